@@ -39,8 +39,6 @@ class Networks:
     """Returns new critics."""
     width: int
     """Units per hidden layer."""
-    fused: bool = False
-    """Whether Adam runs fused: faster, and rounded differently."""
 
 
 class Minibatch(NamedTuple):
@@ -153,7 +151,7 @@ class BatchTD3(TD3):
             policy_kwargs={
                 "net_arch": [networks.width, networks.width],
                 "networks": networks,
-                "optimizer_kwargs": {"fused": True} if networks.fused else {},
+                "optimizer_kwargs": {"fused": True},
             },
             seed=seed,
             device="cpu",

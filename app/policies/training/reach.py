@@ -94,7 +94,7 @@ def networks_of(preset: ReachPreset, n_obs: int) -> Networks:
         quantiles = sizes.n_quantiles, sizes.dropped_quantiles
         return QuantileCritics(width, n_obs, N_ACT, n, layers, normed, *quantiles, crowd)
 
-    return Networks(actor=actor, critic=critic, width=width, fused=True)
+    return Networks(actor=actor, critic=critic, width=width)
 
 
 def start(

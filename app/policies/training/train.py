@@ -6,7 +6,8 @@ buffer with the restored policy; these steps are not counted. Parts of the scena
 ``pick.py``, ``reach.py`` and ``sorting.py``.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 
 import torch
 
@@ -27,6 +28,17 @@ from app.policies.training import (
 from app.policies.training.progress import Progress, TrainResult
 from app.policies.training.reporter import Callbacks, Reporter
 from app.sim.cells.cell import Cell, load_cell
+
+
+@contextmanager
+def _bfloat16_products() -> Iterator[None]:
+    """Let matrix products round to bfloat16 inside, on processors that have it: a third faster."""
+    before = torch.get_float32_matmul_precision()
+    torch.set_float32_matmul_precision("medium")
+    try:
+        yield
+    finally:
+        torch.set_float32_matmul_precision(before)
 
 
 def train(
@@ -69,11 +81,12 @@ def train(
     else:
         run, monitor = pick_training.start(preset, seed, resume, place)
         reporter = pick_training.PickReporter(run, calls, monitor)
-    if resume is not None:
-        run.refill()
-    left = preset.learning.total_steps - run.step
-    if left > 0:
-        run.model.learn(left, callback=reporter, reset_num_timesteps=resume is None)
+    with _bfloat16_products():
+        if resume is not None:
+            run.refill()
+        left = preset.learning.total_steps - run.step
+        if left > 0:
+            run.model.learn(left, callback=reporter, reset_num_timesteps=resume is None)
     policy, state = run.checkpoints()
     if not reporter.stopped and isinstance(preset, PickPreset):
         pick_training.add_outcomes(run, preset, seed, place, policy)
