@@ -23,7 +23,9 @@ class BatchVecEnv(VecEnv):
     """
 
     def __init__(self, task: SteppedTask) -> None:
-        self._task, self._batch = task, task.batch
+        self._task = task
+        self.batch = task.batch
+        """The environments."""
         self.ended: NDArray[np.int64] = np.zeros(task.batch.n_envs, dtype=np.int64)
         """Outcome of the episodes that ended in the last step, 0 elsewhere, (n_envs,)."""
         self._actions: NDArray[Any] = np.zeros(0)
@@ -33,7 +35,7 @@ class BatchVecEnv(VecEnv):
 
     def reset(self) -> NDArray[Any]:
         """Start episode 0 in every environment; return observations, (n_envs, obs_size)."""
-        return self._batch.reset().copy()
+        return self.batch.reset().copy()
 
     def step_async(self, actions: NDArray[Any]) -> None:
         """Store the actions of the next :meth:`step_wait`."""
@@ -43,7 +45,7 @@ class BatchVecEnv(VecEnv):
         self,
     ) -> tuple[NDArray[Any], NDArray[Any], NDArray[Any], list[dict[str, Any]]]:
         """Step all environments; return observations, rewards, ends and infos."""
-        result = self._batch.step(self._actions)
+        result = self.batch.step(self._actions)
         self.ended = result.ended.copy()
         infos, truncated = self._infos.copy(), self._task.cut(self.ended)
         for env in np.flatnonzero(self.ended):
@@ -58,7 +60,7 @@ class BatchVecEnv(VecEnv):
 
     def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
         """Return an attribute of the batch, once per environment."""
-        return [getattr(self._batch, attr_name, None)] * len(self._chosen(indices))
+        return [getattr(self.batch, attr_name, None)] * len(self._chosen(indices))
 
     def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
         """Refuse: the environments share one batch."""

@@ -33,6 +33,14 @@ class PickExploration(NoiseExploration):
     option_rate: float = number(0.02, 0.0, 0.5, "per step", "Start rate of options")
 
 
+class PickNetworks(ActorCriticNetworks):
+    """Sizes of actor and critics, and the values of targets."""
+
+    target_value: Literal["mean", "least"] = choice(
+        "mean", "Target value: the mean of the critics, or the least as in TD3"
+    )
+
+
 class PickEpisode(FieldGroup):
     """Starts, ends and observations of episodes."""
 
@@ -112,11 +120,24 @@ class PickReward(FieldGroup):
 
     c_d: float = number(1.0, 0.0, 10.0, "1/m", "Progress reward weight c_d")
     c_th: float = number(0.25, 0.0, 10.0, "1/rad", "Uprightness weight c_th")
-    c_c: float = number(5.0, 0.0, 100.0, "", "Collision cost c_c")
+    c_c: float = number(5.0, 0.0, 100.0, "", "Collision cost c_c: at the start")
+    c_c_end: float = number(
+        10.0, 0.0, 100.0, "", "Final collision cost: c_c grows to it linearly"
+    )
     c_step: float = number(0.02, 0.0, 1.0, "", "Time cost c_step: per control cycle")
     c_v: float = number(0.0, 0.0, 10.0, "s/m", "Speed cost c_v: TCP speed near the target")
     d_v: float = number(0.1, 0.0, 1.0, "m", "Range d_v of the speed cost")
     c_s: float = number(4.0, 0.0, 100.0, "", "Success bonus c_s")
+
+
+PICK_LEARNING = TD3Learning(
+    total_steps=20_480_000,
+    batch_size=512,
+    lr_end=2e-5,
+    gamma=0.995,
+    policy_delay=2,
+    actor_frozen_updates=3_000,
+)
 
 
 class PickPreset(TrainingConfig):
@@ -124,15 +145,8 @@ class PickPreset(TrainingConfig):
 
     name: str = "pick-td3"
     cell: CellName = "pick-and-place"
-    learning: TD3Learning = TD3Learning(
-        total_steps=9_216_000,
-        batch_size=512,
-        lr_end=3e-5,
-        gamma=0.993,
-        policy_delay=2,
-        actor_frozen_updates=3_000,
-    )
-    networks: ActorCriticNetworks = ActorCriticNetworks()
+    learning: TD3Learning = PICK_LEARNING
+    networks: PickNetworks = PickNetworks()
     exploration: PickExploration = PickExploration(greedy_share=0.125)
     episode: PickEpisode = PickEpisode()
     people: PickPeople = PickPeople()
@@ -142,6 +156,10 @@ class PickPreset(TrainingConfig):
 
 REACH_ONLY = PickPreset(
     name="pick-reach-td3",
+    learning=PICK_LEARNING.model_copy(
+        update={"total_steps": 9_216_000, "gamma": 0.993, "lr_end": 3e-5}
+    ),
+    networks=PickNetworks(target_value="least"),
     episode=PickEpisode(
         task="reach",
         short_limit_s=10.0,
@@ -152,7 +170,7 @@ REACH_ONLY = PickPreset(
     people=PickPeople(
         human_off_task=0.2, human_at_rest=0.0, human_pace=1.0, human_pace_max=1.0
     ),
-    reward=PickReward(c_step=0.005),
+    reward=PickReward(c_step=0.005, c_c_end=5.0),
 )
 """The task without a grasp: a target counts when it is reached, as in the thesis."""
 PICK_PRESETS = (PickPreset(), REACH_ONLY)

@@ -38,7 +38,7 @@ class ActorCriticNetworks(FieldGroup):
     width: Whole = number(256, 16, 1024, "units", "Width of the hidden layers")
     layers: Whole = number(2, 1, 12, "", "Hidden layers")
     critic_norm: Literal["layer", "none"] = choice("layer", "Normalisation of the critics")
-    n_critics: Whole = number(2, 1, 10, "", "Critics: targets use their least value")
+    n_critics: Whole = number(2, 1, 10, "", "Critics: value functions")
 
 
 class NoiseExploration(FieldGroup):

@@ -211,6 +211,7 @@ class Critics(nn.Module):
         normed: Whether hidden layers are normalised.
         n_values: Number of values of each.
         crowd: Position of the people set; None without one.
+        mean_targets: Whether targets use the mean of the value functions, not the minimum.
     """
 
     def __init__(
@@ -223,9 +224,11 @@ class Critics(nn.Module):
         normed: bool = True,
         n_values: int = 1,
         crowd: CrowdShape | None = None,
+        *,
+        mean_targets: bool = False,
     ) -> None:
         super().__init__()
-        self.n_critics = n_critics
+        self.n_critics, self._mean_targets = n_critics, mean_targets
         for number in range(1, n_critics + 1):
             q = QNetwork(width, n_obs, n_act, layers, normed, n_values, crowd)
             self.add_module(f"q{number}", q)
@@ -240,7 +243,9 @@ class Critics(nn.Module):
         return reduce(torch.minimum, self.forward(obs, act)).squeeze(1)
 
     def targets(self, obs: torch.Tensor, act: torch.Tensor) -> torch.Tensor:
-        """Return the values for temporal-difference targets, shape (n, 1): the minimum."""
+        """Return the values for temporal-difference targets, shape (n, 1)."""
+        if self._mean_targets:
+            return torch.stack(self.forward(obs, act)).mean(dim=0)
         return self.least(obs, act).unsqueeze(1)
 
     def first(self, obs: torch.Tensor, act: torch.Tensor) -> torch.Tensor:

@@ -38,7 +38,11 @@ def actor_of(preset: PickPreset, n_obs: int) -> ResidualActor:
 def critics_for(preset: PickPreset, n_obs: int) -> Critics:
     """Return new critics for observations of a length."""
     sizes = preset.networks
-    normed = sizes.critic_norm == "layer"
     return Critics(
-        sizes.width, n_obs, n_critics=sizes.n_critics, layers=sizes.layers, normed=normed
+        sizes.width,
+        n_obs,
+        n_critics=sizes.n_critics,
+        layers=sizes.layers,
+        normed=sizes.critic_norm == "layer",
+        mean_targets=sizes.target_value == "mean",
     )

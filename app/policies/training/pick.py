@@ -82,7 +82,7 @@ def settings_of(preset: PickPreset) -> PickSettings:
         work=work_of(preset.people),
         observation=episode.observation,
         action=preset.action.settings,
-        weights=RewardWeights(**preset.reward.model_dump(), gamma=1.0),
+        weights=RewardWeights(**preset.reward.model_dump(exclude={"c_c_end"}), gamma=1.0),
     )
 
 
@@ -92,6 +92,7 @@ def start(
     """Return a training; see :func:`~app.policies.training.td3.start_td3`."""
     first = seed + first_step(resume)
     batch = PickBatch(cell, preset.learning.n_envs, first, settings_of(preset))
+    batch.set_collision_cost(collision_cost(preset, first_step(resume)))
     rng, config = np.random.default_rng(first), preset.exploration
     noise = PerEnvAR1Noise((batch.n_envs, CONTROLLED), batch.arm.dt, config, rng)
     stations = batch.world.station_q
@@ -145,8 +146,14 @@ def add_outcomes(
         run.add("outcome", head)
 
 
+def collision_cost(preset: PickPreset, step: int) -> float:
+    """Return the collision cost at an environment step, growing over the training."""
+    share = min(1.0, step / preset.learning.total_steps)
+    return preset.reward.c_c + share * (preset.reward.c_c_end - preset.reward.c_c)
+
+
 class PickReporter(Reporter):
-    """Learning curve of the greedy environments.
+    """Learning curve of the greedy environments; raises the collision cost.
 
     Args:
         run: The attempt.
@@ -158,7 +165,9 @@ class PickReporter(Reporter):
         self, run: TrainingRun, callbacks: Callbacks, monitor: TrainingMonitor
     ) -> None:
         super().__init__(run, callbacks)
-        self._monitor = monitor
+        assert isinstance(run.preset, PickPreset)
+        assert isinstance(monitor.env.batch, PickBatch)
+        self._monitor, self._preset, self._batch = monitor, run.preset, monitor.env.batch
         self._returns = np.zeros(run.preset.learning.n_envs)
         self._counts = np.zeros(len(OUTCOMES), dtype=np.int64)
         self._total_return = 0.0
@@ -172,6 +181,7 @@ class PickReporter(Reporter):
         self._total_return += float(self._returns[:n][finished].sum())
         self._returns[ended > 0] = 0.0
         self._monitor.update_ranges(self.num_timesteps)
+        self._batch.set_collision_cost(collision_cost(self._preset, self.num_timesteps))
 
     def rates(self) -> dict[str, Any]:
         """Return rates of the episodes since the last point.

@@ -33,6 +33,7 @@ from app.sim.pick.kernels.observation import (
     observe_batch,
 )
 from app.sim.pick.kernels.reward import RewardWeights
+from app.sim.prediction.weights import new_worker_predictor
 from app.sim.robot.actions import ActionSettings
 from app.sim.robot.kernels import actions, kinematics
 from app.sim.robot.kernels import arm as arm_kernel
@@ -198,6 +199,10 @@ class PickBatch(EnvBatch):
         work = self._work, self._sight
         self._call(episode.observe_rows, *shared, envs, *work, self._view, out)
 
+    def set_collision_cost(self, cost: float) -> None:
+        """Set the cost of a collision in rewards from now on."""
+        self._task = self._task._replace(weights=self._task.weights._replace(c_c=cost))
+
     def set_goals(self, envs: Indices, goals: Vec) -> None:
         """Set new targets [m], shape (len(envs), 3), in some environments."""
         shared = self.world, self.settings.grasp, self.state
@@ -214,7 +219,8 @@ class PickBatch(EnvBatch):
 def observation_workspace_of(cell: Cell) -> PickObservationWorkspace:
     """Return work space for observations in a cell, one at a time."""
     far = human.rest_posture(*FAR_AWAY)
-    return new_pick_observation_workspace(cell.floor_z, far, as_kernel_array(cell.body))
+    size, predictor = as_kernel_array(cell.body), new_worker_predictor()
+    return new_pick_observation_workspace(cell.floor_z, far, size, predictor)
 
 
 def target_configurations(arm: Arm, grasp: GraspRules, goals: Vec) -> tuple[Vec, Vec, Flags]:

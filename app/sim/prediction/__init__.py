@@ -1,5 +1,5 @@
 """Prediction of human motion.
 
-weights   Networks of the shipped motion predictor, from ``data/walker.npz``
+weights   Networks of the shipped motion predictors, from ``data/``
 kernels/  Compiled predictors
 """

@@ -1,4 +1,4 @@
-"""Networks of the shipped motion predictor, from ``data/walker.npz``."""
+"""Networks of the shipped motion predictors, from ``data/walker.npz`` and ``worker.npz``."""
 
 from functools import lru_cache
 from importlib import resources
@@ -7,22 +7,25 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from app.sim.core.arrays import Vec
 from app.sim.prediction.kernels.networks import N_IN, N_TIMES, MotionPredictor, Network
+from app.sim.prediction.kernels.worker import WorkerPredictor
 
-FILE = Path(str(resources.files("app.sim.prediction"))) / "data" / "walker.npz"
+FOLDER = Path(str(resources.files("app.sim.prediction"))) / "data"
+FILE, WORKER_FILE = FOLDER / "walker.npz", FOLDER / "worker.npz"
 KINDS = ("radius", "path")
 """Predicted quantities, one network each."""
 
 
-@lru_cache(maxsize=1)
-def _arrays() -> dict[str, NDArray[np.float32]]:
-    with np.load(FILE, allow_pickle=False) as data:
+@lru_cache(maxsize=2)
+def _arrays(file: Path) -> dict[str, NDArray[np.float32]]:
+    with np.load(file, allow_pickle=False) as data:
         return {name: np.ascontiguousarray(data[name], dtype=np.float32) for name in data.files}
 
 
 def new_motion_predictor() -> MotionPredictor:
     """Return the shipped networks with their own work space."""
-    arrays = _arrays()
+    arrays = _arrays(FILE)
     radius, path = (
         Network(*(arrays[f"{kind}.{field}"] for field in Network._fields)) for kind in KINDS
     )
@@ -50,3 +53,32 @@ def write_networks(radius: Network, path: Network, file: Path = FILE) -> None:
     }
     file.parent.mkdir(parents=True, exist_ok=True)
     np.savez(file, **arrays)
+
+
+def worker_predictor(network: Network, mean: Vec, scale: Vec) -> WorkerPredictor:
+    """Return a predictor of a network with its own work space.
+
+    Args:
+        network: Network.
+        mean: Mean of its inputs, shape (36,).
+        scale: Their scales, shape (36,).
+    """
+    sizes = (len(network.w1), len(network.b1), len(network.b2), len(network.b3))
+    return WorkerPredictor(
+        network, mean, scale, *(np.zeros(size, dtype=np.float32) for size in sizes)
+    )
+
+
+def new_worker_predictor() -> WorkerPredictor:
+    """Return the shipped network with its own work space."""
+    arrays = _arrays(WORKER_FILE)
+    network = Network(*(arrays[field] for field in Network._fields))
+    mean, scale = (arrays[name].astype(np.float64) for name in ("mean", "scale"))
+    return worker_predictor(network, mean, scale)
+
+
+def write_worker_predictor(predictor: WorkerPredictor, file: Path = WORKER_FILE) -> None:
+    """Write a predictor as the shipped file."""
+    inputs = {"mean": predictor.mean, "scale": predictor.scale}
+    arrays = predictor.network._asdict() | inputs
+    np.savez(file, **{name: value.astype(np.float32) for name, value in arrays.items()})

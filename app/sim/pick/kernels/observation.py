@@ -1,8 +1,8 @@
 """Observation of the pick scenario: state of robot, person and target as features (compiled).
 
 The features are normalised and relative to target and person. They contain the joint move of
-the base controller, the distances of four groups of links to the person, and clearances
-extrapolated at constant velocity. All follow from the state (docs/method.md 3.3: q, qd of robot
+the base controller, the distances of four groups of links to the person, and clearances ahead:
+in picks to people as the motion predictor expects them, otherwise at constant velocity. All follow from the state (docs/method.md 3.3: q, qd of robot
 and person, target) and the time left; there is no hidden history. ``LAYOUT`` gives the slice of
 each group. The person's body dimensions affect positions and clearances; ``BODY_SIZES`` adds
 them explicitly (docs/method.md 4). Picks add the phase (``PHASE_SIZES``) and a second person
@@ -35,6 +35,7 @@ from app.sim.robot.kernels.arm import (
     place_robot,
     robot_tilt,
 )
+from app.sim.prediction.kernels.worker import WorkerPredictor, predict_worker
 from app.sim.scenario.kernels.person_observation import (
     BASE_GAIN,
     HORIZONS,
@@ -44,6 +45,7 @@ from app.sim.scenario.kernels.person_observation import (
     extrapolate_capsules,
     new_person_workspace,
     place_person,
+    place_predicted,
 )
 
 TIME_SCALE = 10.0
@@ -208,10 +210,14 @@ class PickObservationWorkspace(NamedTuple):
     """Their body dimensions [m], shape (MAX_PEOPLE, body.N_SIZE)."""
     point: Vec
     """Target of the tcp in the present phase [m], shape (3,)."""
+    predictor: WorkerPredictor
+    """Predicts the motion of the observed people in picks."""
+    ahead: Vec
+    """Their predicted joint positions [m, rad], shape (2, 3, 18)."""
 
 
 def new_pick_observation_workspace(
-    floor_z: float, far_q: Vec, far_size: Vec
+    floor_z: float, far_q: Vec, far_size: Vec, predictor: WorkerPredictor
 ) -> PickObservationWorkspace:
     """Return work space for one observation at a time.
 
@@ -219,6 +225,7 @@ def new_pick_observation_workspace(
         floor_z: Height of the floor [m].
         far_q: Joint positions of the person far away [m, rad], shape (18,).
         far_size: Body dimensions of that person [m], shape (body.N_SIZE,).
+        predictor: Motion predictor; its work space becomes part of this one.
     """
     far = new_person_workspace()
     place_person(floor_z, far_q, np.zeros(18), far_size, far)
@@ -240,6 +247,8 @@ def new_pick_observation_workspace(
         human_qd=np.zeros((MAX_PEOPLE, 18)),
         human_size=np.zeros((MAX_PEOPLE, body.N_SIZE)),
         point=np.zeros(3),
+        predictor=predictor,
+        ahead=np.zeros((2, len(HORIZONS), 18)),
     )
 
 
@@ -415,23 +424,37 @@ def _write_clearances(work: PickObservationWorkspace, place: int, i: int, out: O
 
 @kernel(inline="always")
 def _write_look_ahead(
-    arm: Arm, state: PickQuery, second: int, work: PickObservationWorkspace, out: Obs
+    arm: Arm,
+    floor_z: float,
+    state: PickQuery,
+    second: int,
+    work: PickObservationWorkspace,
+    out: Obs,
 ) -> None:
     """Write the clearances to the observed people at all horizons."""
     q, q_goal, base = state.q, state.q_goal, work.base
     person, other = work.person, work.second
     work.q[5] = q[5]
+    predicts = out.shape[0] == N_WITH_PHASE or out.shape[0] == N_PICK
+    if predicts:
+        predict_worker(work.predictor, state.human_q[0], state.human_qd[0], work.ahead[0])
+    if second > 0:
+        human_q, human_qd = state.human_q[second], state.human_qd[second]
+        predict_worker(work.predictor, human_q, human_qd, work.ahead[1])
     for i in range(3):
         for j in range(CONTROLLED):
             step = base[j] * arm.limits.qd_max[j] * HORIZONS[i]
             limit = abs(q_goal[j] - q[j])
             work.q[j] = q[j] + min(limit, max(-limit, step))
         _place_lanes(arm, work.q, ALONG_BASE, work)
-        extrapolate_capsules(person.now, person.later, HORIZONS[i], person.moved)
+        if predicts:
+            place_predicted(floor_z, work.ahead[0, i], state.size[0], person)
+        else:
+            extrapolate_capsules(person.now, person.later, HORIZONS[i], person.moved)
         nearest_parts(work.lanes, person.moved, FIRST_PART, LAST_PART, work.gap, work.part)
         _write_clearances(work, STILL_AHEAD, i, out)
         if second > 0:
-            extrapolate_capsules(other.now, other.later, HORIZONS[i], other.moved)
+            place_predicted(floor_z, work.ahead[1, i], state.size[second], other)
             nearest_parts(work.lanes, other.moved, FIRST_PART, LAST_PART, work.gap, work.part)
             _write_clearances(work, SECOND_CLEARANCE + 1, i, out)
 
@@ -497,7 +520,7 @@ def observe(
         nearest_parts(work.lanes, now, FIRST_PART, LAST_PART, work.gap, work.part)
         out[SECOND_CLEARANCE] = _lane_clearance(STILL, work)
         out[SECOND_CLEARANCE + 7] = _lane_clearance(AT_GOAL, work)
-    _write_look_ahead(arm, state, second, work, out)
+    _write_look_ahead(arm, floor_z, state, second, work, out)
 
 
 @kernel(inline="always")
