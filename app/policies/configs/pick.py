@@ -131,7 +131,7 @@ class PickReward(FieldGroup):
 
 
 PICK_LEARNING = TD3Learning(
-    total_steps=20_480_000,
+    total_steps=12_288_000,
     batch_size=512,
     lr_end=2e-5,
     gamma=0.995,

@@ -1,7 +1,7 @@
 """Networks of the pick scenario, and the layout of their observations."""
 
 from app.policies.configs.pick import PickPreset
-from app.policies.networks.actor_critic import Critics, Fade, ResidualActor
+from app.policies.networks.actor_critic import Critics, Fade, MeanCritics, ResidualActor
 from app.sim.pick.kernels.observation import (
     BODY_SIZES,
     DISTANCE_SCALE,
@@ -38,11 +38,8 @@ def actor_of(preset: PickPreset, n_obs: int) -> ResidualActor:
 def critics_for(preset: PickPreset, n_obs: int) -> Critics:
     """Return new critics for observations of a length."""
     sizes = preset.networks
-    return Critics(
-        sizes.width,
-        n_obs,
-        n_critics=sizes.n_critics,
-        layers=sizes.layers,
-        normed=sizes.critic_norm == "layer",
-        mean_targets=sizes.target_value == "mean",
+    kind = MeanCritics if sizes.target_value == "mean" else Critics
+    normed = sizes.critic_norm == "layer"
+    return kind(
+        sizes.width, n_obs, n_critics=sizes.n_critics, layers=sizes.layers, normed=normed
     )

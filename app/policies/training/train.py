@@ -32,7 +32,7 @@ from app.sim.cells.cell import Cell, load_cell
 
 @contextmanager
 def _bfloat16_products() -> Iterator[None]:
-    """Let matrix products round to bfloat16 inside, on processors that have it: a third faster."""
+    """Round the factors of matrix products to bfloat16 where the processor has it: faster."""
     before = torch.get_float32_matmul_precision()
     torch.set_float32_matmul_precision("medium")
     try:

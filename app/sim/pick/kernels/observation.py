@@ -2,13 +2,13 @@
 
 The features are normalised and relative to target and person. They contain the joint move of
 the base controller, the distances of four groups of links to the person, and clearances ahead:
-in picks to people as the motion predictor expects them, otherwise at constant velocity. All follow from the state (docs/method.md 3.3: q, qd of robot
-and person, target) and the time left; there is no hidden history. ``LAYOUT`` gives the slice of
-each group. The person's body dimensions affect positions and clearances; ``BODY_SIZES`` adds
-them explicitly (docs/method.md 4). Picks add the phase (``PHASE_SIZES``) and a second person
-(``PICK_SIZES``): the first is the one nearest to the robot, the second, of the others within
-4 m, the one with a hand or the pelvis nearest to the target. Where there is none, a person far
-away is observed.
+in picks to people where the motion predictor expects them, otherwise at constant velocity. All
+follow from the state (docs/method.md 3.3: q, qd of robot and person, target) and the time left;
+there is no hidden history. ``LAYOUT`` gives the slice of each group. The person's body
+dimensions affect positions and clearances; ``BODY_SIZES`` adds them explicitly (docs/method.md
+4). Picks add the phase (``PHASE_SIZES``) and a second person (``PICK_SIZES``): the first is the
+one nearest to the robot, the second, of the others, the one with a hand or the pelvis nearest
+to the target.
 
 Source: (5.8) for the raw state. Deviates: features are added, because the raw state learned far
 more slowly (1 % against 90 % after 2.7 k updates in trials beside the pedestrian).
@@ -25,6 +25,7 @@ from app.sim.core.observation_layout import slices_of
 from app.sim.geometry.capsules import nearest_parts, new_columns, padded_size
 from app.sim.geometry.segments import segment_nearest
 from app.sim.human.kernels import kinematics as body
+from app.sim.prediction.kernels.worker import WorkerPredictor, predict_worker
 from app.sim.robot.kernels import kinematics
 from app.sim.robot.kernels.arm import (
     CONTROLLED,
@@ -35,7 +36,6 @@ from app.sim.robot.kernels.arm import (
     place_robot,
     robot_tilt,
 )
-from app.sim.prediction.kernels.worker import WorkerPredictor, predict_worker
 from app.sim.scenario.kernels.person_observation import (
     BASE_GAIN,
     HORIZONS,
