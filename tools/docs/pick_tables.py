@@ -42,7 +42,8 @@ def _cases(rows: list[Json]) -> list[list[str]]:
 
 def _calibration(rows: list[Json]) -> list[list[str]]:
     head = ["", "outcome", "predictions", "rate [%]", "mean [%]", "ECE [%]", "by chance [%]"]
-    lines = [[*head, "Brier", "constant", "AUC"]]
+    more = ["recalibrated ECE [%]", "recalibrated Brier"]
+    lines = [[*head, "Brier", "constant", "AUC", *more]]
     for row in rows:
         for outcome in ("success", "contact"):
             one: Json = row[outcome]
@@ -59,6 +60,8 @@ def _calibration(rows: list[Json]) -> list[list[str]]:
                     f"{one['brier']:.4f}",
                     f"{one['brier_constant']:.4f}",
                     auc,
+                    f"{100.0 * one['recalibrated']['ece']:.1f}",
+                    f"{one['recalibrated']['brier']:.4f}",
                 ]
             )
     return lines

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.special import expit, logit
 
 from app.errors import InvalidInput
 from app.policies.checkpoints import checkpoint as formats
@@ -28,6 +29,17 @@ def test_shifted_probabilities_have_that_error():
     probability, happened = drawn()
     found = calibration(np.clip(probability + 0.1, 0, 1), np.zeros(20_000), happened, 1)
     assert found["ece"] == pytest.approx(0.1, abs=0.02)
+
+
+def test_recalibration_corrects_what_a_slope_and_an_offset_can():
+    probability, happened = drawn()
+    wrong = expit(0.5 * logit(probability) + 1.0)
+    found = calibration(wrong, np.zeros(20_000), happened, 1)
+    assert found["ece"] > 0.1
+    assert found["recalibrated"]["ece"] < 0.02
+    assert found["recalibrated"]["brier"] == pytest.approx(
+        ((probability - happened) ** 2).mean(), abs=0.001
+    )
 
 
 def test_ranks_of_a_perfect_and_of_a_useless_prediction():
