@@ -7,7 +7,7 @@ from typing import Any
 
 from app.errors import InvalidInput, NotFound
 from app.policies.checkpoints.checkpoint import CHOOSING, REACHING, SORTING, Checkpoint, task_of
-from app.policies.evaluation.pick import calibration, people, tracker
+from app.policies.evaluation.pick import calibration, people, tracker, worst_people
 from app.policies.evaluation.pick import cases as pick_cases
 from app.policies.evaluation.pick import tasks as pick
 from app.policies.evaluation.reach.oracle import run_oracle
@@ -37,6 +37,7 @@ PROTOCOLS: Mapping[str, Protocol] = MappingProxyType(
         "pick-people": people.run_people,
         "pick-yielding": people.run_yielding,
         "pick-mocap": people.run_mocap,
+        "pick-worst": worst_people.run_worst,
         "safety-ssm": run_safety,
         "sorting-grid": run_grid,
         "sorting-tests": run_tests,

@@ -162,7 +162,7 @@ def reach_script(
         delay_s: Rest before the move [s].
     """
     postures = [
-        _standing_reach(cell, palm, hand, stand)
+        standing_reach(cell, palm, hand, stand)
         for palm, stand in zip(palms, pelvis_x, strict=True)
     ]
     distance = float(np.linalg.norm(np.subtract(*palms)))
@@ -170,7 +170,18 @@ def reach_script(
     return ReachScript(np.array([delay_s]), np.array([duration]), np.array(postures))
 
 
-def _standing_reach(cell: Cell, palm: Vec, hand: Hand, pelvis_x: float | None) -> Vec:
+def standing_reach(cell: Cell, palm: Vec, hand: Hand, pelvis_x: float | None) -> Vec:
+    """Return a posture with one palm at a point and the other at the table's edge.
+
+    Args:
+        cell: Work cell.
+        palm: Position of the palm [m], shape (3,).
+        hand: The hand.
+        pelvis_x: Pelvis x [m]; None follows the palm.
+
+    Returns:
+        Joint positions [m, rad], shape (18,).
+    """
     sign = -1.0 if hand == "r" else 1.0
     x = 0.8 * palm[0] - sign * 0.12 if pelvis_x is None else pelvis_x
     x = float(np.clip(x, cell.human.x_min, cell.human.x_max))

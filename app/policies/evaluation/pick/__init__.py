@@ -1,9 +1,13 @@
 """Evaluation of the pick scenario.
 
+calibration      Protocol ``risk-calibration``: predicted probabilities against rates
+cases            Protocol ``pick-cases``: the four case studies
 episodes         Run pick episodes to their ends under a selection rule
-people           Protocols ``pick-people``, ``pick-mocap``, ``pick-yielding``: other people
+people           Protocols ``pick-people``, ``pick-mocap``, ``pick-yielding``,
+                 ``pick-rest``: other people
 recorded_people  Record poses of robot and people, and check them again with FCL
 selection_rules  Selection rules: the critic's with hysteresis, and others
 tasks            Protocols ``pick-single`` and ``pick-choice`` (docs/method.md 3.6)
 tracker          Protocol ``pick-tracker``: people observed through a tracker
+worst_people     Protocol ``pick-worst``: people found by a search
 """

@@ -162,7 +162,7 @@ def calibration(
 
 
 def _recalibrated(probability: Float, happened: NDArray[np.bool_], seed: int) -> Float:
-    """Return the probabilities after Platt scaling, fitted to the other half of the data each."""
+    """Return the probabilities after Platt scaling, each half fitted to the other one."""
     x = logit(np.clip(probability, 1e-4, 1.0 - 1e-4))
     halves = np.array_split(np.random.default_rng(seed).permutation(len(x)), 2)
     corrected = np.empty(len(x))

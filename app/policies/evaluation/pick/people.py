@@ -54,7 +54,7 @@ SMALL, LARGE = 5.0, 95.0
 """Percentiles of stature; arms and shoulders scale with it."""
 
 
-class _Bench:
+class ChoiceBench:
     """Evaluate one checkpoint under several settings on episodes of one seed."""
 
     def __init__(
@@ -111,7 +111,7 @@ def run_people(
         seed: Seed of the episodes.
         on_row: Callback for each finished row.
     """
-    bench = _Bench(checkpoint, episodes, seed, on_row)
+    bench = ChoiceBench(checkpoint, episodes, seed, on_row)
     usual, pelvis = bench.usual, bench.cell.human.pelvis_height
     small, large = (_sized(usual.work, share, pelvis) for share in (SMALL, LARGE))
 
@@ -195,7 +195,7 @@ def run_yielding(
         seed: Seed of the episodes.
         on_row: Callback for each finished row.
     """
-    bench = _Bench(checkpoint, episodes, seed, on_row)
+    bench = ChoiceBench(checkpoint, episodes, seed, on_row)
     usual = bench.usual
 
     def beside(strength: float) -> PickSettings:
@@ -244,7 +244,7 @@ def run_mocap(
     """
     if not motions:
         raise InvalidInput("motions", 0, "must hold at least one recording")
-    bench = _Bench(checkpoint, episodes, seed, on_row)
+    bench = ChoiceBench(checkpoint, episodes, seed, on_row)
     usual, cell = bench.usual, bench.cell
     files = sorted({motion.name for motion in motions})
     rows = {"library": usual, "recorded": beside_recordings(usual, motions, cell)}

@@ -1,0 +1,124 @@
+"""Protocol ``pick-worst``: the people beside whom a policy succeeded least.
+
+``tools/search_worst_people.py`` searches motions of one hand over the table, inside stated
+limits, for those with the lowest rate of success; ``worst_people.json`` keeps what it found as
+a regression test for later policies. A motion is a path of the palm over four points, played
+forth and back.
+"""
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from app.policies.checkpoints.checkpoint import Checkpoint
+from app.policies.evaluation.pick.people import ChoiceBench
+from app.policies.evaluation.rows import OnRow, ignore_row
+from app.sim.cells.cell import Cell
+from app.sim.core.arrays import Vec
+from app.sim.human.model import Hand
+from app.sim.mocap.importer import Motion
+from app.sim.people.human_motion_config import HumanMotionConfig
+from app.sim.people.reach_script import ReachScript, standing_reach
+from app.sim.pick.batch import PickSettings
+
+FILE = Path(__file__).with_suffix(".json")
+N_POINTS = 4
+"""Points of a path."""
+BOX = ((-0.65, 0.35, 0.08), (0.65, 0.8, 0.35))
+"""Least and greatest coordinates of the palm [m]."""
+SPEEDS = (0.2, 0.7)
+"""Least and greatest mean speed of a move [m/s]; the peak is 1.9 times as high."""
+PAUSES = (0.1, 2.0)
+"""Shortest and longest rest before a move [s]."""
+N_NUMBERS = 1 + 3 * N_POINTS + 2 * (N_POINTS - 1)
+"""Numbers that describe a motion."""
+SAMPLE_S = 0.02
+"""Sampling step of a motion [s]."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class HandMotion:
+    """Motion of one hand over the table."""
+
+    hand: Hand
+    """The hand; the other one rests at the edge of the table."""
+    palms: tuple[tuple[float, ...], ...]
+    """Points of the palm [m], N_POINTS of shape (3,)."""
+    speeds: tuple[float, ...]
+    """Mean speed of each move [m/s]."""
+    pauses: tuple[float, ...]
+    """Rest before each move [s]."""
+
+
+def hand_motion(numbers: Vec) -> HandMotion:
+    """Return the motion of numbers in [0, 1], shape (N_NUMBERS,), inside the limits."""
+    points, speeds, pauses = np.split(numbers[1:], (3 * N_POINTS, 4 * N_POINTS - 1))
+    low, high = np.array(BOX)
+    palms = low + points.reshape(N_POINTS, 3) * (high - low)
+    return HandMotion(
+        hand="r" if numbers[0] < 0.5 else "l",
+        palms=tuple(tuple(round(float(x), 3) for x in palm) for palm in palms),
+        speeds=tuple(round(float(x), 3) for x in np.interp(speeds, (0, 1), SPEEDS)),
+        pauses=tuple(round(float(x), 3) for x in np.interp(pauses, (0, 1), PAUSES)),
+    )
+
+
+def motion_of(cell: Cell, motion: HandMotion, name: str) -> Motion:
+    """Return a motion as joint positions of the cell's person."""
+    palms = np.array(motion.palms)
+    postures = [standing_reach(cell, palm, motion.hand, None) for palm in palms]
+    duration = np.linalg.norm(np.diff(palms, axis=0), axis=1) / motion.speeds
+    duration = np.maximum(duration, SAMPLE_S)
+    start = np.cumsum(motion.pauses) + np.concatenate([[0.0], np.cumsum(duration)[:-1]])
+    script = ReachScript(start, duration, np.array(postures))
+    times = np.arange(0.0, start[-1] + duration[-1] + SAMPLE_S, SAMPLE_S)
+    return Motion(
+        name=name,
+        source="search",
+        times=times,
+        q=np.array([script.at(float(t))[0] for t in times]),
+        pelvis_z=np.zeros(len(times)),
+        size=cell.human.size,
+        first_frame=0,
+    )
+
+
+def beside(settings: PickSettings, cell: Cell, motions: Sequence[HandMotion]) -> PickSettings:
+    """Return settings beside people who follow motions, one drawn per episode."""
+    runs = tuple(motion_of(cell, one, f"found-{k}") for k, one in enumerate(motions, start=1))
+    return replace(settings, work=HumanMotionConfig(motion="recorded", recorded=runs))
+
+
+def stored_motions() -> tuple[HandMotion, ...]:
+    """Return the motions that were found, the worst first."""
+    return tuple(
+        HandMotion(
+            hand=one["hand"],
+            palms=tuple(tuple(palm) for palm in one["palms"]),
+            speeds=tuple(one["speeds"]),
+            pauses=tuple(one["pauses"]),
+        )
+        for one in json.loads(FILE.read_text())["motions"]
+    )
+
+
+def run_worst(
+    checkpoint: Checkpoint, *, episodes: int | None, seed: int, on_row: OnRow = ignore_row
+) -> dict[str, Any]:
+    """Evaluate beside the people who were found, together and one by one.
+
+    Args:
+        checkpoint: Policy and critic.
+        episodes: Number of episodes of each row, by default 1000.
+        seed: Seed of the episodes.
+        on_row: Callback for each finished row.
+    """
+    bench, found = ChoiceBench(checkpoint, episodes, seed, on_row), stored_motions()
+    rows = {"library": bench.usual, "found": beside(bench.usual, bench.cell, found)}
+    for number, one in enumerate(found, start=1):
+        rows[f"found-{number}"] = beside(bench.usual, bench.cell, [one])
+    return bench.all(rows)

@@ -1,0 +1,121 @@
+"""Search the hand motions beside which the shipped pick policy succeeds least.
+
+Differential evolution over the numbers of a motion (``evaluation/pick/worst_people.py``); the
+objective is the rate of success when the critic selects among two or three targets. All
+motions of a generation are evaluated in one batch. The last generation is evaluated again on
+another seed, because the least of many noisy rates is too low by chance, and its worst motions
+are written to ``worst_people.json``, which is committed.
+
+Takes about five minutes on one core.
+"""
+
+import json
+import logging
+from collections.abc import Sequence
+from dataclasses import asdict
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from scipy.optimize import differential_evolution
+
+from app.policies.checkpoints import pretrained
+from app.policies.checkpoints.checkpoint import Checkpoint
+from app.policies.checkpoints.trained_cell import cell_of
+from app.policies.evaluation.pick import selection_rules
+from app.policies.evaluation.pick.episodes import Evaluator, settings_for
+from app.policies.evaluation.pick.people import CANDIDATES
+from app.policies.evaluation.pick.worst_people import (
+    FILE,
+    N_NUMBERS,
+    HandMotion,
+    beside,
+    hand_motion,
+)
+from app.policies.inference.task_selection import HYSTERESIS, ValueNetworks, pick_preset_of
+
+logger = logging.getLogger(__name__)
+
+SEED = 601
+"""Seed of the search; ``SEED + 1`` is that of the second evaluation."""
+N_MOTIONS, N_GENERATIONS = 48, 12
+PER_MOTION, PER_MOTION_AGAIN = 24, 150
+"""Episodes of each motion, on average."""
+N_KEPT = 10
+
+
+def success_beside(
+    checkpoint: Checkpoint, motions: Sequence[HandMotion], per_motion: int, seed: int
+) -> NDArray[np.float64]:
+    """Return the rate of success beside each motion.
+
+    Args:
+        checkpoint: Policy and critic.
+        motions: The motions.
+        per_motion: Episodes of each, on average.
+        seed: Seed of the episodes.
+
+    Returns:
+        Rates with one success and one failure added, shape (len(motions),).
+    """
+    cell, usual = (
+        cell_of(checkpoint.manifest),
+        settings_for(CANDIDATES, pick_preset_of(checkpoint)),
+    )
+    settings, n = beside(usual, cell, motions), per_motion * len(motions)
+    evaluator = Evaluator(ValueNetworks(checkpoint), cell, n, seed, settings)
+    won = evaluator.run(selection_rules.critic(HYSTERESIS)).won
+    track = evaluator.batch.state.people.track[:, 0]
+    hits = np.bincount(track, weights=won, minlength=len(motions))
+    return np.asarray((hits + 1.0) / (np.bincount(track, minlength=len(motions)) + 2.0))
+
+
+def search(
+    checkpoint: Checkpoint, n_motions: int, n_generations: int, n_kept: int
+) -> list[tuple[HandMotion, float]]:
+    """Return the worst motions found, and the rate of success beside each on another seed.
+
+    Args:
+        checkpoint: Policy and critic.
+        n_motions: Motions of a generation.
+        n_generations: Generations.
+        n_kept: Motions that are returned.
+    """
+
+    def rates(numbers: NDArray[np.float64]) -> NDArray[np.float64]:
+        motions = [hand_motion(one) for one in np.atleast_2d(numbers.T)]
+        found = success_beside(checkpoint, motions, PER_MOTION, SEED)
+        logger.info("success from %.2f, mean %.2f", found.min(), found.mean())
+        return found
+
+    rng = np.random.default_rng(SEED)
+    result = differential_evolution(
+        rates,
+        [(0.0, 1.0)] * N_NUMBERS,
+        init=rng.random((n_motions, N_NUMBERS)),
+        maxiter=n_generations,
+        tol=0.0,
+        polish=False,
+        vectorized=True,
+        updating="deferred",
+        rng=rng,
+    )
+    motions = [hand_motion(one) for one in result.population]
+    again = success_beside(checkpoint, motions, PER_MOTION_AGAIN, SEED + 1)
+    return [(motions[k], float(again[k])) for k in np.argsort(again)[:n_kept]]
+
+
+def main() -> None:
+    """Search beside the shipped policy and write the motions."""
+    logging.basicConfig(level=logging.INFO, format="%(message)s")
+    torch.set_num_threads(1)
+    checkpoint = pretrained.load("pick")
+    found = search(checkpoint, N_MOTIONS, N_GENERATIONS, N_KEPT)
+    motions = [asdict(motion) | {"success": round(rate, 3)} for motion, rate in found]
+    content = {"checkpoint": checkpoint.sha256, "seed": SEED, "motions": motions}
+    FILE.write_text(json.dumps(content, indent=1) + "\n")
+    logger.info("wrote %s: success %s", FILE, [round(rate, 3) for _, rate in found])
+
+
+if __name__ == "__main__":
+    main()
