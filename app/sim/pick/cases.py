@@ -93,16 +93,17 @@ CASES = (
         id="case-3",
         title="Blocked for a while",
         text=(
-            "The right arm moves from cube 3 to dock 1 and obstructs the path for a while; the "
-            "robot should switch while its goal is blocked."
+            "The left arm moves from cube 4 to dock 1 across cube 3, the nearer goal; the robot "
+            "should switch while cube 3 is blocked, and end there."
         ),
         robot_start="cube5",
-        goals=("cube0", "cube1"),
-        hand="r",
-        human_from="cube3",
+        goals=("cube1", "cube3"),
+        hand="l",
+        human_from="cube4",
         human_to="dock1",
-        expected="cube1",
+        expected="cube3",
         switches=(1, None),
+        delay_s=0.8,
     ),
     Case(
         id="case-4",

@@ -24,8 +24,8 @@ def test_case_2_blocks_the_nearer_goal_for_good_and_leaves_the_farther_free():
 
 def test_case_3_blocks_the_nearer_goal_for_a_while():
     shown = geometry(CELL, find_case("case-3"))
-    assert shown.joint_distance_rad["cube1"] < shown.joint_distance_rad["cube0"]
-    first, last = shown.blocked_s["cube1"]
+    assert shown.joint_distance_rad["cube3"] < shown.joint_distance_rad["cube1"]
+    first, last = shown.blocked_s["cube3"]
     assert 0.5 < first < last < 2.0
 
 

@@ -19,7 +19,10 @@ from app.sim.pick.kernels.observation import (
     N_WITH_PHASE,
     PICK_SIZES,
 )
+from app.sim.prediction.kernels.worker import TIMES, predict_worker
+from app.sim.prediction.weights import new_worker_predictor
 from app.sim.robot.ur10 import Robot
+from app.sim.scenario.kernels.person_observation import HORIZONS
 from app.sim.scene.scene import arm_of, people_of
 
 
@@ -131,9 +134,26 @@ def picking(**changes: Any) -> TaskView:
 
 def test_a_pick_adds_to_the_features_of_a_reach(cell: Cell) -> None:
     reach, both = seen(cell), seen(cell, task=picking())
-    other = np.setdiff1d(np.arange(N_FEATURES), np.arange(N_FEATURES)[LAYOUT["goal_clearance"]])
+    ahead = ("look_ahead_still", "look_ahead_base", "goal_clearance")
+    places = np.concatenate([np.arange(N_FEATURES)[LAYOUT[name]] for name in ahead])
+    other = np.setdiff1d(np.arange(N_FEATURES), places)
     np.testing.assert_array_equal(both[:, other], reach[:, other])
     np.testing.assert_array_equal(both[:, PICK["phase"]], [[1, 0, 0]] * len(reach))
+
+
+def test_clearances_ahead_are_those_to_the_predicted_person(cell: Cell) -> None:
+    at = state(cell)
+    at["human_q"] = human.rest_posture(0.1, 1.2, -1.5)
+    predicted = np.empty((len(HORIZONS), 18))
+    predict_worker(new_worker_predictor(), at["human_q"], at["human_qd"], predicted)
+    row = seen(cell, **at, task=picking())[0]
+    for k, posture in enumerate(predicted):
+        there = seen(cell, **at | {"human_q": posture}, task=picking())[0]
+        now = there[LAYOUT["distance_tilt_clearance_time"]][2]
+        assert row[LAYOUT["look_ahead_still"]][k] == pytest.approx(now, abs=1e-5)
+        at_goal = there[LAYOUT["goal_clearance"]][0]
+        assert row[LAYOUT["goal_clearance"]][1 + k] == pytest.approx(at_goal, abs=1e-5)
+    assert TIMES == HORIZONS
 
 
 def test_in_the_descent_the_target_is_the_object(cell: Cell) -> None:
