@@ -49,7 +49,7 @@ OTHER_LIBRARY = 1_000_003
 """Seed of postures that do not occur in the training."""
 
 
-class Moments(NamedTuple):
+class PostureMoments(NamedTuple):
     """Motion of people at n moments."""
 
     now: Vec
@@ -60,7 +60,7 @@ class Moments(NamedTuple):
     """Body dimensions [m], shape (n, body.N_SIZE)."""
 
 
-def watched(settings: PickSettings, n_people: int, n_steps: int, seed: int) -> Moments:
+def watched(settings: PickSettings, n_people: int, n_steps: int, seed: int) -> PostureMoments:
     """Return the motion of people, observed at every control cycle.
 
     Args:
@@ -83,10 +83,10 @@ def watched(settings: PickSettings, n_people: int, n_steps: int, seed: int) -> M
     rows, who = np.nonzero(episode[: -ahead[-1]] == episode[ahead[-1] :])
     q = now[..., :N_JOINTS]
     change = np.stack([q[rows + k, who] - q[rows, who] for k in ahead], axis=1)
-    return Moments(now[rows, who], change, size[rows, who])
+    return PostureMoments(now[rows, who], change, size[rows, who])
 
 
-def fitted(moments: Moments, n_updates: int, seed: int) -> WorkerPredictor:
+def fitted(moments: PostureMoments, n_updates: int, seed: int) -> WorkerPredictor:
     """Return a predictor trained on moments.
 
     Args:
@@ -133,7 +133,7 @@ def hands(q: Vec, size: Vec) -> Vec:
     return out
 
 
-def hand_errors(predictor: WorkerPredictor, moments: Moments) -> Vec:
+def hand_errors(predictor: WorkerPredictor, moments: PostureMoments) -> Vec:
     """Return mean errors of moving hands [m] at each time: of the predictor, at constant speed.
 
     A hand moves if it would be 5 cm away after 0.25 s.
@@ -167,7 +167,7 @@ def training_people() -> PickSettings:
 
 
 def other_people() -> dict[str, HumanMotionConfig]:
-    """Return people on whom errors are reported."""
+    """Return the people of the reported errors."""
     usual = HumanMotionConfig(seed=OTHER_LIBRARY)
     return {
         "library": usual,

@@ -1,4 +1,4 @@
-"""The search for the people beside whom the policy succeeds least."""
+"""The search for people beside the shipped pick policy that lower its success."""
 
 import numpy as np
 

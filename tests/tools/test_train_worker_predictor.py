@@ -14,7 +14,7 @@ from app.sim.prediction.weights import (
     write_worker_predictor,
 )
 from tools.train_worker_predictor import (
-    Moments,
+    PostureMoments,
     fitted,
     hand_errors,
     hands,
@@ -24,7 +24,7 @@ from tools.train_worker_predictor import (
 )
 
 
-def others(kind: str) -> Moments:
+def others(kind: str) -> PostureMoments:
     """Return motion that the shipped predictor was not trained on."""
     return watched(replace(training_people(), work=other_people()[kind]), 24, 80, 99)
 

@@ -1,4 +1,4 @@
-"""Protocol ``pick-worst``: the people beside whom a policy succeeded least.
+"""Protocol ``pick-worst``: people that a search found to lower the success of a policy.
 
 ``tools/search_worst_people.py`` searches motions of one hand over the table, inside stated
 limits, for those with the lowest rate of success; ``worst_people.json`` keeps what it found as
