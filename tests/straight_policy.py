@@ -4,6 +4,7 @@ It values a candidate by the way to go and by how near a hand is to it.
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -12,7 +13,16 @@ from app.sim.core.arrays import Vec
 from app.sim.human import model as human
 from app.sim.human.person import Person
 from app.sim.pick.kernels.grasp import DESCEND, LIFT, GraspRules
-from app.sim.pick.task_policy import NOT_BEGUN, Candidate, Decision, PickProgress
+from app.sim.pick.task_policy import (
+    FRESH,
+    NOT_BEGUN,
+    Candidate,
+    ChoiceTerms,
+    Decision,
+    MovedPerson,
+    PickProgress,
+    RiskMap,
+)
 from app.sim.robot.actions import ActionSettings
 from app.sim.robot.kernels import kinematics
 from app.sim.scene.scene import arm_of
@@ -69,5 +79,29 @@ class StraightPolicy:
             outside=(),
             outside_candidates=((),) * len(candidates),
             checkpoint=self.checkpoint,
+            elapsed_ms=0.0,
+        )
+
+    def risk_map(
+        self,
+        q: Vec,
+        qd: Vec,
+        people: Sequence[Person],
+        candidates: Sequence[Candidate],
+        moved: MovedPerson,
+        *,
+        terms: ChoiceTerms = FRESH,
+    ) -> RiskMap:
+        found = []
+        for posture in moved.q:
+            there = list(people)
+            there[moved.index] = replace(people[moved.index], q=posture)
+            found.append(self.decide(q, qd, there, candidates, previous=terms.previous))
+        return RiskMap(
+            chosen=np.array([one.index for one in found]),
+            value=np.array([one.values[one.index] for one in found]),
+            success=None,
+            contact=None,
+            clearance_m=np.ones(len(found)),
             elapsed_ms=0.0,
         )

@@ -32,7 +32,8 @@ from app.policies.evaluation.pick.worst_people import (
     beside,
     hand_motion,
 )
-from app.policies.inference.task_selection import HYSTERESIS, ValueNetworks, pick_preset_of
+from app.policies.inference.task_selection import HYSTERESIS
+from app.policies.inference.value_networks import ValueNetworks, pick_preset_of
 
 logger = logging.getLogger(__name__)
 

@@ -4,7 +4,8 @@
 
 ``candidates-3`` is the live cell's case, ``candidates-1000`` the most a request may hold. What
 is timed is ``TaskPolicy.decide`` with the shipped checkpoint, as the service calls it: inverse
-kinematics, features, both networks.
+kinematics, features, all networks. ``actor-3`` and ``actor-1000`` are the actor alone,
+``actor-torch-3`` and ``actor-torch-1000`` the same with torch.
 
 ``sorting`` is one move of the largest sorting cell with a shipped checkpoint, by that,
 ``sorting-planner`` one of ``sorting-e1`` by the exact planner, both as
@@ -19,15 +20,20 @@ beside it.
 
 import itertools
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 import torch
 
 from app.policies.checkpoints import pretrained
+from app.policies.checkpoints.model_state import under
 from app.policies.inference.sorting_policy import SortingPolicy
 from app.policies.inference.task_selection import TaskChooser
+from app.policies.inference.value_networks import ValueNetworks, pick_preset_of
+from app.policies.networks.forward import ForwardPass
+from app.policies.networks.pick import actor_of
 from app.sim.cells.cell import Cell, load_cell
 from app.sim.core.arrays import Vec
 from app.sim.human.person import Person
@@ -101,6 +107,33 @@ def measured(policy: TaskPolicy, n: int, seed: int, seconds: float) -> Row:
     return summary(f"candidates-{n}", n, times)
 
 
+def actor_rows(seed: int, seconds: float) -> Iterator[Row]:
+    """Yield the rows of the actor, without torch and with it."""
+    checkpoint, rng = pretrained.load("pick"), np.random.default_rng(seed)
+    n_obs = ValueNetworks(checkpoint).n_obs
+    module = actor_of(pick_preset_of(checkpoint), n_obs)
+    module.load_state_dict(under(checkpoint.arrays(), "actor"))
+    forward, varying = ForwardPass(module.net), np.ones(n_obs, dtype=bool)
+    for n in (3, 1000):
+        obs = rng.normal(size=(n, n_obs)).astype(np.float32)
+        calls: dict[str, Callable[[], object]] = {
+            "actor": partial(forward, obs, varying),
+            "actor-torch": partial(module.net, torch.as_tensor(obs)),
+        }
+        for name, call in calls.items():
+            with torch.inference_mode():
+                times = np.fromiter(timed_ms(call, seconds), dtype=np.float64)
+            yield summary(f"{name}-{n}", n, times)
+
+
+def timed_ms(call: Callable[[], object], seconds: float) -> Iterator[float]:
+    """Yield the time of each call for ``seconds`` [ms]."""
+    ends = time.perf_counter() + seconds
+    while (begin := time.perf_counter()) < ends:
+        call()
+        yield 1e3 * (time.perf_counter() - begin)
+
+
 def summary(name: str, n: int, times: Vec) -> Row:
     """Return the row of decisions that took these times [ms]."""
     return {
@@ -149,6 +182,7 @@ def main() -> None:
     policy = TaskChooser(pretrained.load("pick"), load_cell())
     seconds = options.rounds * options.seconds
     rows = [measured(policy, n, options.seed, seconds) for n in (3, 1000)]
+    rows += actor_rows(options.seed, 0.2 * seconds)
     shipped = [name for name in SORTING_CELLS if name in pretrained.ALIASES]
     for name in shipped[:1]:
         sorting_policy = SortingPolicy(pretrained.load(name))

@@ -31,7 +31,8 @@ from app.policies.checkpoints.checkpoint import Checkpoint, load
 from app.policies.checkpoints.trained_cell import cell_of
 from app.policies.evaluation.pick import selection_rules as choice_rules
 from app.policies.evaluation.pick.episodes import Evaluator, settings_for
-from app.policies.inference.task_selection import HYSTERESIS, ValueNetworks, pick_preset_of
+from app.policies.inference.task_selection import HYSTERESIS
+from app.policies.inference.value_networks import ValueNetworks, pick_preset_of
 from app.provenance import describe
 from app.sim.mocap.importer import Motion
 from app.sim.people.human_motion_config import at_the_table

@@ -10,27 +10,21 @@ Source: thesis eq. (5.1)-(5.7). Deviates: hysteresis is ours; 0 gives the source
 
 import time
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
 
-from app.errors import CheckpointMismatch, InvalidInput
-from app.policies.checkpoints.checkpoint import (
-    CHOOSING,
-    Checkpoint,
-    expect_layout,
-    require_purpose,
-)
-from app.policies.checkpoints.model_state import under
-from app.policies.configs.fields import read_config
-from app.policies.configs.pick import PickPreset
+from app.errors import InvalidInput
+from app.policies.checkpoints.checkpoint import Checkpoint
+from app.policies.inference.moved_person import scenes_of
 from app.policies.inference.trained_policy import TrainedPolicy
-from app.policies.networks.outcome import OutcomeHead, OutcomePrediction
-from app.policies.networks.pick import LAYOUTS, actor_of, critics_for
+from app.policies.inference.trained_ranges import TrainedRanges
+from app.policies.inference.value_networks import ValueNetworks, pick_preset_of
+from app.policies.networks.outcome import OutcomePrediction
+from app.policies.networks.pick import CLEARANCE
 from app.sim.cells.cell import Cell, require_cell
 from app.sim.core.arrays import Vec
-from app.sim.core.out_of_range import OutsideField
 from app.sim.human import model as human
 from app.sim.human.person import Person
 from app.sim.perception.observed_people import (
@@ -42,18 +36,22 @@ from app.sim.perception.observed_people import (
 )
 from app.sim.pick.batch import TaskView, observation_workspace_of, observe, step_robot
 from app.sim.pick.kernels.grasp import LIFT, GraspRules
+from app.sim.pick.kernels.observation import DISTANCE_SCALE
 from app.sim.pick.task_policy import (
+    FRESH,
     NOT_BEGUN,
     Candidate,
+    ChoiceTerms,
     Decision,
+    MovedPerson,
     Objective,
     OutcomeEstimate,
     PickProgress,
+    RiskMap,
 )
-from app.sim.robot import ur10 as robot
 from app.sim.robot.actions import ActionSettings
 from app.sim.robot.kernels.arm import CONTROLLED
-from app.sim.robot.measured_state import StateLimits
+from app.sim.robot.measured_state import MeasuredState, StateLimits
 from app.sim.scene.scene import FAR_AWAY, arm_of, people_of
 
 HYSTERESIS = 0.5
@@ -69,85 +67,15 @@ _FAR_PERSON = Person(q=human.rest_posture(*FAR_AWAY), qd=np.zeros(18))
 """Observed person of an empty cell."""
 
 
-def pick_preset_of(checkpoint: Checkpoint) -> PickPreset:
-    """Return the training configuration of a checkpoint of the pick scenario.
-
-    Raises:
-        InvalidInput: The checkpoint has another purpose or an invalid configuration.
-    """
-    require_purpose(checkpoint, CHOOSING)
-    return read_config(PickPreset, checkpoint.manifest["preset"], "manifest.preset")
-
-
-class ValueNetworks:
-    """Actor and critics of a checkpoint, for inference.
-
-    Args:
-        checkpoint: A ``policy`` checkpoint.
-
-    Raises:
-        CheckpointMismatch: The layout of observations or actions is another one.
-    """
-
-    def __init__(self, checkpoint: Checkpoint) -> None:
-        preset = pick_preset_of(checkpoint)
-        expect_layout(checkpoint, LAYOUTS[preset.episode.observation], CONTROLLED)
-        self.n_obs = sum(size for _, size in checkpoint.manifest["layout"])
-        """Length of the observations."""
-        self.actor = actor_of(preset, self.n_obs)
-        self.critic = critics_for(preset, self.n_obs)
-        arrays = checkpoint.arrays()
-        self.outcome: OutcomeHead | None = None
-        parts: dict[str, torch.nn.Module] = {"actor": self.actor, "critic": self.critic}
-        if "outcome.mean" in arrays:
-            self.outcome = parts["outcome"] = OutcomeHead(self.n_obs)
-        for name, module in parts.items():
-            try:
-                module.load_state_dict(under(arrays, name))
-            except RuntimeError as error:
-                raise CheckpointMismatch("tensors", f"those of {name}", str(error)) from error
-            module.eval()
-
-    def predict(
-        self, obs: NDArray[np.float32], values: NDArray[np.float32]
-    ) -> OutcomePrediction | None:
-        """Return the predicted outcomes of observations; None without such a network.
-
-        Args:
-            obs: Observations, shape (n, n_obs).
-            values: The critic's values, shape (n,).
-        """
-        if self.outcome is None:
-            return None
-        with torch.inference_mode():
-            return self.outcome.predict(torch.as_tensor(obs), torch.as_tensor(values))
-
-    def act_and_value(
-        self, obs: NDArray[np.float32]
-    ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-        """Return actions, shape (n, 5), and values, shape (n,), of observations."""
-        with torch.inference_mode():
-            rows = torch.as_tensor(obs)
-            act = self.actor(rows)
-            return act.numpy(), self.critic.least(rows, act).numpy()
-
-
 def estimates(predicted: OutcomePrediction) -> tuple[OutcomeEstimate, ...]:
     """Return predicted outcomes one by one, with the intervals of their probabilities."""
-    low = (predicted.probability - predicted.spread).clamp(0.0, 1.0).tolist()
-    high = (predicted.probability + predicted.spread).clamp(0.0, 1.0).tolist()
-    return tuple(
-        OutcomeEstimate(
-            success=mean[0],
-            success_interval=(least[0], most[0]),
-            contact=mean[1],
-            contact_interval=(least[1], most[1]),
-            time_s=time_s,
-        )
-        for mean, least, most, time_s in zip(
-            predicted.probability.tolist(), low, high, predicted.time_s.tolist(), strict=True
-        )
+    mean, spread = predicted.probability, predicted.spread
+    low, high = (mean - spread).clip(0.0, 1.0), (mean + spread).clip(0.0, 1.0)
+    success, contact = (
+        (mean[:, k].tolist(), zip(low[:, k].tolist(), high[:, k].tolist(), strict=True))
+        for k in range(2)
     )
+    return tuple(map(OutcomeEstimate, *success, *contact, predicted.time_s.tolist()))
 
 
 def select(
@@ -166,6 +94,35 @@ def select(
     last = np.expand_dims(previous, -1)
     gain = values.max(axis=-1) - np.take_along_axis(values, last, axis=-1)[..., 0]
     return np.where(gain > hysteresis, best, previous)
+
+
+class _Question(NamedTuple):
+    """Checked input of a decision."""
+
+    state: MeasuredState
+    ids: list[str]
+    goals: Vec
+    """Positions of the candidates [m], shape (n, 3)."""
+    last: int | None
+    """Index of the candidate chosen last."""
+    terms: ChoiceTerms
+
+
+class _Evaluation(NamedTuple):
+    """Evaluation of n candidates beside m sets of people."""
+
+    obs: NDArray[np.float32]
+    """Observations, shape (m n, n_obs)."""
+    reachable: NDArray[np.bool_]
+    """Shape (n,)."""
+    act: NDArray[np.float32]
+    """Actions, shape (m n, 5)."""
+    values: NDArray[np.float32]
+    """Shape (m, n)."""
+    outcomes: OutcomePrediction | None
+    """Of m n rows."""
+    chosen: NDArray[np.int64]
+    """Index of the chosen candidate, shape (m,)."""
 
 
 class TaskChooser(TrainedPolicy):
@@ -193,10 +150,10 @@ class TaskChooser(TrainedPolicy):
         self._hysteresis = hysteresis
         self._networks = ValueNetworks(checkpoint)
         self._arm, self._people = arm_of(self._cell), people_of(self._cell)
-        self._sight = observation_workspace_of(self._cell)
+        self._sight = observation_workspace_of(self._cell)  # its kernel keeps the GIL
         self._limits, self._ranges = (
             StateLimits(self._arm, limits_jerk=False),
-            _TrainedRanges(checkpoint),
+            TrainedRanges(checkpoint),
         )
 
     def decide(
@@ -218,65 +175,104 @@ class TaskChooser(TrainedPolicy):
         observes also the one nearest to the candidate.
         """
         started = time.perf_counter()
-        robot_state = self._limits.take(q, qd)
-        q, qd, _ = robot_state.clamped
-        observed = self._observed(robot_state.measured.q, people)
-        ids, goals = _check_candidates(candidates)
-        last = ids.index(previous) if previous in ids else None
-        if not np.isfinite(time_left_s):
-            raise InvalidInput("time_left_s", time_left_s, "must be finite [s]")
-        time_left_s = min(LONGEST_S, max(0.0, time_left_s))
-        task = TaskView(
-            n_obs=self._networks.n_obs,
-            grasp=self.grasp,
-            current=last,
-            phase=progress.phase,
-            closing_s=progress.closing_s,
+        terms = ChoiceTerms(
+            previous=previous,
+            progress=progress,
+            time_left_s=time_left_s,
+            objective=objective,
         )
-        shared = self._arm, self._people, self._sight
-        people_arrays = _arrays(observed, self._people.bodies[0])
-        obs, reachable = observe(*shared, (q, qd), people_arrays, goals, time_left_s, task)
-        act, values = self._networks.act_and_value(obs)
-        predicted = self._networks.predict(obs, values)
-        outcomes = None if predicted is None else estimates(predicted)
-        index = self._choose(objective, values, outcomes, last)
-        if last is not None and progress.phase == LIFT:
-            index = last
+        asked = self._ask(q, qd, candidates, terms)
+        observed = self._observed(asked.state.measured.q, people)
+        found = self._evaluate(asked, _arrays(observed, self._people.bodies[0]))
+        index = int(found.chosen[0])
         seen, person = observed[0]
-        qd_target = self._speeds(q, qd, act)
+        q, qd, _ = asked.state.clamped
         return Decision(
-            chosen=ids[index],
+            chosen=asked.ids[index],
             index=index,
-            values=tuple(float(value) for value in values),
-            actions=act,
-            qd_target=qd_target,
-            reachable=tuple(bool(flag) for flag in reachable),
-            outside=robot_state.outside + self._ranges.of_state(q, qd, person, seen),
-            outside_candidates=tuple(self._ranges.of_goal(goal) for goal in goals),
-            outcomes=outcomes,
+            values=tuple(found.values[0].tolist()),
+            actions=found.act,
+            qd_target=self._speeds(q, qd, found.act),
+            reachable=tuple(found.reachable.tolist()),
+            outside=asked.state.outside + self._ranges.of_state(q, qd, person, seen),
+            outside_candidates=self._ranges.of_goals(asked.goals),
+            outcomes=None if found.outcomes is None else estimates(found.outcomes),
             checkpoint=self.checkpoint,
             elapsed_ms=1e3 * (time.perf_counter() - started),
             seen=seen,
         )
 
-    def _choose(
+    def risk_map(
         self,
-        objective: Objective,
-        values: NDArray[np.float32],
-        outcomes: tuple[OutcomeEstimate, ...] | None,
-        last: int | None,
-    ) -> int:
-        """Return the index of the best candidate under an objective."""
-        if objective == "value":
-            return int(select(values, last, self._hysteresis))
-        if outcomes is None:
+        q: Vec,
+        qd: Vec,
+        people: Sequence[Person],
+        candidates: Sequence[Candidate],
+        moved: MovedPerson,
+        *,
+        terms: ChoiceTerms = FRESH,
+    ) -> RiskMap:
+        """Choose beside a person in several postures, in one batch."""
+        started = time.perf_counter()
+        asked = self._ask(q, qd, candidates, terms)
+        known, at = checked_people(people), asked.state.measured.q
+        scenes = scenes_of(self._arm, self._people, at, known, moved)
+        found = self._evaluate(asked, scenes)
+        m, k = found.values.shape
+        rows = np.arange(m) * k + found.chosen
+        risk = None if found.outcomes is None else found.outcomes.probability[rows]
+        distance = found.obs[::k, CLEARANCE].astype(np.float64)
+        return RiskMap(
+            chosen=found.chosen,
+            value=found.values.ravel()[rows].astype(np.float64),
+            success=None if risk is None else risk[:, 0].astype(np.float64),
+            contact=None if risk is None else risk[:, 1].astype(np.float64),
+            clearance_m=DISTANCE_SCALE * distance,
+            elapsed_ms=1e3 * (time.perf_counter() - started),
+        )
+
+    def _ask(
+        self, q: Vec, qd: Vec, candidates: Sequence[Candidate], terms: ChoiceTerms
+    ) -> "_Question":
+        """Return a checked question."""
+        state = self._limits.take(q, qd)
+        ids, goals = _check_candidates(candidates)
+        if not np.isfinite(terms.time_left_s):
+            raise InvalidInput("time_left_s", terms.time_left_s, "must be finite [s]")
+        if terms.objective != "value" and not self._networks.predicts:
             rule = "needs a checkpoint with outcome probabilities"
-            raise InvalidInput("objective", objective, rule, ("value",))
-        if objective == "success":
-            scores = [one.success for one in outcomes]
+            raise InvalidInput("objective", terms.objective, rule, ("value",))
+        last = ids.index(terms.previous) if terms.previous in ids else None
+        return _Question(state, ids, goals, last, terms)
+
+    def _evaluate(self, asked: "_Question", seen: tuple[Vec, Vec, Vec]) -> "_Evaluation":
+        """Return values and choices beside people, or beside each of m sets of people."""
+        terms, last = asked.terms, asked.last
+        task = TaskView(
+            n_obs=self._networks.n_obs,
+            grasp=self.grasp,
+            current=last,
+            phase=terms.progress.phase,
+            closing_s=terms.progress.closing_s,
+        )
+        shared = self._arm, self._people, self._sight
+        q, qd, _ = asked.state.clamped
+        left = min(LONGEST_S, max(0.0, terms.time_left_s))
+        obs, reachable = observe(*shared, (q, qd), seen, asked.goals, left, task)
+        act, values = self._networks.act_and_value(obs)
+        outcomes = self._networks.predict(obs, values)
+        by_set = values.reshape(-1, len(asked.ids))
+        if last is not None and terms.progress.phase == LIFT:
+            chosen = np.full(len(by_set), last)
+        elif outcomes is None or terms.objective == "value":
+            before = None if last is None else np.full(len(by_set), last)
+            chosen = select(by_set, before, self._hysteresis)
         else:
-            scores = [-one.time_s / max(one.success, LEAST_SUCCESS) for one in outcomes]
-        return int(np.argmax(scores))
+            success = outcomes.probability[:, 0]
+            per_success = outcomes.time_s / np.maximum(success, LEAST_SUCCESS)
+            scores = success if terms.objective == "success" else -per_success
+            chosen = scores.reshape(by_set.shape).argmax(axis=1)
+        return _Evaluation(obs, reachable, act, by_set, outcomes, chosen)
 
     def _speeds(self, q: Vec, qd: Vec, act: NDArray[np.float32]) -> Vec:
         """Return the joint speeds of actions, shape (n, 5) [rad/s], shape (n, 6)."""
@@ -310,72 +306,27 @@ def _arrays(observed: list[tuple[int | None, Person]], body: Vec) -> tuple[Vec, 
     return q, qd, np.stack(sizes)
 
 
-class _TrainedRanges:
-    """Training range of a checkpoint, to flag inputs outside it."""
-
-    SLACK = 0.02
-    """Tolerance of the training range [m, rad or per second]."""
-
-    def __init__(self, checkpoint: Checkpoint) -> None:
-        ranges = checkpoint.manifest["trained_range"]
-        self._trained_without_people = pick_preset_of(checkpoint).people.human_absent > 0.0
-        self._low = {name: np.array(entry["low"]) for name, entry in ranges.items()}
-        self._high = {name: np.array(entry["high"]) for name, entry in ranges.items()}
-
-    def of_state(
-        self, q: Vec, qd: Vec, person: Person, index: int | None
-    ) -> tuple[OutsideField, ...]:
-        path = f"people[{index or 0}]"
-        alone = (
-            *self._outside("q", q, "robot.q", robot.JOINT_NAMES),
-            *self._outside("qd", qd, "robot.qd", robot.JOINT_NAMES),
-        )
-        if index is None and self._trained_without_people:
-            return alone
-        return (
-            *alone,
-            *self._outside("human_q", person.q, f"{path}.q", human.JOINT_NAMES),
-            *self._outside("human_qd", person.qd, f"{path}.qd", human.JOINT_NAMES),
-        )
-
-    def of_goal(self, goal: Vec) -> tuple[OutsideField, ...]:
-        return self._outside("goal", goal, "position", ("x", "y", "z"))
-
-    def _outside(
-        self, key: str, values: Vec, path: str, names: Sequence[str]
-    ) -> tuple[OutsideField, ...]:
-        if key not in self._low or len(self._low[key]) != len(values):
-            return ()
-        low, high = self._low[key], self._high[key]
-        beyond = (values < low - self.SLACK) | (values > high + self.SLACK)
-        return tuple(
-            OutsideField(
-                field=f"{path}.{names[i]}",
-                value=float(values[i]),
-                low=float(low[i]),
-                high=float(high[i]),
-            )
-            for i in np.flatnonzero(beyond).tolist()
-        )
-
-
 def _check_candidates(candidates: Sequence[Candidate]) -> tuple[list[str], Vec]:
     n = len(candidates)
     if not 1 <= n <= MAX_CANDIDATES:
         raise InvalidInput("candidates", n, f"must be 1 to {MAX_CANDIDATES} of them")
-    limit = np.full(3, 10.0)
-    goals = np.array(
-        [
-            checked_vector(
-                f"candidates[{i}].position", candidate.position, 3, -limit, limit, "m"
-            )
-            for i, candidate in enumerate(candidates)
-        ]
-    )
-    ids = [candidate.id for candidate in candidates]
-    seen: set[str] = set()
-    for i, name in enumerate(ids):
-        if name in seen:
-            raise InvalidInput(f"candidates[{i}].id", name, "must be given once")
-        seen.add(name)
+    goals, ids = _positions(candidates), [candidate.id for candidate in candidates]
+    if len(set(ids)) < n:
+        i = next(i for i, name in enumerate(ids) if name in ids[:i])
+        raise InvalidInput(f"candidates[{i}].id", ids[i], "must be given once")
     return ids, goals
+
+
+def _positions(candidates: Sequence[Candidate]) -> Vec:
+    """Return the checked positions of candidates [m], shape (n, 3)."""
+    given, limit = [candidate.position for candidate in candidates], np.full(3, 10.0)
+    if all(isinstance(one, np.ndarray) and one.shape == (3,) for one in given):
+        goals = np.array(given, dtype=np.float64)
+        if (np.abs(goals) <= limit).all():
+            return goals
+    paths = (f"candidates[{i}].position" for i in range(len(given)))
+    checked = [
+        checked_vector(path, one, 3, -limit, limit, "m")
+        for path, one in zip(paths, given, strict=True)
+    ]
+    return np.array(checked)

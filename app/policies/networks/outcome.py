@@ -11,11 +11,14 @@ using deep ensembles* (2017). The thesis shows the critic's values only.
 
 from typing import NamedTuple
 
+import numpy as np
 import torch
+from numpy.typing import NDArray
 from torch import nn
 
 from app.policies.networks.actor_critic import hidden
 
+Floats = NDArray[np.float32]
 MEMBERS = 3
 """Networks of the ensemble."""
 WIDTH = 64
@@ -31,11 +34,11 @@ N_OUT = len(OUTCOMES) + 1
 class OutcomePrediction(NamedTuple):
     """Prediction for n observations."""
 
-    probability: torch.Tensor
+    probability: Floats
     """Probability of each outcome, shape (n, 3)."""
-    spread: torch.Tensor
+    spread: Floats
     """Half width of the 95 % interval of each, shape (n, 3)."""
-    time_s: torch.Tensor
+    time_s: Floats
     """Expected time to success [s], shape (n,)."""
 
 
@@ -80,9 +83,19 @@ class OutcomeHead(nn.Module):
 
     def predict(self, obs: torch.Tensor, value: torch.Tensor) -> OutcomePrediction:
         """Return the prediction for observations, shape (n, n_obs), and values, shape (n,)."""
-        out = self(obs, value)
-        each = torch.softmax(out[..., : len(OUTCOMES)], dim=-1)
-        spread = 1.96 * self.widen * each.std(dim=0)
-        return OutcomePrediction(
-            each.mean(dim=0), spread, out[..., -1].mean(dim=0).clamp_min(0)
-        )
+        with torch.inference_mode():
+            return combine(self(obs, value).numpy(), float(self.widen))
+
+
+def combine(outputs: Floats, widen: float) -> OutcomePrediction:
+    """Return the prediction of an ensemble.
+
+    Args:
+        outputs: Outputs of the members, shape (MEMBERS, n, N_OUT).
+        widen: Factor of the spread.
+    """
+    logits = outputs[..., : len(OUTCOMES)]
+    each = np.exp(logits - logits.max(axis=-1, keepdims=True))
+    each /= each.sum(axis=-1, keepdims=True)
+    spread = np.float32(1.96 * widen) * each.std(axis=0, ddof=1)
+    return OutcomePrediction(each.mean(axis=0), spread, outputs[..., -1].mean(axis=0).clip(0.0))

@@ -152,11 +152,8 @@ def _fit_member(
 
 def _widen(head: OutcomeHead, data: OutcomeData, apart: NDArray[np.bool_]) -> None:
     """Widen the spread until the calibration error on other episodes lies inside it."""
-    with torch.inference_mode():
-        found = head.predict(
-            torch.as_tensor(data.obs[apart]), torch.as_tensor(data.value[apart])
-        )
-    probability, spread = found.probability[:, 0].numpy(), found.spread[:, 0].numpy()
+    found = head.predict(torch.as_tensor(data.obs[apart]), torch.as_tensor(data.value[apart]))
+    probability, spread = found.probability[:, 0], found.spread[:, 0]
     won = data.label[apart] == 0
     order = np.argsort(probability)
     ratios = [

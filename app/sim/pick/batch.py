@@ -278,7 +278,7 @@ def observe(
     time_left_s: float,
     task: "TaskView",
 ) -> tuple[NDArray[np.float32], Flags]:
-    """Return the observation of one state for each of n targets.
+    """Return the observation of one state for each of n targets, beside people or each of m.
 
     Args:
         arm: From :func:`~app.sim.scene.scene.arm_of`.
@@ -286,18 +286,22 @@ def observe(
         sight: From :func:`observation_workspace_of`.
         robot: Joint positions [rad] and speeds [rad/s], shape (6,) each.
         seen: Joint positions [m, rad] and speeds [m/s, rad/s] of P people, the one nearest to
-            the robot first, shape (P, 18) each, and body dimensions [m], (P, body.N_SIZE).
+            the robot first, shape (P, 18) or (m, P, 18) each, and body dimensions [m],
+            (P, body.N_SIZE) or (m, P, body.N_SIZE).
         goals: Targets [m], shape (n, 3).
         time_left_s: Time left [s].
         task: What is observed of the task.
 
     Returns:
-        Observations, shape (n, task.n_obs), and whether each target is reachable, (n,).
+        Observations, shape (m n, task.n_obs), those of one set of people together, and whether
+        each target is reachable, (n,).
     """
     n, targets = len(goals), as_kernel_array(goals)
     q_goals, q_grasps, reachable = target_configurations(arm, task.grasp, targets)
-    q, qd = (np.tile(as_kernel_array(value), (n, 1)) for value in robot)
-    tiled = [np.tile(as_kernel_array(value), (n, 1, 1)) for value in seen]
+    sets = [as_kernel_array(value).reshape(-1, *value.shape[-2:]) for value in seen]
+    m = len(sets[0])
+    q, qd = (np.tile(as_kernel_array(value), (m * n, 1)) for value in robot)
+    tiled = [value.repeat(n, axis=0) for value in sets]
     phase, closing = np.zeros(n, dtype=np.int64), np.zeros(n)
     if task.current is not None:
         phase[task.current], closing[task.current] = task.phase, task.closing_s
@@ -305,10 +309,11 @@ def observe(
         task.grasp,
         (q, qd),
         (tiled[0], tiled[1], tiled[2]),
-        (targets, q_goals, q_grasps),
-        (phase, closing),
+        (np.tile(targets, (m, 1)), np.tile(q_goals, (m, 1)), np.tile(q_grasps, (m, 1))),
+        (np.tile(phase, m), np.tile(closing, m)),
     )
-    obs, left = np.empty((n, task.n_obs), dtype=np.float32), np.full(n, float(time_left_s))
+    left = np.full(m * n, float(time_left_s))
+    obs = np.empty((m * n, task.n_obs), dtype=np.float32)
     observe_batch(arm, people.floor_z, states, left, sight, obs)
     return obs, reachable
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal, Protocol
+from typing import Literal, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,8 +25,7 @@ class Candidate:
     """Target of the tcp in the robot base frame [m], shape (3,)."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class OutcomeEstimate:
+class OutcomeEstimate(NamedTuple):
     """Predicted outcome of a candidate if it is pursued within the time left."""
 
     success: float
@@ -77,6 +76,24 @@ class Decision:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class RiskMap:
+    """Choice and risk beside a person in each of m postures."""
+
+    chosen: NDArray[np.int64]
+    """Index of the chosen candidate, shape (m,)."""
+    value: Vec
+    """Its value, shape (m,)."""
+    success: Vec | None
+    """Its probability of success, shape (m,); None where the checkpoint predicts none."""
+    contact: Vec | None
+    """Its probability of a contact, shape (m,)."""
+    clearance_m: Vec
+    """Distance of the robot to people, at most 1.5 m, shape (m,) [m]; 0 or less in contact."""
+    elapsed_ms: float
+    """Duration [ms]."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class PickProgress:
     """Progress of a pick that has begun."""
 
@@ -88,6 +105,34 @@ class PickProgress:
 
 NOT_BEGUN = PickProgress(phase=APPROACH, closing_s=0.0)
 """Progress before the descent."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MovedPerson:
+    """One of several people in other postures."""
+
+    index: int
+    """Index of the person."""
+    q: Vec
+    """Joint positions in each posture [m, rad], shape (m, 18); speeds stay."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ChoiceTerms:
+    """What a choice depends on beside the state; as in :meth:`TaskPolicy.decide`."""
+
+    previous: str | None = None
+    """The candidate chosen last."""
+    progress: PickProgress = NOT_BEGUN
+    """Progress of its pick."""
+    time_left_s: float = 10.0
+    """Time left to reach a candidate [s]."""
+    objective: Objective = "value"
+    """Objective of the choice."""
+
+
+FRESH = ChoiceTerms()
+"""Terms of a first choice."""
 
 
 class TaskPolicy(PolicyIdentity, Protocol):
@@ -126,6 +171,30 @@ class TaskPolicy(PolicyIdentity, Protocol):
                 choice stays with it.
             time_left_s: Time left to reach a candidate [s].
             objective: Objective of the choice. Hysteresis applies to values only.
+
+        Raises:
+            InvalidInput: A value that no answer can be given for.
+        """
+
+    def risk_map(
+        self,
+        q: Vec,
+        qd: Vec,
+        people: Sequence[Person],
+        candidates: Sequence[Candidate],
+        moved: MovedPerson,
+        *,
+        terms: ChoiceTerms = FRESH,
+    ) -> RiskMap:
+        """Choose beside one person in several postures; each choice is that of ``decide``.
+
+        Args:
+            q: Robot joint positions [rad], shape (6,).
+            qd: Robot joint speeds [rad/s], shape (6,).
+            people: The people in the cell, at most four.
+            candidates: What may be chosen, at least one.
+            moved: The person and the postures.
+            terms: What the choice depends on beside the state.
 
         Raises:
             InvalidInput: A value that no answer can be given for.

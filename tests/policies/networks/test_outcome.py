@@ -12,7 +12,7 @@ from app.policies.training.outcome import OutcomeData, fit
 def test_probabilities_sum_to_one_and_times_are_not_negative() -> None:
     torch.manual_seed(1)
     found = OutcomeHead(10).predict(torch.randn(50, 10), torch.randn(50))
-    assert torch.allclose(found.probability.sum(dim=1), torch.ones(50))
+    np.testing.assert_allclose(found.probability.sum(axis=1), 1.0, rtol=1e-5)
     assert (found.spread >= 0.0).all() and (found.time_s >= 0.0).all()
 
 
@@ -27,12 +27,11 @@ def test_a_fit_recovers_a_rate_that_depends_on_one_input() -> None:
     head = fit(data, seed=1)
     probe = torch.zeros(3, 4)
     probe[:, 1] = torch.tensor([-1.0, 0.0, 1.0])
-    with torch.inference_mode():
-        found = head.predict(probe, torch.zeros(3))
+    found = head.predict(probe, torch.zeros(3))
     expected = 1.0 / (1.0 + np.exp(-2.0 * probe[:, 1].numpy()))
-    np.testing.assert_allclose(found.probability[:, 0].numpy(), expected, atol=0.05)
+    np.testing.assert_allclose(found.probability[:, 0], expected, atol=0.05)
     assert found.probability[:, 2].max() < 0.05
-    np.testing.assert_allclose(found.time_s.numpy(), 3.0, atol=0.3)
+    np.testing.assert_allclose(found.time_s, 3.0, atol=0.3)
 
 
 @pytest.mark.parametrize(("distance", "share"), [(0.2, 1.0), (0.9, 0.5), (1.5, 0.0)])

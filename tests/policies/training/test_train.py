@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from app.errors import CheckpointMismatch
-from app.policies.inference.task_selection import TaskChooser, ValueNetworks
+from app.policies.inference.task_selection import TaskChooser
+from app.policies.inference.value_networks import ValueNetworks
 from app.policies.networks.pick import LAYOUTS
 from app.sim.cells.cell import load_cell
 from app.sim.human import model as human

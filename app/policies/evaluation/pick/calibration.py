@@ -32,7 +32,7 @@ from app.policies.evaluation.pick.episodes import Evaluator, View, settings_for
 from app.policies.evaluation.pick.people import beside_recordings
 from app.policies.evaluation.pick.tasks import FASTER, PAIR, settings_of
 from app.policies.evaluation.rows import OnRow, ignore_row
-from app.policies.inference.task_selection import ValueNetworks, pick_preset_of
+from app.policies.inference.value_networks import ValueNetworks, pick_preset_of
 from app.sim.mocap.importer import Motion
 from app.sim.pick.batch import PickSettings
 from app.sim.scenario.kernels.episode import COLLISION, SUCCESS
@@ -89,7 +89,7 @@ def run_calibration(
         InvalidInput: The checkpoint predicts no outcomes, or there is too much recorded motion.
     """
     networks, cell = ValueNetworks(checkpoint), cell_of(checkpoint.manifest)
-    if networks.outcome is None:
+    if not networks.predicts:
         raise InvalidInput("checkpoint", checkpoint.sha256[:12], "must predict outcomes")
     usual = settings_for((1, 1), pick_preset_of(checkpoint))
     kinds: dict[str, PickSettings] = {

@@ -19,7 +19,8 @@ from app.policies.evaluation.pick import selection_rules as choice_rules
 from app.policies.evaluation.pick.episodes import Episodes, Evaluator, Rule, View, settings_for
 from app.policies.evaluation.rows import OnRow, ignore_row
 from app.policies.evaluation.statistics import wilson
-from app.policies.inference.task_selection import HYSTERESIS, ValueNetworks, pick_preset_of
+from app.policies.inference.task_selection import HYSTERESIS
+from app.policies.inference.value_networks import ValueNetworks, pick_preset_of
 from app.sim.cells.cell import Cell
 from app.sim.core.arrays import Vec
 from app.sim.mocap.importer import Motion

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from app.policies.configs.pick import PickPreset
 from app.policies.evaluation.pick.recorded_people import Trace
 from app.policies.evaluation.statistics import wilson
-from app.policies.inference.task_selection import ValueNetworks
+from app.policies.inference.value_networks import ValueNetworks
 from app.sim.cells.cell import Cell
 from app.sim.collision.fcl_recheck import Trajectory
 from app.sim.core.observation_layout import slices_of

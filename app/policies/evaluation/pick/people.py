@@ -29,7 +29,8 @@ from app.policies.evaluation.pick.episodes import Episodes, Evaluator, settings_
 from app.policies.evaluation.pick.tasks import settings_of
 from app.policies.evaluation.rows import OnRow, ignore_row
 from app.policies.evaluation.statistics import wilson
-from app.policies.inference.task_selection import HYSTERESIS, ValueNetworks, pick_preset_of
+from app.policies.inference.task_selection import HYSTERESIS
+from app.policies.inference.value_networks import ValueNetworks, pick_preset_of
 from app.sim.cells.cell import Cell
 from app.sim.collision.contact import clearance
 from app.sim.human.anthropometry import percentile_body

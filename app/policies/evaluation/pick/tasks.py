@@ -17,7 +17,8 @@ from app.policies.evaluation.pick.episodes import Episodes, Evaluator, Rule, set
 from app.policies.evaluation.pick.recorded_people import recheck
 from app.policies.evaluation.rows import OnRow, ignore_row
 from app.policies.evaluation.statistics import mcnemar
-from app.policies.inference.task_selection import HYSTERESIS, ValueNetworks, pick_preset_of
+from app.policies.inference.task_selection import HYSTERESIS
+from app.policies.inference.value_networks import ValueNetworks, pick_preset_of
 from app.sim.pick.batch import OUTCOMES, hand_speeds
 from app.sim.scenario.kernels import episode as kernel
 from app.sim.scene.scene import HumanKind, kinds_of

@@ -33,7 +33,8 @@ from app.policies.evaluation.sorting.order_rules import (
 )
 from app.policies.evaluation.sorting.task_states import NOTHING, TaskStates
 from app.policies.evaluation.statistics import mean_of, wilson
-from app.policies.inference.task_selection import HYSTERESIS, ValueNetworks, pick_preset_of
+from app.policies.inference.task_selection import HYSTERESIS
+from app.policies.inference.value_networks import ValueNetworks, pick_preset_of
 from app.sim.cells.cell import Cell, load_cell
 from app.sim.collision.contact import clearance
 from app.sim.core.arrays import Vec

@@ -9,7 +9,8 @@ from app.policies.checkpoints import pretrained
 from app.policies.configs.pick import PickPreset
 from app.policies.evaluation.pick import selection_rules as choice_rules
 from app.policies.evaluation.pick.episodes import Evaluator, seen_exactly, settings_for
-from app.policies.inference.task_selection import TaskChooser, ValueNetworks
+from app.policies.inference.task_selection import TaskChooser
+from app.policies.inference.value_networks import ValueNetworks
 from app.sim.cells.cell import load_cell
 from app.sim.collision.contact import clearance
 from app.sim.human import model as human

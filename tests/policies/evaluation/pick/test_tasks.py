@@ -11,7 +11,7 @@ from app.policies.configs.pick import PickPreset
 from app.policies.evaluation.pick import selection_rules as choice_rules
 from app.policies.evaluation.pick.episodes import Evaluator, View, seen_exactly, settings_for
 from app.policies.evaluation.registry import evaluate
-from app.policies.inference.task_selection import ValueNetworks
+from app.policies.inference.value_networks import ValueNetworks
 from app.sim.cells.cell import load_cell
 
 

@@ -16,7 +16,7 @@ from app.policies.evaluation.pick.tracker import (
     between,
 )
 from app.policies.evaluation.registry import evaluate
-from app.policies.inference.task_selection import ValueNetworks
+from app.policies.inference.value_networks import ValueNetworks
 from app.sim.cells.cell import load_cell
 from app.sim.human import model as human
 from app.sim.perception.keypoint_sensor_model import KeypointSensorSettings

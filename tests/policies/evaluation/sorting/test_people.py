@@ -9,7 +9,7 @@ from app.policies.evaluation.sorting import order_rules, people
 from app.policies.evaluation.sorting.order_rules import OrderView
 from app.policies.evaluation.sorting.people import SortingBesidePeople, run_sorting_people
 from app.policies.evaluation.sorting.task_states import NOTHING, TaskStates
-from app.policies.inference.task_selection import ValueNetworks, pick_preset_of
+from app.policies.inference.value_networks import ValueNetworks, pick_preset_of
 from app.sim.cells.cell import load_cell
 from app.sim.sorting.planner import solve
 

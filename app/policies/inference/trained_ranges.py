@@ -1,0 +1,94 @@
+"""Training range of a pick policy, to flag inputs outside it."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from app.policies.checkpoints.checkpoint import Checkpoint
+from app.policies.inference.value_networks import pick_preset_of
+from app.sim.core.arrays import Vec
+from app.sim.core.out_of_range import OutsideField
+from app.sim.human import model as human
+from app.sim.human.person import Person
+from app.sim.robot import ur10 as robot
+
+STATE_SIZES = (("q", 6), ("qd", 6), ("human_q", 18), ("human_qd", 18))
+"""Variables of a state in a training range."""
+
+
+class TrainedRanges:
+    """Training range of a checkpoint, to flag inputs outside it."""
+
+    SLACK = 0.02
+    """Tolerance of the training range [m, rad or per second]."""
+
+    def __init__(self, checkpoint: Checkpoint) -> None:
+        ranges = checkpoint.manifest["trained_range"]
+        self._trained_without_people = pick_preset_of(checkpoint).people.human_absent > 0.0
+        self._low = {name: np.array(entry["low"]) for name, entry in ranges.items()}
+        self._high = {name: np.array(entry["high"]) for name, entry in ranges.items()}
+        self._state = tuple(
+            np.concatenate([self._bound(name, n, low) for name, n in STATE_SIZES])
+            for low in (True, False)
+        )
+
+    def _bound(self, key: str, n: int, low: bool) -> Vec:
+        """Return the least or greatest values of a variable, infinite where unknown."""
+        bounds = self._low if low else self._high
+        if key not in bounds or len(bounds[key]) != n:
+            return np.full(n, -np.inf if low else np.inf)
+        return bounds[key] - self.SLACK if low else bounds[key] + self.SLACK
+
+    def of_state(
+        self, q: Vec, qd: Vec, person: Person, index: int | None
+    ) -> tuple[OutsideField, ...]:
+        """Return the fields of robot and observed person outside the range.
+
+        Args:
+            q: Joint positions [rad], shape (6,).
+            qd: Joint speeds [rad/s], shape (6,).
+            person: The observed person.
+            index: Index of that person; None: a person far away.
+        """
+        state, (low, high) = np.concatenate([q, qd, person.q, person.qd]), self._state
+        if ((low <= state) & (state <= high)).all():
+            return ()
+        path = f"people[{index or 0}]"
+        alone = (
+            *self._outside("q", q, "robot.q", robot.JOINT_NAMES),
+            *self._outside("qd", qd, "robot.qd", robot.JOINT_NAMES),
+        )
+        if index is None and self._trained_without_people:
+            return alone
+        return (
+            *alone,
+            *self._outside("human_q", person.q, f"{path}.q", human.JOINT_NAMES),
+            *self._outside("human_qd", person.qd, f"{path}.qd", human.JOINT_NAMES),
+        )
+
+    def of_goals(self, goals: Vec) -> tuple[tuple[OutsideField, ...], ...]:
+        """Return the coordinates of each target outside the range, shape (n, 3) [m]."""
+        found: list[tuple[OutsideField, ...]] = [()] * len(goals)
+        low, high = (self._bound("goal", 3, lower) for lower in (True, False))
+        for i in np.flatnonzero(((goals < low) | (goals > high)).any(axis=1)).tolist():
+            found[i] = self._outside("goal", goals[i], "position", ("x", "y", "z"))
+        return tuple(found)
+
+    def _outside(
+        self, key: str, values: Vec, path: str, names: Sequence[str]
+    ) -> tuple[OutsideField, ...]:
+        if key not in self._low or len(self._low[key]) != len(values):
+            return ()
+        low, high = self._low[key], self._high[key]
+        beyond = (values < self._bound(key, len(values), True)) | (
+            values > self._bound(key, len(values), False)
+        )
+        return tuple(
+            OutsideField(
+                field=f"{path}.{names[i]}",
+                value=float(values[i]),
+                low=float(low[i]),
+                high=float(high[i]),
+            )
+            for i in np.flatnonzero(beyond).tolist()
+        )

@@ -1,0 +1,39 @@
+"""Actions, values and outcomes of the shipped policy, compared with torch."""
+
+import numpy as np
+import pytest
+import torch
+
+from app.policies.checkpoints import pretrained
+from app.policies.checkpoints.model_state import under
+from app.policies.inference.value_networks import ValueNetworks, pick_preset_of
+from app.policies.networks.outcome import OutcomeHead
+from app.policies.networks.pick import actor_of, critics_for
+from app.sim.cells.cell import load_cell
+from app.sim.pick.batch import WHOLE_PICK, PickBatch
+
+
+@pytest.mark.parametrize("n", [3, 200])
+def test_the_shipped_policy_decides_as_its_modules_of_torch_do(n: int) -> None:
+    checkpoint = pretrained.load("pick")
+    networks, preset = ValueNetworks(checkpoint), pick_preset_of(checkpoint)
+    parts = {
+        "actor": actor_of(preset, networks.n_obs),
+        "critic": critics_for(preset, networks.n_obs),
+        "outcome": OutcomeHead(networks.n_obs),
+    }
+    for name, module in parts.items():
+        module.load_state_dict(under(checkpoint.arrays(), name))
+    obs = PickBatch(load_cell(), n, 5, WHOLE_PICK).reset()
+    act, values = networks.act_and_value(obs)
+    found = networks.predict(obs, values)
+    assert found is not None
+    with torch.inference_mode():
+        rows = torch.as_tensor(obs)
+        expected = parts["actor"](rows)
+        np.testing.assert_allclose(act, expected.numpy(), atol=1e-5)
+        least = parts["critic"].least(rows, expected)
+        np.testing.assert_allclose(values, least.numpy(), atol=1e-4)
+        head = parts["outcome"].predict(rows, torch.as_tensor(values))
+    for one, other in zip(found, head, strict=True):
+        np.testing.assert_allclose(one, other, atol=1e-4)
