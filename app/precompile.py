@@ -7,6 +7,7 @@ parts share few kernels; each is compiled in its own process, one per core at a 
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import replace
 from multiprocessing import get_context
 
 import numpy as np
@@ -57,6 +58,9 @@ def _choosing() -> None:
         x, y, z = cell.stations[0].position
         world.apply(MovePerson(right=(x, y, z + 0.1)))
         world.step()
+        query = world.risk_query()
+        assert query is not None  # there is a policy, and a person
+        replace(query, people=[*query.people, *query.people]).answer()
         batch = PickBatch(cell, N_ENVS, seed=0, settings=PickSettings())
         batch.reset()
         batch.step(np.zeros((N_ENVS, CONTROLLED), dtype=np.float32))

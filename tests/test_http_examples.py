@@ -23,7 +23,9 @@ JOB = next(k for k, text in enumerate(SHELL) if "my-first-job" in text)
 """The example that posts a job; the first, SORT and the last have tests of their own, too."""
 SORT = next(k for k, text in enumerate(SHELL) if "/v1/sorting" in text)
 OTHERS = [text for k, text in enumerate(SHELL[:-1]) if k not in (0, JOB, SORT)]
-DECIDES = re.compile(r"/v1/(task-selection|motion|sorting|plan|trackers/\$\w+/frames)(?![\w/])")
+DECIDES = re.compile(
+    r"/v1/(task-selection|motion|sorting|plan|risk-map|trackers/\$\w+/frames)(?![\w/])"
+)
 DECISIONS = [
     text
     for page in (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))
@@ -78,7 +80,7 @@ def flagged(value: Any, place: str = "") -> list[str]:
 
 def test_every_route_that_decides_is_documented_by_a_request() -> None:
     found = {one.split("/")[0] for text in DECISIONS for one in DECIDES.findall(text)}
-    assert found == {"task-selection", "motion", "sorting", "plan", "trackers"}
+    assert found == {"task-selection", "motion", "sorting", "plan", "risk-map", "trackers"}
 
 
 @pytest.mark.parametrize("text", DECISIONS)
@@ -121,6 +123,16 @@ def test_plan_answers_as_is_shown(address: str) -> None:
     assert (answer["symbol"], answer["move"]) == (shown["symbol"], shown["move"])
     for one, two in zip(answer["moves"], shown["moves"], strict=True):
         assert one["to_object"]["value"] == pytest.approx(two["to_object"]["value"], abs=0.02)
+
+
+def test_risk_map_answers_as_is_shown(address: str) -> None:
+    (command,) = (one for one in SHELL if "8000/v1/risk-map " in one)
+    (shown,) = (sample for sample in SAMPLES if "reason" in sample)
+    answer = json.loads(shell(command, address))
+    assert shape(answer) == shape(shown)
+    assert (answer["chosen"], answer["reason"]) == (shown["chosen"], shown["reason"])
+    for one, two in zip(answer["contact"], shown["contact"], strict=True):
+        assert one == pytest.approx(two, abs=0.02)
 
 
 def test_every_protocol_is_listed() -> None:

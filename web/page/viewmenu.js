@@ -8,6 +8,7 @@ const HELP = {
   "Collision shapes": "The capsules with which the simulator measures distances",
   Values: "What the critic expects at each goal",
   "Target line": "From the tool to the chosen goal",
+  "Risk map": "Probability of a contact by the place where the first person stands",
   "Failure figures": "How often a grasp fails in each cell",
   Goal: "The blocks that the towers still lack",
   Move: "From where the block is taken to where it goes",

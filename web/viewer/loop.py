@@ -20,15 +20,17 @@ from app.errors import ServiceError
 from app.live import commands
 from app.live.command_checks import Command
 from app.live.factory import new_world
+from app.live.pick.risk_worker import RiskWorker
+from app.live.pick.world import LivePickWorld
 from app.live.reach.interfaces import LiveReachPolicy
 from app.live.snapshot import RefusedCommand
 from app.live.world_handle import WorldHandle
 from app.sim.cells.cell import Cell
-from app.sim.pick.task_policy import TaskPolicy
+from app.sim.pick.task_policy import RiskMap, TaskPolicy
 from app.sim.sorting.sorting_values import SortingValues
 from web.viewer.scene.cell_scene import CellScene
 from web.viewer.server import ViewerServer
-from web.viewer.view_settings import COLLISION_SHAPES, ViewSettings
+from web.viewer.view_settings import COLLISION_SHAPES, RISK_MAP, ViewSettings
 
 logger = logging.getLogger(__name__)
 
@@ -72,6 +74,7 @@ class LiveCell:
         self._ticks, self._undrawn_s = 0, 0.0
         self._done = 0
         self._refused: RefusedCommand | None = None
+        self._risk = RiskWorker()
         self._stop = threading.Event()
         self._server: ViewerServer | None = None
         self._thread: threading.Thread | None = None
@@ -103,6 +106,7 @@ class LiveCell:
     def stop(self) -> None:
         """Stop thread and viewer; may be called twice."""
         self._stop.set()
+        self._risk.close()
         if self._thread is not None:
             self._thread.join(timeout=5.0)
             self._thread = None
@@ -141,9 +145,16 @@ class LiveCell:
         self._ticks += 1
         self._undrawn_s += dt * self._speed
         if self._ticks % max(1, round(FRAME_S / dt)) == 0:
-            shapes = views.is_seen(COLLISION_SHAPES)
-            scene.draw(snapshot, self._undrawn_s, shapes=shapes)
+            shapes, risk = views.is_seen(COLLISION_SHAPES), self._risk_map(views)
+            scene.draw(snapshot, self._undrawn_s, shapes=shapes, risk=risk)
             self._undrawn_s = 0.0
+
+    def _risk_map(self, views: ViewSettings) -> RiskMap | None:
+        """Return the newest risk map; None where nobody looks at it."""
+        if not isinstance(self._world, LivePickWorld) or not views.is_seen(RISK_MAP):
+            return None
+        self._risk.offer(self._world.risk_query)
+        return self._risk.newest
 
     def _apply(self, command: Command) -> None:
         """Apply a command; the speed of the clock belongs to the loop."""

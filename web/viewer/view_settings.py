@@ -12,6 +12,7 @@ import viser
 from app.live.reach.commands import is_reaching
 from app.sim.cells.cell import Cell
 from web.viewer.capsules_view import SHAPES
+from web.viewer.scene.risk_view import NODE as RISK
 from web.viewer.scene.sorting_scene import sorts
 
 PREFIX = "view: "
@@ -31,9 +32,11 @@ class Setting:
 
 
 COLLISION_SHAPES = Setting(label="Collision shapes", node=SHAPES, shown=False)
+RISK_MAP = Setting(label="Risk map", node=RISK, shown=False)
 CHOICE = (
     Setting(label="Values", node="/labels"),
     Setting(label="Target line", node="/path"),
+    RISK_MAP,
 )
 SORTING = (
     Setting(label="Failure figures", node="/chances"),
@@ -73,7 +76,7 @@ class ViewSettings:
 
     def is_seen(self, setting: Setting) -> bool:
         """Whether any visitor looks at it."""
-        return bool(self._seen_by[setting])
+        return bool(self._seen_by.get(setting))
 
     async def _greet(self, visitor: viser.ClientHandle) -> None:
         for one in self._settings:

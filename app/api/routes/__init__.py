@@ -10,6 +10,7 @@ plan            Next move of a sorting task with its motion, by the pick policy'
 presets         Presets of training jobs, with the limits of every field
 recordings      Recordings of human motion: import a file, list, show, remove
 reference       ``/docs``: the API description as one static page without external scripts
+risk_map        Choice and risk over a grid of positions of a person
 session         Sign-in of a browser: exchanges the token for a session cookie
 sorting         Sorting decisions: the next move of a sorting task (thesis chapter 3)
 task_selection  Task selection by the critic's values (thesis chapter 5)

@@ -10,6 +10,8 @@ people          People in a request, and their use by a policy
 plan            ``POST /v1/plan``: sorting task, robot and people in; next move and motion out
 presets         Presets with the declarations of their fields, as the training form needs them
 recordings      Recordings of human motion as they are shown
+risk_map        ``POST /v1/risk-map``: a decision and the positions of a person in, choices and
+                risks out
 robot_state     Joints of the robot in a request: base to wrist 3, or in any order by name
 separation      Speed and separation monitoring in a motion request and in its answer
 sorting         ``POST /v1/sorting``: objects and goal in, next move out

@@ -19,6 +19,9 @@ TASK_SELECTION: dict[str, Any] = {
         {"id": "right", "position": [0.3, 0.7, 0.12]},
     ],
 }
+RISK_MAP: dict[str, Any] = TASK_SELECTION | {
+    "grid": {"x": [-0.5, 0.5], "y": [1.1, 1.5], "nx": 3, "ny": 2},
+}
 MOTION: dict[str, Any] = {
     "cell": "shared-workspace",
     "robot": {

@@ -6,6 +6,8 @@ there; a pick that was broken off stays a candidate. A contact is shown for two 
 the robot starts again from home.
 """
 
+from dataclasses import replace
+
 import numpy as np
 
 from app.live import commands, status_messages
@@ -14,13 +16,20 @@ from app.live.base_world import BaseWorld
 from app.live.command_checks import Command
 from app.live.people.workers import LiveWorkers
 from app.live.pick import explanation
+from app.live.pick.risk_worker import RiskQuery
 from app.live.snapshot import Status, WorldSnapshot
 from app.sim.cells.cell import Cell
 from app.sim.core.arrays import Vec, as_kernel_array
 from app.sim.pick.case_verdict import CaseRun, Verdict, judge
 from app.sim.pick.cases import Case, find_case
 from app.sim.pick.kernels.grasp import APPROACH, DESCEND, next_phase
-from app.sim.pick.task_policy import Candidate, Decision, PickProgress, TaskPolicy
+from app.sim.pick.task_policy import (
+    Candidate,
+    ChoiceTerms,
+    Decision,
+    PickProgress,
+    TaskPolicy,
+)
 
 
 class LivePickWorld(BaseWorld[LiveWorkers]):
@@ -204,6 +213,24 @@ class LivePickWorld(BaseWorld[LiveWorkers]):
             self.set_message(
                 explanation.switched(self.decision, names, left, self.t, self._label)
             )
+
+    def risk_query(self) -> RiskQuery | None:
+        """Return the present state for a risk map; None without a decision or a person."""
+        people = [person.seen() for person in self.people]
+        if self.policy is None or self.decision is None or not people:
+            return None
+        return RiskQuery(
+            policy=self.policy,
+            q=self.robot.q.copy(),
+            qd=self.robot.qd.copy(),
+            people=[replace(one, q=one.q.copy(), qd=one.qd.copy()) for one in people],
+            offered=self.offered,
+            terms=ChoiceTerms(
+                previous=self.previous,
+                progress=self.progress,
+                time_left_s=self.time_left,
+            ),
+        )
 
     # Read model.
 

@@ -8,6 +8,8 @@ goal_gizmo      The goal of a reach cell in the scene: a point, its tolerance, a
                 drag it with
 reach_scene     A reach cell in the scene: goal, targets, the way of the tool, the separation
                 zone
+risk_view       Risk map in the scene: the probability of a contact by the place where the
+                person stands
 solid_meshes    Plain solids with soft edges, painted with physical materials, as binary glTF
 sorting_bodies  What blocks, towers and clutter cells look like, and the colours of the failure
                 map

@@ -12,11 +12,13 @@ from app.live.command_checks import Command
 from app.live.reach.commands import is_reaching
 from app.live.snapshot import WorldSnapshot
 from app.sim.cells.cell import Cell
+from app.sim.pick.task_policy import RiskMap
 from web.viewer.people.people_view import PeopleView
 from web.viewer.robot.robot_view import RobotView
 from web.viewer.scene import workplace
 from web.viewer.scene.arc import Arc
 from web.viewer.scene.reach_scene import ReachScene
+from web.viewer.scene.risk_view import RiskView
 from web.viewer.scene.sorting_scene import SortingScene, sorts
 from web.viewer.scene.stations_view import StationsView
 
@@ -44,15 +46,25 @@ class CellScene:
             self._people = PeopleView(server, cell, submit)
             self._sorting = SortingScene(server, cell, submit) if sorts(cell) else None
             self._reach = ReachScene(server, cell, submit) if is_reaching(cell) else None
+            picks = self._sorting is None and self._reach is None
+            self._risk = RiskView(server) if picks else None
             self._path = Arc(server, "/path/arc", lift=PATH_LIFT)
 
-    def draw(self, snapshot: WorldSnapshot, dt: float, *, shapes: bool = False) -> None:
+    def draw(
+        self,
+        snapshot: WorldSnapshot,
+        dt: float,
+        *,
+        shapes: bool = False,
+        risk: RiskMap | None = None,
+    ) -> None:
         """Show a snapshot; sends only what changed.
 
         Args:
             snapshot: What to show.
             dt: Time since the last call [s].
             shapes: Whether anybody looks at the capsules that the simulator sees.
+            risk: Risk map of a pick cell.
         """
         with self._server.atomic():
             touched = snapshot.contact if snapshot.status == "contact" else None
@@ -67,6 +79,8 @@ class CellScene:
                 self._reach.draw(snapshot)
             else:
                 self._draw_path(snapshot)
+            if self._risk is not None:
+                self._risk.draw(risk)
 
     def _draw_path(self, snapshot: WorldSnapshot) -> None:
         if snapshot.status != "moving" or snapshot.chosen is None:

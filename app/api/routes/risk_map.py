@@ -1,0 +1,52 @@
+"""Choice and risk over a grid of positions of a person.
+
+Source: docs/method.md 3.1.
+"""
+
+from fastapi import APIRouter
+from starlette.concurrency import run_in_threadpool
+
+from app.api.known_people import people_for_policy
+from app.api.schemas.risk_map import RiskMapAnswer, RiskMapRequest
+from app.api.services import ServicesDep
+from app.api.world_policies import require_task_policy
+from app.errors import InvalidInput
+from app.sim.pick.task_policy import MovedPerson
+
+router = APIRouter(prefix="/v1/risk-map", tags=["deciding"])
+
+
+@router.post("", summary="Choose beside a person at each position of a grid")
+async def draw(request: RiskMapRequest, services: ServicesDep) -> RiskMapAnswer:
+    """Return the choice, its value and its probabilities at every position of a person.
+
+    At each position the answer is that of `/v1/task-selection` beside the person there.
+    """
+    services.readiness.require()
+    cell = await services.known_cell(request.cell)
+    q, qd, candidates = request.to_domain()
+    policy = services.task_policies.loaded(request.checkpoint)
+    if policy is None:
+        policy = await run_in_threadpool(services.task_policies.load, request.checkpoint)
+    require_task_policy(policy, cell, services)
+
+    def answer() -> RiskMapAnswer:
+        people = people_for_policy(request.people, cell, services.trackers, q)
+        which = request.grid.person
+        if which not in people.places:
+            rule = "must be the index of one of the four people nearest to the robot"
+            raise InvalidInput("grid.person", which, rule, [str(i) for i in people.places])
+        index = people.places.index(which)
+        person, size = people.people[index], people.people[index].size
+        grid = request.grid.to_domain()
+        postures, reached = grid.postures(person, cell.body if size is None else size)
+        moved = MovedPerson(index=index, q=postures)
+        with request.robot.faults_in_place():
+            found = policy.risk_map(
+                q, qd, people.people, candidates, moved, terms=request.terms
+            )
+        seen = people.in_request(policy.decide(q, qd, people.people, candidates)).seen
+        uses = people.uses(seen)
+        return RiskMapAnswer.from_domain(found, reached, request, uses, policy.checkpoint)
+
+    return await run_in_threadpool(answer)

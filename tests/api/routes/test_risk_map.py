@@ -1,0 +1,83 @@
+"""``POST /v1/risk-map``: the same choices as one by one, and what has none."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from fastapi.testclient import TestClient
+
+from app.api.schemas.examples import RISK_MAP, TASK_SELECTION
+from app.sim.human import model as human
+
+URL = "/v1/risk-map"
+
+
+def person(x: float, y: float, yaw: float = -1.4) -> dict[str, Any]:
+    q = human.rest_posture(x, y, yaw)
+    q[10] = 0.6
+    return {"q": q.tolist(), "qd": (0.1 * np.arange(18)).tolist()}
+
+
+def mapped(client: TestClient, **changes: Any) -> dict[str, Any]:
+    answer = client.post(URL, json=RISK_MAP | changes)
+    assert answer.status_code == 200, answer.text
+    found: dict[str, Any] = answer.json()
+    return found
+
+
+@pytest.mark.parametrize("objective", ["value", "success", "time"])
+def test_each_position_has_the_answer_of_task_selection(
+    client: TestClient, objective: str
+) -> None:
+    """Two people: the moved one is the nearer one in a part of the positions."""
+    people = [person(0.3, 1.25), person(0.0, 1.5)]
+    grid = {"x": [-0.4, 0.4], "y": [1.05, 1.6], "nx": 2, "ny": 3, "person": 1}
+    terms = {"previous": "left", "time_left_s": 6.0, "objective": objective}
+    found = mapped(client, people=people, grid=grid, **terms)
+    for j, y in enumerate(found["y"]):
+        for i, x in enumerate(found["x"]):
+            there = [people[0], person(x, y)]
+            answer = client.post(
+                "/v1/task-selection", json=TASK_SELECTION | terms | {"people": there}
+            )
+            chosen = next(one for one in answer.json()["candidates"] if one["chosen"])
+            assert found["chosen"][j][i] == chosen["id"]
+            one = [found[name][j][i] for name in ("value", "success", "contact")]
+            outcome = chosen["outcome"]
+            expected = [chosen["value"], outcome["success"]["mean"], outcome["contact"]["mean"]]
+            assert one == pytest.approx(expected, abs=1e-5)
+            assert found["reason"][j][i] is None and found["clearance_m"][j][i] > 0.0
+
+
+def test_a_position_inside_the_robot_has_no_values_but_a_reason(client: TestClient) -> None:
+    grid = {"x": [0.0, 0.0], "y": [0.25, 1.4], "nx": 1, "ny": 2}
+    found = mapped(client, people=[person(0.0, 1.4)], grid=grid)
+    assert found["reason"] == [["contact"], [None]]
+    for name in ("chosen", "value", "success", "contact", "clearance_m"):
+        assert found[name][0][0] is None and found[name][1][0] is not None
+
+
+def test_a_hand_is_moved_as_far_as_it_reaches(client: TestClient) -> None:
+    grid = {"what": "hand", "hand": "left", "x": [0.1, 0.1], "y": [-1.5, 1.0], "nx": 1, "ny": 2}
+    found = mapped(client, people=[person(0.0, 1.4)], grid=grid)
+    assert found["reason"] == [["unreachable"], [None]]
+    rest = mapped(client, people=[person(0.0, 1.4)], grid=RISK_MAP["grid"])
+    assert found["clearance_m"][1][0] < rest["clearance_m"][-1][1]
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"person": 1}, ("grid.person", "1", "four people nearest", "choices: 0")),
+        ({"x": [0.5, -0.5]}, ("grid.x", "[0.5, -0.5]", "in this order")),
+        ({"nx": 51}, ("grid.nx", "51", "50")),
+        ({"what": "head"}, ("grid.what", "head", "person", "hand")),
+        ({"height": 1.0}, ("grid.height", "1.0")),
+    ],
+)
+def test_errors_name_field_value_and_rule(
+    client: TestClient, change: dict[str, Any], words: tuple[str, ...]
+) -> None:
+    answer = client.post(URL, json=RISK_MAP | {"grid": RISK_MAP["grid"] | change})
+    assert answer.status_code == 422
+    assert [word for word in words if word not in answer.text] == []

@@ -1,0 +1,77 @@
+"""Risk maps of a live cell: computed beside the loop, one at a time."""
+
+import threading
+import time
+from collections.abc import Callable
+
+import numpy as np
+
+from app.live import commands
+from app.live.pick.risk_worker import GRID, RiskQuery, RiskWorker
+from app.live.pick.world import LivePickWorld
+from app.sim.cells.cell import load_cell
+from app.sim.pick.task_policy import MovedPerson, RiskMap
+from tests.straight_policy import StraightPolicy
+
+WAIT_S = 30.0
+
+
+def finished(worker: RiskWorker, query: Callable[[], RiskQuery | None]) -> RiskMap:
+    end = time.monotonic() + WAIT_S
+    while worker.newest is None:
+        assert time.monotonic() < end
+        worker.offer(query)
+        time.sleep(0.01)
+    return worker.newest
+
+
+def test_map_is_the_policys_for_the_state_of_the_world() -> None:
+    cell = load_cell()
+    world = LivePickWorld(cell, StraightPolicy(cell), seed=3)
+    query = world.risk_query()
+    assert query is not None
+    person = query.people[0]
+    found, middle = query.answer(), GRID.shape[1] // 2
+    assert found.chosen.shape == (len(GRID.x) * len(GRID.y),)
+    posture = person.q.copy()
+    posture[:2] = GRID.x[middle], GRID.y[0]
+    moved = MovedPerson(index=0, q=posture[None])
+    alone = query.policy.risk_map(
+        query.q, query.qd, query.people, query.offered, moved, terms=query.terms
+    )
+    assert found.value[middle] == alone.value[0]
+    world.step()
+    assert not np.shares_memory(query.q, world.robot.q)
+
+
+def test_one_map_is_computed_at_a_time() -> None:
+    cell, go, began = load_cell(), threading.Event(), []
+
+    class Slow(StraightPolicy):
+        def risk_map(self, *state: object, **terms: object) -> RiskMap:
+            began.append(threading.current_thread().name)
+            assert go.wait(WAIT_S)
+            return super().risk_map(*state, **terms)  # type: ignore[arg-type]
+
+    world, worker = LivePickWorld(cell, Slow(cell), seed=3), RiskWorker()
+    asked: list[RiskQuery | None] = []
+
+    def query() -> RiskQuery | None:
+        asked.append(world.risk_query())
+        return asked[-1]
+
+    for _ in range(3):
+        worker.offer(query)
+    assert len(asked) == 1 and worker.newest is None
+    go.set()
+    assert len(finished(worker, query).value) == len(GRID.x) * len(GRID.y)
+    worker.close()
+    assert began == [name for name in began if name.startswith("risk-map")]
+
+
+def test_without_a_policy_or_a_person_there_is_no_map() -> None:
+    cell = load_cell()
+    assert LivePickWorld(cell, None, seed=3).risk_query() is None
+    world = LivePickWorld(cell, StraightPolicy(cell), seed=3)
+    world.apply(commands.RemovePerson(person=0))
+    assert world.risk_query() is None
