@@ -73,7 +73,7 @@ CASES = (
         expected="cube4",
         first="cube4",
         switches=(0, 0),
-        palm_offset=(0.02, 0.22, 0.02),
+        palm_offset=(0.02, 0.3, 0.02),
     ),
     Case(
         id="case-2",
@@ -109,18 +109,18 @@ CASES = (
         id="case-4",
         title="Single switch, no oscillation",
         text=(
-            "The right arm moves from cube 0 to cube 4, the nearer goal; the robot should "
-            "start for cube 4, switch to cube 2 and stay with it."
+            "The left arm moves from cube 0 to cube 4, the nearer goal; the robot should "
+            "start for cube 4, switch to cube 1 and stay with it."
         ),
         robot_start="cube5",
-        goals=("cube2", "cube4"),
-        hand="r",
+        goals=("cube1", "cube4"),
+        hand="l",
         human_from="cube0",
         human_to="cube4",
-        expected="cube2",
+        expected="cube1",
         first="cube4",
         switches=(1, 1),
-        delay_s=0.1,
+        palm_offset=(0.0, 0.05, 0.0),
     ),
 )
 

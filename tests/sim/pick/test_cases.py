@@ -31,10 +31,10 @@ def test_case_3_blocks_the_nearer_goal_for_a_while():
 
 def test_case_4_blocks_the_nearer_goal_for_good_and_the_farther_for_a_moment():
     shown = geometry(CELL, find_case("case-4"))
-    assert shown.joint_distance_rad["cube4"] < shown.joint_distance_rad["cube2"]
+    assert shown.joint_distance_rad["cube4"] < shown.joint_distance_rad["cube1"]
     first, last = shown.blocked_s["cube4"]
     assert 1.0 < first < last == pytest.approx(5.95)
-    start, end = shown.blocked_s["cube2"]
+    start, end = shown.blocked_s["cube1"]
     assert start > 0.5 and end - start < 0.2
 
 
