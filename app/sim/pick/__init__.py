@@ -4,6 +4,8 @@ batch         The pick scenario of thesis chapter 5: one robot, one person, cube
 case_verdict  Whether what happened in a case study is what it is for: expected, observed,
               verdict
 cases         The four case studies of task selection (docs/method.md 3.6, thesis table 5.3)
+monitored_batch
+              The pick scenario under speed and separation monitoring
 task_policy   Interface of a policy that selects a task, and its decision
 kernels/      Compiled pick episodes
 """

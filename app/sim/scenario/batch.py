@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from app.sim.cells.cell import Cell
 from app.sim.core.jit import direct
 from app.sim.people.kernels.people import PeopleState
 from app.sim.robot.kernels.arm import Arm
@@ -59,6 +60,8 @@ class EnvBatch(ABC):
 
     _kernel: ModuleType
     """Kernels of the scenario: ``reset_rows`` and ``step_batch``."""
+    cell: Cell
+    """Work cell."""
 
     def __init__(
         self,

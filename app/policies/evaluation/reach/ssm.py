@@ -65,9 +65,7 @@ from app.policies.evaluation.reach.ssm_rows import (
     against,
     arrival_times,
     crossing_row,
-    joined,
     random_row,
-    selected,
 )
 from app.policies.evaluation.rows import OnRow, ignore_row
 from app.policies.inference.controllers import Controller, RolloutController, controller_of
@@ -77,14 +75,11 @@ from app.sim.cells.cell import Cell
 from app.sim.mocap.importer import Motion
 from app.sim.reach.batch import ReachSettings
 from app.sim.reach.crossings import N_CROSSINGS, SEED, crossings, recorded_crossings
-from app.sim.reach.monitored.batch import (
-    HORIZON_S,
-    MonitoredEpisodes,
-    MonitoredReachBatch,
-)
+from app.sim.reach.monitored.batch import HORIZON_S, MonitoredReachBatch
 from app.sim.reach.oracle_search import Acts
 from app.sim.safety.layer import SafetySettings, safety_settings
 from app.sim.scenario.kernels.episode import TIMEOUT
+from app.sim.scenario.monitoring import MonitoredEpisodes, joined, selected
 
 Json = dict[str, Any]
 WITH_ROLLOUT = "policy-rollout"

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.policies.evaluation.reach.episodes import run_to_end
-from app.policies.evaluation.reach.ssm_rows import joined, selected
 from app.policies.inference.controllers import Controller
 from app.sim.cells.cell import Cell
 from app.sim.core.arrays import Vec
@@ -17,16 +16,18 @@ from app.sim.planning.ompl_planners import PlanSettings
 from app.sim.planning.replanning import ReplanningSettings
 from app.sim.reach.batch import ReachBatch, ReachSettings
 from app.sim.reach.crossings import CrossingSet
-from app.sim.reach.monitored.batch import (
-    MonitoredEpisodes,
-    MonitoredReachBatch,
-    MonitoringSettings,
-)
+from app.sim.reach.monitored.batch import MonitoredReachBatch
 from app.sim.reach.monitored.planners import drive_planner, postures_of
 from app.sim.reach.oracle_search import Acts, sample_detours, toward
 from app.sim.robot.actions import ActionSettings
 from app.sim.robot.kernels.arm import Arm
 from app.sim.safety.layer import SafetySettings
+from app.sim.scenario.monitoring import (
+    MonitoredEpisodes,
+    MonitoringSettings,
+    joined,
+    selected,
+)
 from app.sim.scene.scene import arm_of
 
 MARGIN = 0.05

@@ -1,13 +1,12 @@
 """Rows and comparisons of ``reach-ssm``, from episodes under the safety layer."""
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from app.policies.evaluation.statistics import mean_of, wilson
-from app.sim.reach.monitored.batch import MonitoredEpisodes
+from app.sim.scenario.monitoring import MonitoredEpisodes
 
 Json = dict[str, Any]
 
@@ -109,19 +108,3 @@ def arrival_times(runs: MonitoredEpisodes) -> list[float | None]:
         round(float(seconds), 2) if arrived else None
         for seconds, arrived in zip(runs.seconds, runs.arrived, strict=True)
     ]
-
-
-def joined(parts: Sequence[MonitoredEpisodes]) -> MonitoredEpisodes:
-    """Return several sets of runs as one."""
-    names = MonitoredEpisodes.__dataclass_fields__
-    values: Any = {
-        name: np.concatenate([getattr(part, name) for part in parts]) for name in names
-    }
-    return MonitoredEpisodes(**values)
-
-
-def selected(runs: MonitoredEpisodes, which: NDArray[np.int64]) -> MonitoredEpisodes:
-    """Return the runs with the given indices."""
-    names = MonitoredEpisodes.__dataclass_fields__
-    values: Any = {name: getattr(runs, name)[which] for name in names}
-    return MonitoredEpisodes(**values)

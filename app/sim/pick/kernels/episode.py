@@ -315,12 +315,36 @@ def step_env(
     work: StepWorkspace,
 ) -> float:
     """Step environment ``e``, set its outcome and return the reward."""
+    collided, unfeasible = move(world.arm, world.people, task.action, state, e, act, work)
+    return conclude(world, task, state, e, collided, unfeasible, work)
+
+
+@kernel(inline="always")
+def conclude(
+    world: PickCell,
+    task: PickTask,
+    state: EpisodeState,
+    e: int,
+    collided: bool,
+    unfeasible: bool,
+    work: StepWorkspace,
+) -> float:
+    """Set phase and outcome of environment ``e`` after a motion; return the reward.
+
+    Args:
+        world: Shared data.
+        task: Rules, action type and reward coefficients.
+        state: Environments; changed.
+        e: Environment.
+        collided: Whether the motion ended in a collision.
+        unfeasible: Whether a joint had no admissible coefficient.
+        work: Holds the pose of the robot.
+    """
     action, weights, robot = task.action, task.weights, work.robot
-    collided, unfeasible = move(world.arm, world.people, action, state, e, act, work)
     grasp, goal, d_old, tilt_old = task.grasp, state.goal[e], state.distance[e], state.tilt[e]
     d, tilt = distance_to(goal, robot), robot_tilt(robot)
     near = max(SUCCESS_DISTANCE, weights.d_v)
-    speed = tcp_speed(robot, work.qd) if d <= near else 0.0
+    speed = tcp_speed(robot, state.qd[e]) if d <= near else 0.0
     if grasp.depth > 0.0:
         tool = ToolState(robot.tcp, tilt, speed, state.clear[e, 0])
         phase, closing, lifted = next_phase(

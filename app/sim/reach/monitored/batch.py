@@ -7,8 +7,6 @@ trainings use both alike. Its people may follow given tracks, such as those of `
 Source: docs/method.md 2.6 (last row) and 2.7.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -17,87 +15,25 @@ from app.sim.cells.cell import Cell
 from app.sim.collision.checker import Shapes
 from app.sim.core.arrays import Vec, as_kernel_array
 from app.sim.people.kernels.pedestrian import GROWTH, VX, VY
-from app.sim.people.kernels.people import new_people_geometry
 from app.sim.reach.batch import ReachBatch, ReachSettings
 from app.sim.reach.monitored.kernels import step
-from app.sim.reach.monitored.kernels.state import (
-    BELOW_HALF,
-    CELL,
-    CONTACT,
-    FASTEST,
-    JOINT_PATH,
-    N_ACCOUNT,
-    PERIODS,
-    PERSON,
-    SPEED,
-    STANDSTILL,
-    STANDSTILL_STOPPED,
-    STOPPED,
-    TOOL_PATH,
-    Commands,
-    MonitoredState,
-    StepResults,
-)
+from app.sim.reach.monitored.kernels.state import Commands, StepResults
 from app.sim.robot.kernels import acceleration_bounds as polynomial
 from app.sim.robot.kernels.joints import JointState
-from app.sim.safety.kernels import separation_check as watch
-from app.sim.safety.kernels.adversarial_people import new_trial_work
-from app.sim.safety.kernels.adversarial_trials import MOVING
-from app.sim.safety.layer import SafetySettings, separation_rule
+from app.sim.safety.layer import SafetySettings
 from app.sim.scenario.batch import StepResult
-from app.sim.scenario.kernels.episode import SUCCESS, Indices
-from app.sim.scene.scene import new_people_state, require_finite, require_shape
+from app.sim.scenario.kernels.episode import Indices
+from app.sim.scenario.monitoring import (
+    MonitoredEpisodes,
+    MonitoringSettings,
+    monitored_episodes,
+    new_monitored_state,
+)
+from app.sim.scene.scene import require_finite, require_shape
 
 HORIZON_S = 5.0
 """Largest time left that policies observe [s]: the time limit of docs/method.md 2.3."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class MonitoringSettings:
-    """Settings of the episodes beyond the assumptions of the safety layer."""
-
-    active: bool = True
-    """Whether the safety layer acts."""
-    rest_ends: bool = True
-    """Whether a person who walks into a robot at standstill ends the episode; contact with a
-    moving link always does."""
-    horizon_s: float = HORIZON_S
-    """Largest time left that policies observe [s]."""
-
-
 DEFAULT_MONITORING = MonitoringSettings()
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class MonitoredEpisodes:
-    """Results of n episodes under the safety layer; arrays of shape (n,)."""
-
-    arrived: NDArray[np.bool_]
-    """Whether the tcp reached the goal in time."""
-    seconds: Vec
-    """Duration [s]."""
-    stopped_s: Vec
-    """Time with override 0 [s]."""
-    below_half_s: Vec
-    """Time with override below one half, including 0 [s]."""
-    standstill_s: Vec
-    """Time at standstill for any reason [s]."""
-    standstill_stopped_s: Vec
-    """Time at standstill with override 0 [s]; braking does not count."""
-    joint_path: Vec
-    """Path length in joint space [rad]."""
-    tool_path: Vec
-    """Path length of the tcp [m]."""
-    touched_moving: NDArray[np.bool_]
-    """Whether a person touched a moving link."""
-    touched_at_rest: NDArray[np.bool_]
-    """Whether a person walked into a link at standstill."""
-    touched_cell: NDArray[np.bool_]
-    """Whether the robot touched its cell or itself."""
-    link_speed: Vec
-    """Speed of the touching link [m/s]."""
-    person_speed: Vec
-    """Greatest speed of any point of the people [m/s]."""
 
 
 class MonitoredReachBatch(ReachBatch):
@@ -135,31 +71,7 @@ class MonitoredReachBatch(ReachBatch):
         self.safety, self.n_tracks = safety, 0 if tracks is None else len(tracks)
         if tracks is not None:
             self._require_tracks(tracks)
-        people = self.world.people
-        shape = (people.columns.shape[1], len(self.cell.cylinders))
-        self._monitor = MonitoredState(
-            safety=separation_rule(safety, *shape, safety.use_measured_velocity),
-            active=monitoring.active,
-            rest_ends=monitoring.rest_ends,
-            horizon=monitoring.horizon_s,
-            measured=safety.use_measured_velocity,
-            tracks=np.zeros((0, 1, 3)) if tracks is None else as_kernel_array(tracks),
-            period=np.zeros(n_envs, dtype=np.int64),
-            trial=new_trial_work(
-                self.arm,
-                people,
-                new_people_state(self.cell, people, 1),
-                new_people_geometry(people, len(self.cell.workers), len(self.cell.cylinders)),
-                (
-                    watch.new_ssm_workspace(self.arm, *shape),
-                    watch.new_ssm_workspace(self.arm, *shape),
-                ),
-                0,
-            ),
-            override=np.ones(n_envs),
-            account=np.zeros((n_envs, N_ACCOUNT)),
-            closed=np.zeros((n_envs, N_ACCOUNT)),
-        )
+        self._monitor = new_monitored_state(self, safety, monitoring, tracks, HORIZON_S)
 
     def _require_tracks(self, tracks: Vec) -> None:
         if self.cell.workers or len(self.cell.cylinders) != 1:
@@ -241,20 +153,4 @@ class MonitoredReachBatch(ReachBatch):
 
     def runs(self) -> MonitoredEpisodes:
         """Return the results of all environments, once all episodes have ended."""
-        account, dt = self._monitor.closed, self.arm.dt
-        person, moving = account[:, CONTACT] == PERSON, account[:, SPEED] > MOVING
-        return MonitoredEpisodes(
-            arrived=self.state.outcome == SUCCESS,
-            seconds=dt * account[:, PERIODS],
-            stopped_s=dt * account[:, STOPPED],
-            below_half_s=dt * account[:, BELOW_HALF],
-            standstill_s=dt * account[:, STANDSTILL],
-            standstill_stopped_s=dt * account[:, STANDSTILL_STOPPED],
-            joint_path=account[:, JOINT_PATH].copy(),
-            tool_path=account[:, TOOL_PATH].copy(),
-            touched_moving=person & moving,
-            touched_at_rest=person & ~moving,
-            touched_cell=account[:, CONTACT] == CELL,
-            link_speed=account[:, SPEED].copy(),
-            person_speed=account[:, FASTEST].copy(),
-        )
+        return monitored_episodes(self._monitor, self.state, self.arm.dt)

@@ -14,13 +14,14 @@ from app.policies.evaluation.reach.ssm_crossings import (
     ComparisonSettings,
     best_resimulations,
 )
-from app.policies.evaluation.reach.ssm_rows import against, crossing_row, selected
+from app.policies.evaluation.reach.ssm_rows import against, crossing_row
 from app.policies.evaluation.registry import evaluate
 from app.sim.cells.cell import load_cell
 from app.sim.planning.ompl_planners import PlanSettings
 from app.sim.reach.batch import ReachSettings
 from app.sim.reach.crossings import crossings
 from app.sim.safety.layer import safety_settings
+from app.sim.scenario.monitoring import selected
 from tests.policies.straight_controller import Straight
 from tests.sim.recorded_motion import recorded
 

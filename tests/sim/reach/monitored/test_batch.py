@@ -11,10 +11,11 @@ from app.sim.collision.checker import no_people
 from app.sim.collision.contact import clearance
 from app.sim.people.kernels.pedestrian import AGE, N_PAST, PAST_RADIUS, PAST_SPEED
 from app.sim.reach.batch import ReachBatch, ReachSettings
-from app.sim.reach.monitored.batch import MonitoredReachBatch, MonitoringSettings
+from app.sim.reach.monitored.batch import MonitoredReachBatch
 from app.sim.robot.kernels.kinematics import ik_vertical_batch
 from app.sim.safety.layer import SafetyLayer, safety_settings
 from app.sim.scenario.kernels.episode import COLLISION, RUNNING, SUCCESS, TIMEOUT
+from app.sim.scenario.monitoring import MonitoringSettings
 from app.sim.scene.scene import NO_CYLINDERS, people_of
 
 CELL = load_cell("shared-workspace")
@@ -213,7 +214,7 @@ def test_a_touched_robot_at_rest_may_go_on():
 
 def test_policies_observe_no_more_time_than_their_horizon():
     batch = MonitoredReachBatch(
-        CELL, 1, 0, replace(ALONE, time_limit_s=12.0), SAFETY, MonitoringSettings(horizon_s=5.0)
+        CELL, 1, 0, replace(ALONE, time_limit_s=12.0), SAFETY, MonitoringSettings()
     )
     batch.reset()
     seen = [batch.state.time_left[0]]

@@ -8,10 +8,11 @@ from app.sim.cells.cell import load_cell
 from app.sim.planning.ompl_planners import PlanSettings
 from app.sim.planning.replanning import ReplanningSettings
 from app.sim.reach.batch import ReachSettings
-from app.sim.reach.monitored.batch import MonitoredReachBatch, MonitoringSettings
+from app.sim.reach.monitored.batch import MonitoredReachBatch
 from app.sim.reach.monitored.planners import GOAL_SPREAD, drive_planner, postures_of
 from app.sim.robot.ur10 import Robot
 from app.sim.safety.layer import safety_settings
+from app.sim.scenario.monitoring import MonitoringSettings
 from app.sim.scene.scene import arm_of
 
 CELL = load_cell("shared-workspace")

@@ -1,5 +1,5 @@
 """Compiled monitored reach step.
 
-state  Data of the reach steps under speed and separation monitoring: accounts, command, results
+state  Commands and results of the reach steps under speed and separation monitoring
 step   Steps of the reach scenario under speed and separation monitoring
 """
