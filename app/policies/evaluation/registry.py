@@ -9,6 +9,7 @@ from app.errors import InvalidInput, NotFound
 from app.policies.checkpoints.checkpoint import CHOOSING, REACHING, SORTING, Checkpoint, task_of
 from app.policies.evaluation.pick import calibration, people, tracker, worst_people
 from app.policies.evaluation.pick import cases as pick_cases
+from app.policies.evaluation.pick import ssm as pick_ssm
 from app.policies.evaluation.pick import tasks as pick
 from app.policies.evaluation.reach.oracle import run_oracle
 from app.policies.evaluation.reach.people import run_constant, run_people, run_speeds
@@ -38,6 +39,7 @@ PROTOCOLS: Mapping[str, Protocol] = MappingProxyType(
         "pick-yielding": people.run_yielding,
         "pick-mocap": people.run_mocap,
         "pick-worst": worst_people.run_worst,
+        "pick-ssm": pick_ssm.run_ssm,
         "safety-ssm": run_safety,
         "sorting-grid": run_grid,
         "sorting-tests": run_tests,

@@ -7,6 +7,7 @@ people           Protocols ``pick-people``, ``pick-mocap``, ``pick-yielding``,
                  ``pick-rest``: other people
 recorded_people  Record poses of robot and people, and check them again with FCL
 selection_rules  Selection rules: the critic's with hysteresis, and others
+ssm              Protocol ``pick-ssm``: picks under speed and separation monitoring
 tasks            Protocols ``pick-single`` and ``pick-choice`` (docs/method.md 3.6)
 tracker          Protocol ``pick-tracker``: people observed through a tracker
 worst_people     Protocol ``pick-worst``: people found by a search

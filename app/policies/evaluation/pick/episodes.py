@@ -174,6 +174,7 @@ class Evaluator:
         n_episodes: Number of episodes.
         seed: Seed of the episodes.
         settings: Start and end conditions.
+        new_batch: Makes the environments.
     """
 
     def __init__(
@@ -183,9 +184,10 @@ class Evaluator:
         n_episodes: int,
         seed: int,
         settings: PickSettings,
+        new_batch: Callable[[Cell, int, int, PickSettings], PickBatch] = PickBatch,
     ) -> None:
         self._networks = networks
-        self.batch = PickBatch(cell, n_episodes, seed, settings)
+        self.batch = new_batch(cell, n_episodes, seed, settings)
         self._sight = observation_workspace_of(self.batch.cell)
         world, grasp = self.batch.world, settings.grasp
         found = target_configurations(self.batch.arm, grasp, world.stations)

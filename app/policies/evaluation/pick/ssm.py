@@ -1,0 +1,179 @@
+"""Protocol ``pick-ssm``: picks under speed and separation monitoring (docs/method.md 2.7).
+
+The policy picks beside a person as in ``pick-single`` and ``pick-choice``, for at most 20 s,
+with the safety layer between policy and robot.
+
+``ssm``
+    One target; assumptions for work among hands (``AMONG_HANDS``): no protective distance.
+``ssm-distance``
+    The same with the default protective distance of 0.3 m.
+``pfl``
+    ``ssm`` with power and force limiting: contacts at admissible speeds are permitted.
+``no-ssm``
+    The same episodes without the safety layer.
+``choice-ssm``, ``choice-no-ssm``
+    Two or three targets, chosen by the critic.
+
+Contact with a moving link ends an episode, also at a speed that power and force limiting
+admits (``contact_admissible``). A person may touch a robot at standstill: the episode continues
+and counts in ``contact_at_rest``. ``stopped`` is the share of control cycles with override 0,
+``time_lost_s`` the time to success less that of the same episode without the layer, where both
+succeed.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+from app.policies.checkpoints.checkpoint import Checkpoint
+from app.policies.checkpoints.trained_cell import cell_of
+from app.policies.evaluation.pick import selection_rules as choice_rules
+from app.policies.evaluation.pick.episodes import Evaluator, settings_for
+from app.policies.evaluation.pick.tasks import settings_of
+from app.policies.evaluation.rows import OnRow, ignore_row
+from app.policies.evaluation.statistics import mean_of, wilson
+from app.policies.inference.task_selection import HYSTERESIS, ValueNetworks, pick_preset_of
+from app.sim.cells.cell import Cell
+from app.sim.pick.batch import PickBatch, PickSettings
+from app.sim.pick.monitored_batch import AMONG_HANDS, MonitoredPickBatch
+from app.sim.safety.layer import SafetySettings
+from app.sim.scenario.monitoring import MonitoredEpisodes, MonitoringSettings, joined
+
+Json = dict[str, Any]
+DEFAULT_EPISODES = 20_000
+TIME_LIMIT_S = 20.0
+"""Time limit of an episode [s]."""
+CHUNK = 5_000
+"""Number of episodes that run together."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Condition:
+    """Condition of a row."""
+
+    safety: SafetySettings = AMONG_HANDS
+    """Assumptions of the safety layer."""
+    active: bool = True
+    """Whether the safety layer acts."""
+    choice: bool = False
+    """Whether the critic chooses among 2 or 3 targets."""
+    against: str | None = None
+    """Row of the same episodes without the layer."""
+
+
+CONDITIONS: Mapping[str, Condition] = {
+    "no-ssm": Condition(active=False),
+    "ssm": Condition(against="no-ssm"),
+    "ssm-distance": Condition(safety=SafetySettings(), against="no-ssm"),
+    "pfl": Condition(safety=replace(AMONG_HANDS, pfl=True), against="no-ssm"),
+    "choice-no-ssm": Condition(active=False, choice=True),
+    "choice-ssm": Condition(choice=True, against="choice-no-ssm"),
+}
+"""Conditions by row."""
+
+
+class MonitoredPicks:
+    """Episodes of a policy under the safety layer.
+
+    Args:
+        checkpoint: Policy and critics.
+        n_episodes: Number of episodes.
+        seed: Seed of the episodes.
+    """
+
+    def __init__(self, checkpoint: Checkpoint, n_episodes: int, seed: int) -> None:
+        self._networks, self._cell = ValueNetworks(checkpoint), cell_of(checkpoint.manifest)
+        self._preset = pick_preset_of(checkpoint)
+        self._n, self._seed = n_episodes, seed
+
+    def evaluator(self, condition: Condition, first: int) -> Evaluator:
+        """Return the evaluator of up to CHUNK episodes from number ``first`` on."""
+        monitoring = MonitoringSettings(active=condition.active, rest_ends=False)
+
+        def new_batch(cell: Cell, n: int, seed: int, settings: PickSettings) -> PickBatch:
+            return MonitoredPickBatch(
+                cell, n, seed, settings, condition.safety, monitoring, first
+            )
+
+        settings = settings_for((2, 3) if condition.choice else (1, 1), self._preset)
+        settings = replace(settings, time_limit_s=TIME_LIMIT_S)
+        n = min(CHUNK, self._n - first)
+        return Evaluator(self._networks, self._cell, n, self._seed, settings, new_batch)
+
+    def run(self, condition: Condition) -> MonitoredEpisodes:
+        """Run all episodes under a condition."""
+        rule = choice_rules.critic(HYSTERESIS) if condition.choice else choice_rules.fixed(0)
+        parts = []
+        for first in range(0, self._n, CHUNK):
+            evaluator = self.evaluator(condition, first)
+            evaluator.run(rule)
+            assert isinstance(evaluator.batch, MonitoredPickBatch)
+            parts.append(evaluator.batch.runs())
+        return joined(parts)
+
+
+def row_of(name: str, runs: MonitoredEpisodes, bare: MonitoredEpisodes | None) -> Json:
+    """Return the result row of a condition.
+
+    Args:
+        name: Name of the row.
+        runs: Episodes of the condition.
+        bare: The same episodes without the layer; None for those themselves.
+    """
+    n, won = len(runs.arrived), runs.arrived
+    admissible = runs.touched_moving & (runs.link_speed <= runs.allowed_speed)
+    moving = runs.touched_moving & ~admissible
+    ended = won | runs.touched_moving | runs.touched_cell
+    rates = {
+        "success": won,
+        "contact_moving": moving,
+        "contact_admissible": admissible,
+        "contact_at_rest": runs.touched_at_rest,
+        "contact_cell": runs.touched_cell,
+        "timeout": ~ended,
+    }
+    both = won if bare is None else won & bare.arrived
+    lost = None if bare is None else mean_of((runs.seconds - bare.seconds)[both])
+    periods = float(runs.seconds.sum())
+    return {
+        "name": name,
+        "n": n,
+        **{key: wilson(int(which.sum()), n) for key, which in rates.items()},
+        "contacts_moving": int(moving.sum()),
+        "time_to_success_s": mean_of(runs.seconds[won]),
+        "time_lost_s": lost,
+        "stopped": float(runs.stopped_s.sum()) / periods,
+        "override": float(runs.override @ runs.seconds) / periods,
+        "fastest_link_m_s": float(runs.link_speed[moving].max(initial=0.0)),
+        "fastest_person_m_s": float(runs.person_speed.max(initial=0.0)),
+    }
+
+
+def run_ssm(
+    checkpoint: Checkpoint, *, episodes: int | None, seed: int, on_row: OnRow = ignore_row
+) -> Json:
+    """Evaluate picks under the safety layer, and the same episodes without it.
+
+    Args:
+        checkpoint: Policy and critics.
+        episodes: Number of episodes of each row, by default 20,000.
+        seed: Seed of the episodes; use one that was not used for tuning.
+        on_row: Callback for each finished row.
+    """
+    picks = MonitoredPicks(checkpoint, episodes or DEFAULT_EPISODES, seed)
+    runs: dict[str, MonitoredEpisodes] = {}
+    rows: list[Json] = []
+    for name, condition in CONDITIONS.items():
+        runs[name] = picks.run(condition)
+        bare = None if condition.against is None else runs[condition.against]
+        rows.append(row_of(name, runs[name], bare))
+        on_row(len(rows), len(CONDITIONS), rows[-1])
+    stated = {name: one.safety.describe() for name, one in CONDITIONS.items() if one.active}
+    return {
+        "settings": {
+            **settings_of(picks.evaluator(CONDITIONS["ssm"], 0)),
+            "hysteresis": HYSTERESIS,
+            "safety": stated,
+        },
+        "results": rows,
+    }
