@@ -15,5 +15,6 @@ world_handle     Interface of a live world for other threads: command queue and 
 people/          People of live worlds: workers, pedestrians, dragged people
 pick/            The live pick-and-place world
 reach/           The live reach world
+safety/          The safety layer of live worlds
 sorting/         The live sorting world
 """

@@ -9,6 +9,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from app.sim.cells.cell import Cell
+from app.sim.collision.checker import Shapes
 from app.sim.collision.contact import Contact, contact, pedestrian_distances, worker_distances
 from app.sim.core.arrays import Vec
 from app.sim.core.jit import FAR
@@ -19,12 +20,10 @@ from app.sim.robot.actions import ActionSettings
 from app.sim.robot.kernels import kinematics
 from app.sim.robot.kernels.joints import JointPath
 from app.sim.robot.trajectory_segment import TrajectorySegment
-from app.sim.scene.scene import arm_of, people_of
+from app.sim.scene.scene import arm_of, people_geometry_of, people_of
 
 GAIN = 3.0
 """Proportional gain from joint error to joint speed [1/s]."""
-AT_REST = 0.01
-"""Joint speed below which the robot counts as at rest [rad/s]."""
 
 
 class HumanGeometry(NamedTuple):
@@ -36,6 +35,8 @@ class HumanGeometry(NamedTuple):
     """Body lengths of workers [m], shape (W, N_SIZE)."""
     cylinders: Vec
     """x, y and radius of cylinders [m], shape (C, 3)."""
+    velocities: Vec
+    """vx, vy and growth of the radius of cylinders [m/s], shape (C, 3)."""
 
 
 class PeopleInCell(Protocol):
@@ -91,24 +92,6 @@ class LiveArm:
         rest, here = np.zeros(6), people.geometry
         return self._test(rest, rest, rest, here, here).kind != "none"
 
-    def advance(
-        self,
-        act: Vec,
-        people: PeopleInCell,
-        before: HumanGeometry,
-        *,
-        straight: bool = False,
-    ) -> Contact:
-        """Execute one action; on contact the state stays that of the start.
-
-        Args:
-            act: Action in [-1, 1], shape (5,) or (6,).
-            people: People at the end of the period.
-            before: Their geometry at its start.
-            straight: Whether the action comes from :meth:`toward` instead of the policy.
-        """
-        return self.follow(self.segment(act, straight=straight), people, before)
-
     def segment(self, act: Vec, *, straight: bool = False) -> TrajectorySegment:
         """Return the trajectory segment of an action in the next period."""
         rule = pick.DEFAULT_ACTION if straight else self.action
@@ -138,6 +121,19 @@ class LiveArm:
         anybody = len(after.q) + len(after.cylinders) > 0
         self.clearance_m = found.clearance_m if anybody else None
         return found
+
+    def shapes(self, people: PeopleInCell) -> Shapes:
+        """Return the people as shapes, for the safety layer."""
+        here = people.geometry
+        columns = body.capsule_columns(len(here.q))
+        shared = self._people._replace(columns=columns)
+        crowd = people_geometry_of(shared, here.q, here.cylinders, here.sizes)
+        top = np.full((len(here.cylinders), 1), self._people.top_z)
+        return Shapes(
+            columns=crowd.columns,
+            cylinders=np.hstack([here.cylinders, top]),
+            going=here.velocities,
+        )
 
     def distances(self, people: PeopleInCell) -> dict[int, float]:
         """Return the distance to each person by id [m]."""
@@ -170,11 +166,6 @@ class LiveArm:
         kinematics.link_poses(self.arm.lengths, self.q, rotations, origins)
         kinematics.tcp_point(self.arm.lengths, rotations, origins, point)
         return point
-
-    @property
-    def moves(self) -> bool:
-        """Whether a joint moves faster than a resting robot's would."""
-        return bool(np.abs(self.qd).max() > AT_REST)
 
     def tool(self, point: Vec) -> ToolState:
         """Return the tool and the separation distance, for the phases of a pick.

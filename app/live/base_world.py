@@ -2,7 +2,10 @@
 
 A world advances in control periods of ``cell.robot.dt``. In each period the people move, the
 robot executes the motion decided for the previous state, contact is tested over the whole
-period, and the policy decides again (docs/method.md 3.1). Pure numpy: no thread, no screen.
+period, and the policy decides again (docs/method.md 3.1). The safety layer (docs/method.md 2.7)
+lies between policy and robot. A contact of the moving robot is shown for two seconds, and the
+robot starts again; one of the robot at standstill is counted apart, and the robot waits until
+the person has moved on. Pure numpy: no thread, no screen.
 """
 
 from abc import ABC, abstractmethod
@@ -10,11 +13,15 @@ from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any, Generic, Protocol, TypeVar
 
+import numpy as np
+
 from app.errors import ServiceError
 from app.live import commands
 from app.live.arm import HumanGeometry, LiveArm, PeopleInCell
 from app.live.command_checks import Command, check
 from app.live.read_model import frozen
+from app.live.safety import explanation
+from app.live.safety.layer import LiveSafety
 from app.live.snapshot import (
     PICK_PHASES,
     CandidateSnapshot,
@@ -30,6 +37,7 @@ from app.sim.core.arrays import Vec
 from app.sim.human.person import Person
 from app.sim.pick import batch as pick
 from app.sim.pick.task_policy import NOT_BEGUN, Candidate, Decision, TaskPolicy
+from app.sim.robot.trajectory_segment import TrajectorySegment
 
 TIME_LIMIT_S = 20.0
 """Time limit of one motion of the policy [s] (thesis table 5.2)."""
@@ -40,6 +48,10 @@ NOTE_S = 2.5
 NEAR_M = 0.25
 """Separation distance below which a motion by inverse kinematics ends, so that the policy can
 move away [m]."""
+STANDSTILL = 1e-3
+"""Joint speed below which the robot is at standstill [rad/s]."""
+APART_M = 0.02
+"""Separation distance from which a contact at standstill is over [m]."""
 
 _TOUCHED = {"cell": "table", "self": "robot"}
 
@@ -104,6 +116,9 @@ class BaseWorld(ABC, Generic[P]):
         self.cell, self.id, self.policy = cell, id, policy
         self.people = people
         self.robot = LiveArm(cell, pick.DEFAULT_ACTION if policy is None else policy.action)
+        self.safety = LiveSafety(self.robot, cell)
+        self._planned: TrajectorySegment
+        self._touching = False
         self.paused = False
         self.status: Status = "moving"
         self.status_s = 0.0
@@ -145,12 +160,15 @@ class BaseWorld(ABC, Generic[P]):
         """
 
     @abstractmethod
-    def _decide(self) -> None:
-        """Query the policy for the present state."""
+    def _wanted(self) -> TrajectorySegment:
+        """Return the motion of the next period without the safety layer."""
 
     @abstractmethod
     def snapshot(self) -> WorldSnapshot:
         """Return the read model of the present state."""
+
+    def _decide(self) -> None:
+        """Query the policy for the present state; nothing where :meth:`_wanted` does."""
 
     def _refresh(self) -> None:
         """Decide again after people or policy changed."""
@@ -189,8 +207,11 @@ class BaseWorld(ABC, Generic[P]):
                 pass  # the loop's own
             case _ if isinstance(command, commands.PeopleCommand):
                 self._change_people(command)
+            case commands.SetSafety():
+                self._change_safety(command)
             case _:
                 self._change(command)
+        self._plan()
 
     def step(self) -> None:
         """Advance by one control period; while paused only dragged people move."""
@@ -199,6 +220,7 @@ class BaseWorld(ABC, Generic[P]):
         elif self.people.move_while_paused(self.robot.dt):
             self.in_contact()
             self._refresh()
+        self._plan()
 
     def _advance(self) -> None:
         before = self.people.geometry
@@ -224,12 +246,13 @@ class BaseWorld(ABC, Generic[P]):
 
     def _reset(self) -> None:
         self.t, self.counters = 0.0, Counters()
+        self.safety.reset()
         self._reset_scenario()
         self._restart_robot()
 
     def _restart_robot(self) -> None:
         self.robot.place(self._start_configuration())
-        self.contact = None
+        self.contact, self._touching = None, False
         self._prepare_restart()
         self._begin("blocked" if self.in_contact() else "moving")
 
@@ -252,7 +275,34 @@ class BaseWorld(ABC, Generic[P]):
         """Begin another status."""
         self.status, self.status_s = status, 0.0
 
+    def _change_safety(self, command: commands.SetSafety) -> None:
+        self.safety.change(command)
+
     # The robot.
+
+    def _plan(self) -> None:
+        """Plan the motion of the next period for the present state."""
+        self._planned = self.safety.plan(self._wanted(), self.robot.shapes(self.people))
+
+    def follow_plan(self, before: HumanGeometry) -> bool:
+        """Execute the planned motion; return whether a contact ended the episode.
+
+        Args:
+            before: The people at the start of the period.
+        """
+        speeds = np.concatenate([self.robot.qd, self._planned.qd])
+        at_standstill = bool(np.abs(speeds).max() < STANDSTILL)
+        found = self.robot.follow(self._planned, self.people, before)
+        if found.kind == "human" and at_standstill:
+            self.robot.halt()
+            self.count(contacts_at_rest=int(not self._touching))
+            self._touching = True
+        elif found.kind != "none":
+            self.note_contact(found)
+            return True
+        elif self.robot.clearance_m is None or self.robot.clearance_m > APART_M:
+            self._touching = False
+        return False
 
     def use(self, policy: TaskPolicy | None) -> None:
         """Replace the policy."""
@@ -277,7 +327,7 @@ class BaseWorld(ABC, Generic[P]):
             body=found.part if found.kind == "human" else _TOUCHED[found.kind],
             person=self._touched_person(found),
         )
-        self.count(contacts=1, contacts_at_rest=int(not self.robot.moves))
+        self.count(contacts=1)
         self.robot.halt()
         self.enter("contact")
 
@@ -365,6 +415,11 @@ class BaseWorld(ABC, Generic[P]):
             outside=() if decision is None else decision.outside_candidates[index],
         )
 
+    def slowed(self) -> str | None:
+        """Return why the safety layer reduces the speed; None if it does not."""
+        ids = self.people.ids
+        return explanation.slowed(self.safety.snapshot(ids), len(ids))
+
     def _people_views(self) -> tuple[PersonSnapshot, ...]:
         distances = self.robot.distances(self.people)
         nearest = min(distances, key=lambda id: distances[id], default=None)
@@ -403,5 +458,6 @@ class BaseWorld(ABC, Generic[P]):
             elapsed_ms=None if decision is None else decision.elapsed_ms,
             counters=self.counters,
             decided_s=None if decision is None else self.decided_s,
+            safety=self.safety.snapshot(self.people.ids),
             **scenario,
         )

@@ -18,6 +18,7 @@ from app.live.commands import (
     PickCommand,
     RemovePerson,
     SetCandidates,
+    SetSafety,
     StartCase,
     ToggleCandidate,
 )
@@ -92,6 +93,9 @@ def check(command: Command, cell: Cell, people: Sequence[int]) -> None:
         case StartCase():
             cases = [case.id for case in cases_of(cell)]
             _require("id", command.id, cases, "is no case study of this cell")
+        case SetSafety() if command.use_measured_velocity is not None and scenario != "reach":
+            rule = f"needs people who are cylinders: those of {cell.name} are workers"
+            raise InvalidInput("use_measured_velocity", command.use_measured_velocity, rule)
         case MoveGoal():
             _check_goal(command.position, cell)
         case StartTest():

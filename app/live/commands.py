@@ -177,6 +177,25 @@ class SetPolicy(LoadingCommand):
     """SHA-256 or alias; null: the robot is idle; in a reach cell: straight to the goal"""
 
 
+class SetSafety(LiveCommand):
+    """Enable or disable the safety layer, and change its settings; null keeps a setting."""
+
+    tag: Literal["set-safety"] = "set-safety"
+    on: bool
+    """whether the robot obeys the safety layer"""
+    protective_distance: Annotated[float, Field(ge=0.0, le=2.0)] | None = None
+    """least distance to people while the robot moves [m]"""
+    human_speed: Annotated[float, Field(ge=0.0, le=5.0)] | None = None
+    """assumed speed of people v_h [m/s]"""
+    reaction_time: Annotated[float, Field(ge=0.0, le=2.0)] | None = None
+    """reaction time, a part of T_r [s]"""
+    pfl: bool | None = None
+    """whether power and force limiting permits contacts at admissible speeds"""
+    use_measured_velocity: bool | None = None
+    """whether S_p uses people's measured velocities instead of an assumed speed in every
+    direction; in reach cells"""
+
+
 class SetCandidates(LiveCommand):
     """Set the stations among which the robot chooses."""
 
@@ -206,5 +225,11 @@ CylinderCommand = MovePerson | SetMode | AddPerson | RemovePerson
 """Commands to people that are known as walking cylinders."""
 PeopleCommand = CylinderCommand | SetMotion | SetAnthropometry
 PickCommand = (
-    PeopleCommand | ClockCommand | SetPolicy | SetCandidates | ToggleCandidate | StartCase
+    PeopleCommand
+    | ClockCommand
+    | SetPolicy
+    | SetSafety
+    | SetCandidates
+    | ToggleCandidate
+    | StartCase
 )

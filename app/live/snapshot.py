@@ -10,6 +10,7 @@ from typing import Literal
 from app.live.commands import Mode
 from app.live.reach.snapshot import ReachSnapshot
 from app.live.read_model import Internal, Numbers, ReadModel
+from app.live.safety.snapshot import SafetySnapshot
 from app.live.sorting.snapshot import SortingSnapshot
 from app.sim.core.arrays import Vec
 from app.sim.core.out_of_range import OutsideField
@@ -178,9 +179,9 @@ class Counters(ReadModel):
     broken_off: int = 0
     """picks broken off during the descent"""
     contacts: int = 0
-    """episodes that ended in a contact"""
+    """contacts of the moving robot; each ends an episode"""
     contacts_at_rest: int = 0
-    """those of them with the robot at rest"""
+    """contacts of a person with the robot at standstill, which waits"""
     timeouts: int = 0
     """episodes that reached the time limit"""
     switches: int = 0
@@ -253,10 +254,12 @@ class WorldSnapshot(ReadModel):
     """expectation and outcome of the running case study or sorting test"""
     counters: Counters
     """events since the last reset"""
+    safety: SafetySnapshot
+    """safety layer and its decision for the present state"""
     sorting: SortingSnapshot | None = None
     """sorting task; null in other cells"""
     reach: ReachSnapshot | None = None
-    """goal, safety layer and outcomes of a reach cell; null in other cells"""
+    """goal and outcomes of a reach cell; null in other cells"""
     robot_q: Internal
     """joint positions of the robot [rad], shape (6,)"""
     robot_qd: Internal

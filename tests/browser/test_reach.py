@@ -45,7 +45,7 @@ def test_visitor_opens_the_cell_sees_it_reach_and_obstructs_it(
     page.locator('[data-role="speed"]').select_option("4")
     now = until(server, lambda one: one["counters"]["reached"] > 0, LIMIT_S)
     expect(page.locator('[data-counter="reached"]')).not_to_have_text("0")
-    now = until(server, lambda one: one["reach"]["safety"]["override"] == 1.0, LIMIT_S)
+    now = until(server, lambda one: one["safety"]["override"] == 1.0, LIMIT_S)
     x, y, _ = now["tcp"]
     tell(server, {"tag": "move-person", "pelvis": [x, y + 0.3, 0.0]})
     expect(page.locator('[data-status="moving"]')).to_have_text("Stopped")

@@ -11,6 +11,7 @@ import { goalColours } from "./palette.js";
 import { ReachDecision } from "./reach/reach.js";
 import { SignIn } from "./signin.js";
 import { SortingDecision } from "./sorting/sorting.js";
+import { Safety } from "./live/safety.js";
 import { SmallPrint, StatusPanel } from "./live/status.js";
 import { Training } from "./training/training.js";
 import { Values } from "./live/values.js";
@@ -226,6 +227,7 @@ function Decision({ cell, checkpoints, jobs }) {
   if (cell.world.reach) return html`<${ReachDecision} world=${cell.world} />`;
   return html`<${StatusPanel} world=${cell.world} />
     <${Values} world=${cell.world} cell=${cell.cell} history=${cell.history} ...${goals} />
+    <${Safety} world=${cell.world} />
     <${SmallPrint} world=${cell.world} />`;
 }
 

@@ -41,6 +41,7 @@ from app.sim.people.kernels.pedestrian import (
     FIXED,
     FIXED_SPEED,
     GAIT,
+    GROWTH,
     KIND,
     LEFT,
     MIDDLE,
@@ -152,7 +153,8 @@ class LivePedestrians:
     @property
     def geometry(self) -> HumanGeometry:
         """Collision geometry: cylinders only."""
-        return HumanGeometry(np.zeros((0, 18)), np.zeros((0, N_SIZE)), self.cylinders)
+        going = self.rows[:, [VX, VY, GROWTH]]
+        return HumanGeometry(np.zeros((0, 18)), np.zeros((0, N_SIZE)), self.cylinders, going)
 
     def restart(self) -> None:
         """Draw new starts for walking people; others keep their positions."""

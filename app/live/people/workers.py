@@ -68,7 +68,7 @@ class LiveWorkers:
     @property
     def geometry(self) -> HumanGeometry:
         """Collision geometry: capsules only."""
-        return HumanGeometry(self.q, self.sizes, NO_CYLINDERS)
+        return HumanGeometry(self.q, self.sizes, NO_CYLINDERS, NO_CYLINDERS)
 
     def only_first(self) -> LiveWorker:
         """Replace all people by the worker of the cell, and return it."""

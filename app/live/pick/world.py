@@ -30,6 +30,7 @@ from app.sim.pick.task_policy import (
     PickProgress,
     TaskPolicy,
 )
+from app.sim.robot.trajectory_segment import TrajectorySegment
 
 
 class LivePickWorld(BaseWorld[LiveWorkers]):
@@ -53,6 +54,7 @@ class LivePickWorld(BaseWorld[LiveWorkers]):
         self._selected = tuple(s.id for s in cell.stations if s.kind == "cube")
         self._own_choice = self._selected
         self._reset()
+        self._plan()
 
     # Starts and ends.
 
@@ -134,16 +136,18 @@ class LivePickWorld(BaseWorld[LiveWorkers]):
         if self.status in ("moving", "picking"):
             self._decide()
 
-    def _move_robot(self, before: HumanGeometry) -> None:
+    def _wanted(self) -> TrajectorySegment:
         act = np.zeros(5)
-        if self.decision is not None:
+        if self.decision is not None and self.status in ("moving", "picking"):
             act = np.asarray(self.decision.actions[self.decision.index], dtype=np.float64)
-        found = self.robot.advance(act, self.people, before)
-        if found.kind != "none":
-            self.note_contact(found)
+        return self.robot.segment(act)
+
+    def _move_robot(self, before: HumanGeometry) -> None:
+        if self.follow_plan(before):
             self._run = self._run.finish("contact", self.t)
         elif self.decision is not None:
             self.time_left -= self.robot.dt
+            self.safety.count(self.robot.dt)
             if self._advance_pick(self.decision):
                 self._finish_pick(self.decision.chosen)
             elif self.time_left <= 0.0:
@@ -247,6 +251,8 @@ class LivePickWorld(BaseWorld[LiveWorkers]):
             return status_messages.touched(self.contact, final=self._case is not None)
         if self.note is not None and status in ("moving", "picking", "no policy"):
             return self.note
+        if status in ("moving", "picking") and (reason := self.slowed()) is not None:
+            return reason
         if status == "picking" and self.decision is not None:
             return explanation.picking(self.decision, self.progress, self._label)
         if status == "moving" and self.decision is not None:

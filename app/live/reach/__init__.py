@@ -5,7 +5,6 @@ controller   Controller of a live reach cell: a reach policy, or straight motion
 explanation  Status messages of a live reach cell, one sentence each
 goal         Goal of a live reach cell: position and choice of the next one
 interfaces   Interface of policies of a live reach cell; ``app.policies`` implements it
-snapshot     State of a live reach cell beyond robot and people: goal, inference mode, safety
-             layer
+snapshot     State of a live reach cell beyond robot and people: goal, inference mode, outcomes
 world        Live reach world: the robot moves from goal to goal beside walking people
 """

@@ -5,7 +5,14 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field
 
-from app.live.commands import ClockCommand, CylinderCommand, LiveCommand, Name, SetPolicy
+from app.live.commands import (
+    ClockCommand,
+    CylinderCommand,
+    LiveCommand,
+    Name,
+    SetPolicy,
+    SetSafety,
+)
 from app.live.reach.snapshot import GoalMode
 from app.sim.cells.cell import Cell
 from app.sim.core.arrays import Vec
@@ -35,17 +42,6 @@ class SetGoalMode(LiveCommand):
     mode: GoalMode
 
 
-class SetSafety(LiveCommand):
-    """Enable or disable speed and separation monitoring."""
-
-    tag: Literal["set-safety"] = "set-safety"
-    on: bool
-    """whether the robot obeys the safety layer"""
-    use_measured_velocity: bool | None = None
-    """whether S_p uses people's measured velocities instead of an assumed speed in every
-    direction; null keeps the setting"""
-
-
 class SetInferenceMode(LiveCommand):
     """Set how the policy is evaluated for goals and people outside its training set."""
 
@@ -62,8 +58,8 @@ class SetWalkingSpeed(LiveCommand):
     """walking speed [m/s]; null: variable, as in training"""
 
 
-ReachOnly = MoveGoal | NewGoal | SetGoalMode | SetSafety | SetInferenceMode | SetWalkingSpeed
-ReachCommand = CylinderCommand | ClockCommand | SetPolicy | ReachOnly
+ReachOnly = MoveGoal | NewGoal | SetGoalMode | SetInferenceMode | SetWalkingSpeed
+ReachCommand = CylinderCommand | ClockCommand | SetPolicy | SetSafety | ReachOnly
 
 
 def is_reaching(cell: Cell) -> bool:

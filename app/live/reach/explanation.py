@@ -1,28 +1,27 @@
 """Status messages of a live reach cell, one sentence each."""
 
-from app.live.reach.snapshot import ReachSnapshot, SafetySnapshot
+from app.live.reach.snapshot import ReachSnapshot
+from app.live.safety.explanation import slowed
+from app.live.safety.snapshot import SafetySnapshot
 from app.live.snapshot import Status
 
-FULL = 0.995
-"""Override from which a message does not mention it."""
 NO_POLICY = "No reach policy is active: moving straight to the goal without avoiding people"
-_LINKS = {
-    "base_link": "base",
-    "shoulder_link": "shoulder",
-    "upper_arm_link": "upper arm",
-    "forearm_link": "forearm",
-    "wrist_1_link": "wrist",
-    "wrist_2_link": "wrist",
-    "wrist_3_link": "tool",
-}
 
 
-def doing(status: Status, view: ReachSnapshot, *, has_policy: bool, n_people: int) -> str:
+def doing(
+    status: Status,
+    view: ReachSnapshot,
+    safety: SafetySnapshot,
+    *,
+    has_policy: bool,
+    n_people: int,
+) -> str:
     """Return the status message.
 
     Args:
         status: Status of the robot.
-        view: Goal and safety layer.
+        view: Goal.
+        safety: Safety layer.
         has_policy: Whether a policy moves the robot.
         n_people: Number of people.
     """
@@ -31,27 +30,7 @@ def doing(status: Status, view: ReachSnapshot, *, has_policy: bool, n_people: in
     if status == "reached":
         then = "drag it to continue" if view.goal_mode == "follow" else "the next one follows"
         return f"Goal reached: {then}."
-    if (reason := slowed(view.safety, n_people)) is not None:
+    if (reason := slowed(safety, n_people)) is not None:
         return reason
     left = f"{100.0 * view.distance:.0f} cm to go"
     return f"Moving to the goal, {left}." if has_policy else f"{NO_POLICY}, {left}."
-
-
-def slowed(safety: SafetySnapshot, n_people: int) -> str | None:
-    """Return why the safety layer reduces the speed; None if it does not."""
-    if not safety.on or safety.override >= FULL or safety.separation is None:
-        return None
-    verb = "Stopped" if safety.override <= 0.0 else f"Slowed to {100 * safety.override:.0f} %"
-    person = "the person" if n_people < 2 else f"person {(safety.person or 0) + 1}"
-    gap, need, link = safety.separation, safety.required or 0.0, link_name(safety.link)
-    if gap <= 0.0:
-        return f"{verb}: {person} touches the {link}; the robot stands still."
-    place = f"{person} is {gap:.2f} m from the {link}"
-    if gap < need:
-        return f"{verb}: {place}, {need:.2f} m required."
-    return f"{verb}: {place}, and could come too near along the planned motion."
-
-
-def link_name(link: str | None) -> str:
-    """Return a link's name for people."""
-    return "robot" if link is None else _LINKS.get(link, link.replace("_", " "))

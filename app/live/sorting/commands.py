@@ -15,6 +15,7 @@ from app.live.commands import (
     Name,
     PeopleCommand,
     SetPolicy,
+    SetSafety,
 )
 from app.live.sorting.table import Block, SortingTable
 
@@ -85,7 +86,13 @@ class SetSortingPolicy(LoadingCommand):
 
 TableCommand = AddObject | RemoveObject | MoveObject | SetGoal | ToggleGoal
 SortingCommand = (
-    PeopleCommand | ClockCommand | SetPolicy | TableCommand | StartTest | SetSortingPolicy
+    PeopleCommand
+    | ClockCommand
+    | SetPolicy
+    | SetSafety
+    | TableCommand
+    | StartTest
+    | SetSortingPolicy
 )
 
 

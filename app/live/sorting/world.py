@@ -39,6 +39,7 @@ from app.live.sorting.vertical_approach import VerticalApproach
 from app.sim.cells.cell import Cell
 from app.sim.core.arrays import Vec
 from app.sim.pick.task_policy import Candidate, TaskPolicy
+from app.sim.robot.trajectory_segment import TrajectorySegment
 from app.sim.sorting.layout import above, reaching_cell
 from app.sim.sorting.sorting_values import SortingValues
 from app.sim.sorting.state import NULL
@@ -75,6 +76,7 @@ class LiveSortingWorld(BaseWorld[LiveWorkers]):
         self._vertical: VerticalApproach | None = None
         self._n_tasks = self._version = 0
         self._reset()
+        self._plan()
 
     # Starts and ends.
 
@@ -175,21 +177,26 @@ class LiveSortingWorld(BaseWorld[LiveWorkers]):
 
     def _move_robot(self, before: HumanGeometry) -> None:
         vertical = self._vertical
-        straight = vertical is not None or self.decision is None
-        found = self.robot.advance(self._action(), self.people, before, straight=straight)
-        if found.kind != "none":
+        if self.follow_plan(before):
             self._vertical = None
-            self.note_contact(found)
             if self._test is not None:
                 self._test.note_contact()
         elif vertical is not None:
+            self.safety.count(self.robot.dt)
             self._continue_vertical(vertical)
         elif self.decision is not None:
+            self.safety.count(self.robot.dt)
             self.time_left -= self.robot.dt
             self._end_motion(self.decision.index)
 
+    def _wanted(self) -> TrajectorySegment:
+        straight = self._vertical is not None or self.decision is None
+        return self.robot.segment(self._action(), straight=straight)
+
     def _action(self) -> Vec:
         """Return joint speeds over their limits, in [-1, 1], shape (5,)."""
+        if self.status not in ("moving", "picking"):
+            return np.zeros(5)
         if self._vertical is not None:
             aim = self._vertical.aim(self.robot.tcp())
             return self.robot.toward(self.robot.configuration_at(aim)[0])
@@ -356,6 +363,8 @@ class LiveSortingWorld(BaseWorld[LiveWorkers]):
             return status_messages.touched(self.contact, final=False)
         if self.note is not None and status != "blocked":
             return self.note
+        if status in ("moving", "picking") and (reason := self.slowed()) is not None:
+            return reason
         if status in ("moving", "picking") and (chosen := self._chosen()) is not None:
             return self._messages.doing(self._phase, chosen, self._controller)
         if status == "solved":

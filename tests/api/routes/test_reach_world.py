@@ -49,7 +49,7 @@ def test_world_shows_goal_safety_layer_and_cylinders(client: TestClient) -> None
     )
     assert reach["tolerance"] == 0.1
     assert reach["inference_modes"] == []
-    safety = reach["safety"]
+    safety = world["safety"]
     total = safety["person_distance"] + safety["robot_distance"] + safety["margin"]
     assert safety["required"] == pytest.approx(total)
     assert 0.2 <= person["cylinder"]["radius"] <= 0.5
@@ -65,10 +65,10 @@ def test_goal_safety_and_people_are_changed(client: TestClient) -> None:
     now = until(client, lambda one: one["reach"]["walk_speed"] == 0.25)
     until(client, lambda one: len(one["people"]) == 2)
     assert now["reach"]["goal"] == pytest.approx([0.5, 0.6, 0.1])
-    assert (now["reach"]["goal_mode"], now["reach"]["safety"]["on"]) == ("follow", False)
+    assert (now["reach"]["goal_mode"], now["safety"]["on"]) == ("follow", False)
     send(client, tag="remove-person", person=1)
     send(client, tag="set-safety", on=True, use_measured_velocity=True)
-    until(client, lambda one: one["reach"]["safety"]["use_measured_velocity"])
+    until(client, lambda one: one["safety"]["use_measured_velocity"])
     send(client, tag="set-walking-speed", speed=None)
     until(client, lambda one: len(one["people"]) == 1)
     send(client, tag="new-goal")
@@ -136,7 +136,7 @@ def test_policy_that_chooses_tasks_cannot_reach(client: TestClient) -> None:
 
 def test_reach_commands_need_a_reach_cell(client: TestClient) -> None:
     client.put(f"{WORLD}/cell", json={"cell": "pick-and-place"}).raise_for_status()
-    refused = send(client, tag="set-safety", on=False)
+    refused = send(client, tag="set-walking-speed", speed=0.5)
     assert (refused.status_code, refused.json()["field"]) == (422, "tag")
     shown = client.put(f"{WORLD}/cell", json={"cell": "shared-workspace"})
     assert shown.status_code == 200

@@ -6,7 +6,8 @@ import pytest
 from app.errors import InvalidInput
 from app.live import commands
 from app.live.command_checks import Command
-from app.live.reach.commands import MoveGoal, NewGoal, SetGoalMode, SetInferenceMode, SetSafety
+from app.live.commands import SetSafety
+from app.live.reach.commands import MoveGoal, NewGoal, SetGoalMode, SetInferenceMode
 from app.live.reach.world import LONG_LIMIT_S, LiveReachWorld
 from app.live.snapshot import WorldSnapshot
 from app.sim.cells.cell import load_cell
@@ -51,7 +52,7 @@ def test_robot_without_a_policy_goes_from_goal_to_goal_and_says_so() -> None:
     then = until(world, lambda now: now.counters.reached == 2)
     assert not np.array_equal(then.reach.goal, first.reach.goal)
     assert (then.counters.contacts, then.counters.timeouts) == (0, 0)
-    assert then.reach.counters.reaching_s == pytest.approx(then.reach.counters.moving_s)
+    assert then.reach.counters.reaching_s == pytest.approx(then.safety.moving_s)
 
 
 def test_goal_that_follows_stays_until_it_is_dragged_away() -> None:
@@ -83,8 +84,8 @@ def test_goal_can_be_drawn_again_while_the_robot_moves() -> None:
 def test_person_beside_the_robot_slows_it_down_and_the_message_says_by_how_much() -> None:
     world = LiveReachWorld(CELL, None, seed=3)
     standing_at(world, -0.35, 1.5)
-    slow = until(world, lambda now: 0.0 < now.reach.safety.override < 0.9)
-    safety = slow.reach.safety
+    slow = until(world, lambda now: 0.0 < now.safety.override < 0.9)
+    safety = slow.safety
     assert slow.message.startswith(f"Slowed to {100 * safety.override:.0f} %")
     assert f"{safety.separation:.2f} m from the" in slow.message
     total = safety.person_distance + safety.robot_distance + safety.margin
@@ -95,26 +96,26 @@ def test_person_beside_the_robot_slows_it_down_and_the_message_says_by_how_much(
 def test_robot_stops_before_a_standing_person_and_continues_afterwards() -> None:
     world = LiveReachWorld(CELL, None, seed=3)
     standing_at(world, 0.0, 0.9)
-    stopped = until(world, lambda now: now.reach.safety.override == 0.0)
+    stopped = until(world, lambda now: now.safety.override == 0.0)
     assert stopped.message.startswith("Stopped:")
     world.apply(commands.MovePerson(pelvis=FAR_CORNER))
     end = until(world, lambda now: now.counters.reached == 1)
     assert end.counters.contacts == 0
-    assert end.reach.counters.stopped_s > 0.0
+    assert end.safety.stopped_s > 0.0
 
 
 def test_person_who_walks_into_the_standing_robot_is_no_contact() -> None:
     world = LiveReachWorld(CELL, None, seed=3)
     standing_at(world, 0.0, 1.2)
-    until(world, lambda now: now.reach.safety.override == 0.0)
+    until(world, lambda now: now.safety.override == 0.0)
     x, y, _ = world.snapshot().tcp
     world.apply(commands.MovePerson(pelvis=(float(x), float(y), 0.0)))
-    hit = until(world, lambda now: now.reach.counters.touched == 1)
+    hit = until(world, lambda now: now.counters.contacts_at_rest == 1)
     assert np.allclose(hit.robot_qd, 0.0, atol=1e-3)
     for _ in range(50):
         world.step()
     after = world.snapshot()
-    assert (after.counters.contacts, after.reach.counters.touched) == (0, 1)
+    assert (after.counters.contacts, after.counters.contacts_at_rest) == (0, 1)
     assert "stands still" in after.message
 
 
@@ -124,10 +125,10 @@ def test_without_the_layer_the_robot_hits_an_unobserved_person() -> None:
     world.apply(SetGoalMode(mode="follow"))
     world.apply(MoveGoal(position=(-0.5, 0.8, 0.3)))
     standing_at(world, -0.3, 1.0)
-    assert world.snapshot().reach.safety.override == 1.0
+    assert world.snapshot().safety.override == 1.0
     hit = until(world, lambda now: now.status == "contact")
     assert (hit.counters.contacts, hit.contact.kind, hit.contact.person) == (1, "human", 0)
-    assert hit.reach.safety.advised < 1.0
+    assert hit.safety.advised < 1.0
     again = until(world, lambda now: now.status != "contact")
     assert np.allclose(again.robot_q, CELL.robot.home_q, atol=0.02)
 
@@ -136,16 +137,16 @@ def test_who_stands_near_does_not_hold_the_robot_where_velocities_are_measured()
     world = LiveReachWorld(CELL, None, seed=3)
     x, y, _ = world.snapshot().tcp
     standing_at(world, float(x), float(y) + 0.75)
-    assumed = world.snapshot().reach.safety
+    assumed = world.snapshot().safety
     world.apply(SetSafety(on=True, use_measured_velocity=True))
-    measured = world.snapshot().reach.safety
+    measured = world.snapshot().safety
     assert assumed.advised < measured.advised == 1.0
     assert (assumed.use_measured_velocity, measured.use_measured_velocity) == (False, True)
     assert (assumed.human_speed, measured.human_speed) == (1.6, pytest.approx(0.1))
     assert measured.required < assumed.required
     assert np.ptp(measured.zone, axis=0).max() < np.ptp(assumed.zone, axis=0).max() - 0.3
     world.apply(SetSafety(on=False))
-    assert world.snapshot().reach.safety.use_measured_velocity
+    assert world.snapshot().safety.use_measured_velocity
 
 
 def test_goal_that_is_not_reached_in_time_counts_and_is_tried_again() -> None:
@@ -165,7 +166,7 @@ def test_paused_cell_answers_to_a_person_who_is_dragged() -> None:
     standing_at(world, 0.3, 1.0)
     after = world.snapshot()
     assert np.array_equal(after.robot_q, before.robot_q)
-    assert after.reach.safety.separation != before.reach.safety.separation
+    assert after.safety.separation != before.safety.separation
     assert after.people[0].mode == "manual"
 
 
@@ -185,7 +186,7 @@ def test_reset_sets_time_and_counters_to_zero() -> None:
     until(world, lambda now: now.counters.reached == 1)
     world.apply(commands.Reset())
     fresh = world.snapshot()
-    assert (fresh.t_s, fresh.counters.reached, fresh.reach.counters.moving_s) == (0.0, 0, 0.0)
+    assert (fresh.t_s, fresh.counters.reached, fresh.safety.moving_s) == (0.0, 0, 0.0)
     assert np.array_equal(fresh.robot_q, CELL.robot.home_q)
 
 

@@ -3,8 +3,8 @@ import pytest
 from numpy.typing import NDArray
 
 from app.live import commands
-from app.live.commands import SetPolicy
-from app.live.reach.commands import SetInferenceMode, SetSafety
+from app.live.commands import SetPolicy, SetSafety
+from app.live.reach.commands import SetInferenceMode
 from app.live.reach.controller import TIME_LIMIT_S, ReachController
 from app.live.reach.world import LiveReachWorld
 from app.policies.inference.controllers import RolloutController, controller_of

@@ -3,6 +3,7 @@ import { html } from "../vendor/htm-preact-standalone.module.js";
 import { Icon } from "../icons.js";
 import { People } from "./people.js";
 import { Presets } from "./presets.js";
+import { SafetyControls } from "./safetycontrols.js";
 import { ReachControls } from "../reach/reachcontrols.js";
 
 const SPEEDS = [1, 2, 4, 8];
@@ -31,7 +32,8 @@ export function Controls({ world, cell, cases, send, colourOf, labelOf }) {
     </${People}>
     ${world.reach ? html`<${ReachControls} world=${world} send=${send} />`
       : world.sorting
-      ? html`<${Presets} label="Benchmark tasks" items=${cell?.sorting_tests ?? []} tag="start-test"
+      ? html`<div class="dock-row dock-wrap"><${SafetyControls} world=${world} send=${send} /></div>
+        <${Presets} label="Benchmark tasks" items=${cell?.sorting_tests ?? []} tag="start-test"
           running=${world.sorting.test} send=${send}
           hint="Six sorting tests of the thesis: the cell is set up and the robot sorts." />`
       : html`<div class="dock-row">
@@ -39,6 +41,7 @@ export function Controls({ world, cell, cases, send, colourOf, labelOf }) {
           <${Goals} world=${world} cell=${cell} send=${send} colourOf=${colourOf}
             labelOf=${labelOf} />
         </div>
+        <div class="dock-row dock-wrap"><${SafetyControls} world=${world} send=${send} /></div>
         ${cases.length > 0 && html`<${Presets} label="Scenarios" items=${cases} tag="start-case"
           running=${world.case} send=${send}
           hint="Four case studies of thesis table 5.3: the person reaches in, the robot selects the better goal." />`}`}

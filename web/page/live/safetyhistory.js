@@ -1,4 +1,4 @@
-// The last seconds of override and separation, for the running plots of a reach cell.
+// The last seconds of override and separation, for the running plots of the safety layer.
 
 export const SAFETY_SPAN_S = 20;
 
@@ -13,7 +13,7 @@ export class SafetyHistory {
   }
 
   /** Add what a snapshot says, once. */
-  add({ tick, t_s: t, reach: { safety } }) {
+  add({ tick, t_s: t, safety }) {
     if (tick === this.tick) return;
     const last = this.samples.at(-1);
     if (tick < this.tick || (last && t < last.t)) this.samples = [];

@@ -3,6 +3,7 @@ import { html } from "../vendor/htm-preact-standalone.module.js";
 import * as format from "../format.js";
 import { Icon } from "../icons.js";
 import { nameOf } from "./people.js";
+import { safetyChip } from "./safety.js";
 
 const STATUS = {
   moving: ["Moving to target", "accent"],
@@ -21,7 +22,7 @@ const NOUNS = { protract: "protraction", elevate: "elevation", flex: "flexion", 
 
 /** `chip` replaces the name of the status where a more specific one exists. */
 export function StatusPanel({ world, chip = null }) {
-  const [text, tone] = chip ?? judged(world) ?? STATUS[world.status] ?? [String(world.status), "quiet"];
+  const [text, tone] = safetyChip(world) ?? chip ?? judged(world) ?? STATUS[world.status] ?? [String(world.status), "quiet"];
   return html`<section class="story" aria-labelledby="story-title">
     <h2 id="story-title" class="sr">What the robot does and why</h2>
     <div class="story-top">
@@ -77,7 +78,7 @@ export function SmallPrint({ world }) {
   return html`<section class="card small-print" aria-label="Counters and provenance">
     <dl class="tiles">
       ${[["reached", "Picked"], ["broken_off", "Broken off"], ["contacts", "Contacts"],
-        ["contacts_at_rest", "Of these at rest"], ["timeouts", "Timed out"],
+        ["contacts_at_rest", "Contacts at rest"], ["timeouts", "Timed out"],
         ["switches", "Target switches"]].map(([key, label]) => html`<div key=${key}>
           <dt>${label}</dt><dd data-counter=${key}>${counters[key] ?? 0}</dd></div>`)}
     </dl>

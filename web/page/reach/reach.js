@@ -1,114 +1,29 @@
-// Panel of a reach cell: status, speed and separation monitoring, outcomes.
-import { html, useRef } from "../vendor/htm-preact-standalone.module.js";
+// Panel of a reach cell: status, safety layer, outcomes.
+import { html } from "../vendor/htm-preact-standalone.module.js";
 import * as format from "../format.js";
 import { Icon } from "../icons.js";
-import { overrideColour } from "../palette.js";
-import { nameOf } from "../live/people.js";
-import { OverridePlot, SeparationPlot } from "./reachplots.js";
-import { SAFETY_SPAN_S, SafetyHistory } from "./safetyhistory.js";
+import { Safety } from "../live/safety.js";
 import { StatusPanel } from "../live/status.js";
 
-const SLOW = 0.995;
-const ARC = 2 * Math.PI * 40 * 0.75;
-const LINKS = { base_link: "base", shoulder_link: "shoulder", upper_arm_link: "upper arm",
-  forearm_link: "forearm", wrist_1_link: "wrist", wrist_2_link: "wrist", wrist_3_link: "tool" };
-
 export function ReachDecision({ world }) {
-  const history = useRef(new SafetyHistory()).current;
-  history.add(world);
-  return html`<${StatusPanel} world=${world} chip=${chip(world)} />
+  return html`<${StatusPanel} world=${world} />
     ${!world.checkpoint && html`<div class="notice warn" data-role="no-policy"><${Icon} name="alert" />
       <span>No reach policy is active. The robot moves straight to the goal without avoiding
         people; only the safety layer slows it down. Train <b>reach-td3</b> under Training, or choose a
         checkpoint above.</span></div>`}
-    <${Safety} world=${world} history=${history} />
+    <${Safety} world=${world} />
     <${Outcomes} world=${world} />`;
-}
-
-/** What the story's chip says where the world's status is too coarse. */
-function chip({ status, reach: { safety } }) {
-  if (status === "reached") return ["Goal reached", "good"];
-  if (status !== "moving" || !safety.on || safety.override >= SLOW) return null;
-  return safety.override <= 0 ? ["Stopped", "bad"] : ["Slowed down", "warn"];
-}
-
-/** The safety layer: rate, separation against what is needed, both over time. */
-function Safety({ world, history }) {
-  const { safety } = world.reach;
-  return html`<section class="card" aria-labelledby="safety-title">
-    <header class="card-head">
-      <h2 id="safety-title">Speed and separation monitoring</h2>
-      <span class="hint" tabindex="0" aria-describedby="safety-help">ISO 10218-2
-        <span class="tip tip-left" role="tooltip" id="safety-help">The robot must be able to stop
-          before a person ${safety.use_measured_velocity ? "at the measured velocity plus" : "walking at"}
-          ${safety.human_speed.toFixed(1)} m/s can reach it. The layer checks the path ahead; S_p is the
-          bound of the standard, so near the limit the two differ slightly, and a robot that moves
-          away may be faster. S_p is the sum of the distances that person and robot cover until
-          the robot has stopped, and of the margins. Not a certified safety function.</span>
-      </span>
-    </header>
-    <div class="safety">
-      <${Gauge} safety=${safety} />
-      <${Terms} safety=${safety} people=${world.people ?? []} />
-    </div>
-    <div class="plot-head"><span>Override, last ${SAFETY_SPAN_S} s</span>
-      ${!safety.on && html`<span class="faint"><i class="dashed-mark"></i>override of the layer</span>`}
-    </div>
-    <${OverridePlot} history=${history} on=${safety.on} />
-    <div class="plot-head"><span>Separation distance and S<sub>p</sub></span></div>
-    <${SeparationPlot} history=${history} />
-  </section>`;
-}
-
-/** The override as three quarters of a ring. */
-function Gauge({ safety }) {
-  const { on, override, advised } = safety;
-  const percent = Math.round(override * 100);
-  return html`<div class="gauge" role="meter" aria-label="Override in percent" aria-valuemin="0"
-    aria-valuemax="100" aria-valuenow=${percent} data-role="override" data-override=${override.toFixed(3)}>
-    <svg viewBox="0 0 100 100" aria-hidden="true">
-      <circle cx="50" cy="50" r="40" class="gauge-back" stroke-dasharray=${`${ARC} 400`} />
-      ${override > 0 && html`<circle cx="50" cy="50" r="40" class="gauge-fill"
-        stroke=${on ? overrideColour(override) : "var(--ink-3)"}
-        stroke-dasharray=${`${ARC * override} 400`} />`}
-    </svg>
-    <b>${percent}<small> %</small></b>
-    <span>${on ? "speed override" : `disabled, would be ${Math.round(advised * 100)} %`}</span>
-  </div>`;
-}
-
-function Terms({ safety, people }) {
-  const { person, link, separation, required, person_distance: person_m, robot_distance: robot_m, margin } = safety;
-  if (person === null) {
-    return html`<p class="empty">No person in the cell. Add a person below the scene.</p>`;
-  }
-  const subject = people.length > 1 ? nameOf(person) : "Person";
-  const rows = [
-    ["person", "human contribution Sh", person_m],
-    ["robot", "robot reaction and stopping Sr + Ss", robot_m],
-    ["margin", "margins C + Z", margin],
-  ];
-  return html`<dl class="terms">
-    <div class=${separation < required ? "terms-top is-short" : "terms-top"}>
-      <dt>${subject} to ${LINKS[link] ?? "robot"}</dt>
-      <dd data-role="separation">${format.gap(separation)}</dd></div>
-    <div class="terms-top"><dt>Protective separation distance S<sub>p</sub></dt><dd data-role="required">${metres(required)}</dd></div>
-    ${rows.map(([key, label, value]) => html`<div key=${key}><dt><i class=${`term term-${key}`}></i>${label}</dt>
-      <dd>${metres(value)}</dd></div>`)}
-  </dl>`;
 }
 
 /** Outcome counters and provenance. */
 function Outcomes({ world }) {
   const { counters, reach } = world;
-  const more = reach.counters;
   const tiles = [
     ["reached", "Reached", counters.reached],
     ["contacts", "Contacts", counters.contacts],
-    ["touched", "Contact at standstill", more.touched],
+    ["contacts_at_rest", "Contact at standstill", counters.contacts_at_rest],
     ["timeouts", "Timed out", counters.timeouts],
   ];
-  const share = (seconds) => (more.moving_s > 0 ? format.percent(seconds / more.moving_s, 0) : "–");
   return html`<section class="card small-print" aria-label="Outcomes and provenance">
     <dl class="tiles">
       ${tiles.map(([key, label, value]) => html`<div key=${key}>
@@ -116,9 +31,7 @@ function Outcomes({ world }) {
     </dl>
     <dl class="facts">
       <div><dt>Mean time to a goal</dt><dd>${counters.reached
-        ? `${(more.reaching_s / counters.reached).toFixed(1)} s` : "–"}</dd></div>
-      <div><dt>Below half speed</dt><dd>${share(more.slowed_s)}</dd></div>
-      <div><dt>Stopped</dt><dd>${share(more.stopped_s)}</dd></div>
+        ? `${(reach.counters.reaching_s / counters.reached).toFixed(1)} s` : "–"}</dd></div>
     </dl>
     <p class="range"><${Icon} name="alert" /><span>Contact at standstill: a person touched the robot
       while it stood still. People in this cell do not avoid the robot.</span></p>
@@ -126,8 +39,4 @@ function Outcomes({ world }) {
       ${` ${format.number(world.elapsed_ms, 2)} ms by checkpoint `}
       <code title=${world.checkpoint}>${format.short(world.checkpoint)}</code></p>`}
   </section>`;
-}
-
-function metres(value) {
-  return Number.isFinite(value) ? `${value.toFixed(2)} m` : "–";
 }

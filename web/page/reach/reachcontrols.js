@@ -2,15 +2,11 @@
 import { html } from "../vendor/htm-preact-standalone.module.js";
 import { Segmented } from "../choice.js";
 import { Icon } from "../icons.js";
+import { SafetyControls } from "../live/safetycontrols.js";
 
 const GOAL_MODES = [
   ["jump", "New target when reached", "A reached goal is replaced by a random one"],
   ["follow", "Manual target", "The goal stays where you drag it with the arrows in the scene"],
-];
-const SAFETY = [
-  ["assumed", "Assumed speed", "The safety layer assumes a walking speed in every direction"],
-  ["measured", "Measured velocity", "The safety layer uses the measured velocities of people; the rollout takes it into account"],
-  ["off", "Disabled", "The robot moves without a safety layer"],
 ];
 const BETWEEN = [
   [true, "On", "Actions for the training targets around the goal are interpolated"],
@@ -26,7 +22,7 @@ const AHEAD = [
 ];
 
 export function ReachControls({ world, send }) {
-  const { goal_mode: mode, safety, inference_mode: current, inference_modes: modes } = world.reach;
+  const { goal_mode: mode, inference_mode: current, inference_modes: modes } = world.reach;
   const between = current.includes("interpolated");
   const weighted = current.includes("distance-weighted");
   const ahead = current.endsWith("-rollout");
@@ -40,9 +36,7 @@ export function ReachControls({ world, send }) {
       onPick=${(one) => send({ tag: "set-goal-mode", mode: one })} />
     <button type="button" class="tool" data-action="new-goal" title="Draw a random goal"
       onClick=${() => send({ tag: "new-goal" })}><${Icon} name="reset" />Random target</button>
-    <span class="dock-pair"><span class="dock-label dock-label-free" id="layer-label">Safety layer</span>
-      <${Segmented} labelledby="layer-label" mark=${marked("safety")} value=${layerOf(safety)} items=${SAFETY}
-        onPick=${(one) => send({ tag: "set-safety", on: one !== "off", ...(one !== "off" && { use_measured_velocity: one === "measured" }) })} /></span>
+    <${SafetyControls} world=${world} send=${send} />
     ${modes.includes("interpolated") && html`<span class="dock-pair">
       <span class="dock-label dock-label-free" id="between-label">Target interpolation</span>
       <${Segmented} labelledby="between-label" mark=${marked("between")} value=${between} items=${BETWEEN}
@@ -56,12 +50,6 @@ export function ReachControls({ world, send }) {
       <${Segmented} labelledby="beside-label" mark=${marked("beside")} value=${weighted} items=${BESIDE}
         onPick=${(one) => ask(one, between, ahead)} /></span>`}
   </div>`;
-}
-
-/** Which of the choices holds for the safety layer. */
-function layerOf({ on, use_measured_velocity: measured }) {
-  if (!on) return "off";
-  return measured ? "measured" : "assumed";
 }
 
 function marked(name) {

@@ -87,9 +87,10 @@ function worth(value, by) {
 
 /** Counters and the task planner. */
 export function SortingSmallPrint({ world, cell, checkpoints, jobs, send }) {
-  const { counters } = world.sorting;
+  const counters = { ...world.sorting.counters, ...world.counters };
   const shown = [["attempts", "Grasps"], ["failures", "Failed"], ["moves", "Moves"],
-    ["planner_fallbacks", "Planner fallbacks"]];
+    ["planner_fallbacks", "Planner fallbacks"], ["contacts", "Contacts"],
+    ["contacts_at_rest", "Contacts at rest"]];
   return html`<section class="card small-print" aria-label="Counters and provenance">
     <dl class="tiles">
       ${shown.map(([key, label]) => html`<div key=${key}>

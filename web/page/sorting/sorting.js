@@ -3,6 +3,7 @@ import { html, useEffect, useState } from "../vendor/htm-preact-standalone.modul
 import { Blocks } from "./blocks.js";
 import { GoalEditor } from "./goaleditor.js";
 import { Moves, SortingSmallPrint } from "./ranking.js";
+import { Safety } from "../live/safety.js";
 import { StatusPanel } from "../live/status.js";
 
 const PHASES = {
@@ -26,6 +27,7 @@ export function SortingDecision({ world, cell, send, checkpoints, jobs }) {
     <${GoalEditor} ...${shared} />
     <${Blocks} ...${shared} />
     <${Moves} sorting=${sorting} cell=${cell} />
+    <${Safety} world=${world} />
     <${SortingSmallPrint} world=${world} cell=${cell} checkpoints=${checkpoints} jobs=${jobs}
       send=${send} />`;
 }

@@ -11,7 +11,7 @@ import numpy as np
 import viser
 
 from app.live.reach.commands import MoveGoal, goal_box
-from app.live.reach.snapshot import ReachSnapshot, SafetySnapshot
+from app.live.safety.snapshot import SafetySnapshot
 from app.live.snapshot import WorldSnapshot
 from app.sim.cells.cell import Cell
 from app.sim.reach.batch import goal_region_of
@@ -85,8 +85,8 @@ class ReachScene:
         else:
             self._path.hide()
         self._trail.note(snapshot)
-        self._zone.draw(view, visible=view.safety.person is not None)
-        self._gauge.draw(view)
+        self._zone.draw(snapshot.safety)
+        self._gauge.draw(snapshot.safety)
         self._trail.draw()
 
 
@@ -117,12 +117,13 @@ class _Zone:
         )
         self._key: tuple[object, ...] = ()
 
-    def draw(self, view: ReachSnapshot, *, visible: bool) -> None:
+    def draw(self, safety: SafetySnapshot) -> None:
         """Show the zone of this state."""
+        visible = safety.person is not None
         for part in (self._area, self._edge):
             if part.visible != visible:
                 part.visible = visible
-        color, outline = override_color(view.safety), view.safety.zone
+        color, outline = override_color(safety), safety.zone
         key = (color, *np.round(outline[::9], 2).ravel().tolist())
         if not visible or key == self._key:
             return
@@ -157,9 +158,9 @@ class _Gauge:
         )
         self._key: tuple[object, ...] = ()
 
-    def draw(self, view: ReachSnapshot) -> None:
+    def draw(self, safety: SafetySnapshot) -> None:
         """Show the override of this state."""
-        safety, color = view.safety, override_color(view.safety)
+        color = override_color(safety)
         full = round(N_GAUGE * safety.override)
         text = f"{100 * safety.override:.0f} %" if safety.on else "no safety layer"
         if (full, color, text) == self._key:
@@ -189,7 +190,7 @@ class _Trail:
         if points and float(np.linalg.norm(tcp - points[-1][0])) > 0.3:
             points.clear()
         if not points or float(np.linalg.norm(tcp - points[-1][0])) > TRAIL_M:
-            points.append((tcp, override_color(snapshot.reach.safety)))
+            points.append((tcp, override_color(snapshot.safety)))
             self._n += 1
 
     def draw(self) -> None:

@@ -9,7 +9,8 @@ import viser
 
 from app.live import commands
 from app.live.command_checks import Command
-from app.live.reach.commands import MoveGoal, SetSafety, goal_box
+from app.live.commands import SetSafety
+from app.live.reach.commands import MoveGoal, goal_box
 from app.live.reach.world import LiveReachWorld
 from app.live.snapshot import WorldSnapshot
 from app.sim.cells.cell import load_cell
@@ -54,9 +55,8 @@ def node(server: viser.ViserServer, name: str) -> Any:
 
 def slowed(snapshot: WorldSnapshot, override: float) -> WorldSnapshot:
     """Return the same a moment later, with another override."""
-    safety = replace(snapshot.reach.safety, override=override)
-    reach = replace(snapshot.reach, safety=safety)
-    return replace(snapshot, t_s=snapshot.t_s + 1.0, reach=reach)
+    safety = replace(snapshot.safety, override=override)
+    return replace(snapshot, t_s=snapshot.t_s + 1.0, safety=safety)
 
 
 def test_cylinder_is_where_the_person_counts_and_as_wide(
@@ -130,7 +130,7 @@ def test_gauge_is_as_full_as_the_override_and_the_zone_has_its_colour(
     assert node(server, "/gauge/text").text == "40 %"
     area = node(server, "/zone/area")
     assert tuple(area.color) == color
-    assert np.allclose(area.vertices[:-1, :2], now.reach.safety.zone, atol=1e-6)
+    assert np.allclose(area.vertices[:-1, :2], now.safety.zone, atol=1e-6)
     assert np.allclose(area.vertices[:, 2], CELL.floor_z, atol=0.02)
 
 
@@ -140,7 +140,7 @@ def test_scene_says_that_the_layer_is_off(
     world.apply(SetSafety(on=False))
     now = slowed(world.snapshot(), 1.0)
     scene.draw(now, 0.02)
-    assert override_color(now.reach.safety) == OFF
+    assert override_color(now.safety) == OFF
     assert node(server, "/gauge/text").text == "no safety layer"
 
 
