@@ -1,22 +1,22 @@
-"""Tables of the pick protocols whose rows hold more than rates: cases, calibration, pairs."""
+"""Tables of the pick protocols with forms of their own: cases, calibration, SSM, pairs."""
 
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from tools.docs.headline import percent, share
 
 Json = dict[str, Any]
-CASES, CALIBRATION = "pick-cases", "risk-calibration"
+CASES, CALIBRATION, MONITORED = "pick-cases", "risk-calibration", "pick-ssm"
 
 
 def has_own_table(result: Json) -> bool:
     """Return whether a result has a table of its own form."""
-    return result.get("protocol") in (CASES, CALIBRATION)
+    return result.get("protocol") in TABLES
 
 
 def lines_of(result: Json) -> list[list[str]]:
     """Return the table of a result as lines of cells, the header first."""
-    rows: list[Json] = result["results"]
-    return _cases(rows) if result["protocol"] == CASES else _calibration(rows)
+    return TABLES[result["protocol"]](result["results"])
 
 
 def _cases(rows: list[Json]) -> list[list[str]]:
@@ -65,6 +65,45 @@ def _calibration(rows: list[Json]) -> list[list[str]]:
                 ]
             )
     return lines
+
+
+def _monitored(rows: list[Json]) -> list[list[str]]:
+    rates = {
+        "success": "success",
+        "contact_moving": "contact, robot moving",
+        "contact_admissible": "contact at admissible speed",
+        "contact_at_rest": "contact, robot at standstill",
+        "timeout": "timeout",
+    }
+    head = ["", "n", *rates.values(), "time to success [s]", "time lost [s]"]
+    lines = [[*head, "override 0 [% of cycles]", "mean override [%]"]]
+    for row in rows:
+        lines.append(
+            [
+                f"`{row['name']}`",
+                f"{row['n']:,}",
+                *(percent(row[key], 2) for key in rates),
+                _mean(row["time_to_success_s"]),
+                _mean(row["time_lost_s"]),
+                f"{100.0 * row['stopped']:.1f}",
+                f"{100.0 * row['override']:.1f}",
+            ]
+        )
+    return lines
+
+
+def _mean(value: Json | None) -> str:
+    if value is None:
+        return ""
+    return f"{value['mean']:.2f} ({value['low']:.2f}-{value['high']:.2f})"
+
+
+TABLES: Mapping[str, Callable[[list[Json]], list[list[str]]]] = {
+    CASES: _cases,
+    CALIBRATION: _calibration,
+    MONITORED: _monitored,
+}
+"""Tables of the protocols with a form of their own."""
 
 
 def pairs_of(result: Json) -> list[list[str]]:

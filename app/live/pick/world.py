@@ -2,8 +2,8 @@
 
 The policy moves the robot in all phases of a pick (``sim/pick/kernels/grasp.py``). A picked
 station leaves the candidates until all have been picked, and the next pick continues from
-there; a pick that was broken off stays a candidate. A contact is shown for two seconds; then
-the robot starts again from home.
+there; a pick that was broken off stays a candidate. A case study starts without the safety
+layer, as in its source.
 """
 
 from dataclasses import replace
@@ -106,6 +106,7 @@ class LivePickWorld(BaseWorld[LiveWorkers]):
 
     def _start_case(self, case: Case) -> None:
         self._case, self.paused = case, False
+        self.safety.suspended = True  # the source has no safety layer
         self._selected = tuple(n for n in self.cell.station_ids if n in case.goals)
         self.people.only_first()
         self._reset()
@@ -114,6 +115,7 @@ class LivePickWorld(BaseWorld[LiveWorkers]):
         if self._case is None:
             return
         self._case, self._selected = None, self._own_choice
+        self.safety.suspended = False
         for person in self.people:
             person.leave_case()
         self._refresh()

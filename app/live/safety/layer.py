@@ -40,11 +40,17 @@ class LiveSafety:
     """
 
     def __init__(self, robot: LiveArm, cell: Cell) -> None:
-        self.on = True
-        """Whether the robot obeys the layer."""
+        self.suspended = False
+        """Whether the layer is disabled for a case study."""
+        self._enabled = True
         self._robot = robot
         self._layer = SafetyLayer(robot.arm, safety_settings(cell))
         self.reset()
+
+    @property
+    def on(self) -> bool:
+        """Whether the robot obeys the layer."""
+        return self._enabled and not self.suspended
 
     @property
     def settings(self) -> SafetySettings:
@@ -58,7 +64,7 @@ class LiveSafety:
 
     def change(self, command: SetSafety) -> None:
         """Enable or disable the layer, and change its settings."""
-        self.on = command.on
+        self._enabled, self.suspended = command.on, False
         changed = command.model_dump(exclude={"tag", "on"}, exclude_none=True)
         if changed:
             self._layer = SafetyLayer(self._robot.arm, replace(self.settings, **changed))

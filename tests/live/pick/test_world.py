@@ -89,8 +89,85 @@ def test_contacts_are_counted_apart_while_the_robot_is_at_rest(world: LivePickWo
     world.apply(commands.SetCandidates(ids=()))
     x, y, z = world.snapshot().tcp
     world.apply(commands.MovePerson(pelvis=(x, 1.15, -1.57), right=(x, y, z)))
-    hit = until(world, "contact")
-    assert (hit.counters.contacts, hit.counters.contacts_at_rest) == (1, 1)
+    for _ in range(400):
+        world.step()
+        hit = world.snapshot()
+        if hit.counters.contacts_at_rest:
+            break
+    assert (hit.counters.contacts, hit.counters.contacts_at_rest) == (0, 1)
+    assert hit.clearance_m <= 0.0
+    stays = run(world, 40)
+    assert stays.counters == hit.counters
+    assert np.array_equal(stays.robot_q, hit.robot_q)
+
+
+def test_layer_stops_the_robot_before_a_person_and_says_why(world: LivePickWorld) -> None:
+    world.apply(commands.SetCandidates(ids=("cube2",)))
+    world.apply(commands.MovePerson(pelvis=(0.0, 1.15, -1.57), right=(-0.1, 0.62, 0.2)))
+    overrides = []
+    for _ in range(300):
+        now = run(world, 1)
+        overrides.append(now.safety.override)
+        assert now.safety.override == now.safety.advised
+    assert 0.0 < sum(0.0 < one < 1.0 for one in overrides)
+    assert (now.safety.override, now.counters.contacts) == (0.0, 0)
+    assert now.message.startswith("Stopped: the person is")
+    assert now.safety.separation == pytest.approx(now.clearance_m, abs=0.02)
+    total = now.safety.person_distance + now.safety.robot_distance + now.safety.margin
+    assert now.safety.required == pytest.approx(total)
+    assert now.safety.moving_s > now.safety.slowed_s > now.safety.stopped_s > 0.0
+    world.apply(commands.MovePerson(pelvis=(0.0, 2.4, -1.57)))
+    assert until(world, "picking").safety.override == 1.0
+
+
+def test_layer_starts_with_the_settings_of_the_cell_and_takes_others(
+    world: LivePickWorld,
+) -> None:
+    world.apply(commands.MovePerson(pelvis=(0.3, 1.6, -1.57)))
+    before = run(world, 60).safety
+    assert (before.on, before.pfl, before.protective_distance) == (True, False, 0.0)
+    world.apply(commands.PauseClock())
+    world.apply(
+        commands.SetSafety(
+            on=True, protective_distance=0.3, human_speed=2.0, reaction_time=0.2, pfl=True
+        )
+    )
+    after = world.snapshot().safety
+    assert (after.protective_distance, after.margin) == (0.3, 0.3)
+    assert (after.human_speed, after.reaction_time, after.pfl) == (2.0, 0.2, True)
+    assert after.required > before.required + 0.3
+    world.apply(commands.SetSafety(on=False))
+    off = world.snapshot().safety
+    assert (off.on, off.override, off.protective_distance) == (False, 1.0, 0.3)
+
+
+def test_robot_does_not_set_off_into_a_person_after_a_pick(
+    world: LivePickWorld, cell: Cell
+) -> None:
+    world.apply(commands.SetCandidates(ids=("cube2", "cube4")))
+    first = until(world, "picking").chosen
+    until(world, "moving")
+    x, y, z = cell.station(first).position
+    world.apply(commands.MovePerson(pelvis=(x, 1.15, -1.57), right=(x + 0.1, y, z + 0.2)))
+    after = run(world, 200)
+    assert after.counters.reached == 1
+    assert after.counters.contacts == 0
+    assert after.safety.stopped_s > 1.0
+
+
+def test_person_at_home_keeps_the_robot_there(world: LivePickWorld, cell: Cell) -> None:
+    world.apply(commands.PauseClock())
+    x, y, z = world.snapshot().tcp
+    world.apply(commands.MovePerson(pelvis=(x, 1.15, -1.57), right=(x, y, z)))
+    run(world, 100)
+    world.apply(commands.ResumeClock())
+    world.apply(commands.Reset())
+    inside = run(world, 60)
+    assert inside.status == "blocked"
+    assert np.allclose(inside.robot_q, cell.robot.home_q)
+    assert inside.counters.contacts == 0
+    world.apply(commands.MovePerson(pelvis=(0.0, 2.4, -1.57)))
+    assert until(world, "picking").counters.contacts == 0
 
 
 def test_decision_in_a_snapshot_is_the_one_for_its_own_state(
@@ -162,6 +239,7 @@ def test_speed_given_to_the_policy_is_the_speed_of_the_movement(world: LivePickW
 def test_contact_is_reported_and_the_robot_restarts_from_home(
     world: LivePickWorld, cell: Cell
 ) -> None:
+    world.apply(commands.SetSafety(on=False))
     world.apply(commands.SetCandidates(ids=("cube2",)))
     world.apply(commands.MovePerson(pelvis=(0.0, 1.15, -1.57), right=(-0.1, 0.62, 0.2)))
     hit = until(world, "contact")
@@ -208,6 +286,7 @@ def test_case_study_starts_at_its_station_and_ends_with_a_verdict(cell: Cell) ->
     start = world.snapshot()
     assert np.allclose(start.tcp, cell.station("cube5").position, atol=1e-6)
     assert {c.id for c in start.candidates} == {"cube0", "cube4"}
+    assert not start.safety.on
     end = until(world, "case done")
     assert end.case == "case-1"
     assert "ended" in end.message
@@ -220,6 +299,7 @@ def test_leaving_a_case_brings_back_the_visitors_candidates(cell: Cell) -> None:
     world.apply(commands.SetMode(mode="manual"))
     after = world.snapshot()
     assert after.case is None
+    assert after.safety.on
     assert after.selected == ("cube3", "dock0")
 
 
@@ -245,6 +325,8 @@ def test_commands_that_do_not_fit_are_refused_and_change_nothing(world: LivePick
     before = world.snapshot()
     with pytest.raises(InvalidInput, match="cube9"):
         world.apply(commands.ToggleCandidate(id="cube9"))
+    with pytest.raises(InvalidInput, match="use_measured_velocity"):
+        world.apply(commands.SetSafety(on=True, use_measured_velocity=True))
     with pytest.raises(InvalidInput, match="case-9"):
         world.apply(commands.StartCase(id="case-9"))
     assert world.snapshot().selected == before.selected

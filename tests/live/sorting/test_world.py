@@ -244,11 +244,29 @@ def test_contact_lets_a_held_block_fall_back_where_it_came_from() -> None:
     lay(world, {"cell7": "red-large"}, {"red": ("large",)})
     world.apply(commands.MovePerson(pelvis=(-0.7, 1.12, -1.57)))
     until(world, phase("carry"))
+    world.apply(commands.SetSafety(on=False))
     world.apply(commands.MovePerson(right=(-0.5, 0.5, 0.2), left=(-0.6, 0.6, 0.2)))
     until(world, lambda now: now.status == "contact")
     after = until(world, lambda now: now.status in ("moving", "blocked"))
     assert [one.place for one in after.sorting.pieces] == ["cell7"]
     assert after.sorting.counters.moves == 0
+
+
+def test_layer_holds_the_block_before_a_person_and_the_robot_goes_on_afterwards() -> None:
+    world = empty_world()
+    lay(world, {"cell7": "red-large"}, {"red": ("large",)})
+    world.apply(commands.MovePerson(pelvis=(-0.7, 1.12, -1.57)))
+    until(world, phase("carry"))
+    world.apply(commands.MovePerson(right=(-0.5, 0.5, 0.2), left=(-0.6, 0.6, 0.2)))
+    held = until(world, lambda now: now.safety.override == 0.0)
+    assert held.message.startswith("Stopped: the person is")
+    for _ in range(200):
+        world.step()
+    assert world.snapshot().counters.contacts == 0
+    world.apply(commands.MovePerson(pelvis=(0.0, 2.4, -1.57)))
+    end = until(world, solved)
+    assert towers(end)["red"] == ["red-large"]
+    assert end.safety.stopped_s > 1.0
 
 
 def test_nothing_is_grasped_while_a_hand_is_near() -> None:

@@ -10,7 +10,7 @@ checkpoint is involved.
 ``touch-limited``         the same with power and force limiting: contacts at admissible speeds
 ``fast-hands``            people at 2.5 m/s where 1.6 m/s are assumed
 ``late-tracker``          an unknown delay of 0.1 s
-``fast-hands-cell``       fast hands with the margins of the cell: 0.3 m and 0.1 s
+``fast-hands-cell``       fast hands with the default margins: 0.3 m and 0.1 s
 ``late-tracker-cell``     a late tracker with the same margins
 ``no-ssm``                no safety layer: rate of contacts in motion
 ========================  ==================================================================
@@ -25,9 +25,8 @@ import numpy as np
 from app.policies.checkpoints.checkpoint import Checkpoint
 from app.policies.evaluation.rows import OnRow, ignore_row
 from app.policies.evaluation.statistics import wilson
-from app.sim.cells.cell import load_cell
 from app.sim.safety.adversarial_trials import TrialResult, TrialSettings, run_trial
-from app.sim.safety.layer import SafetySettings, safety_settings
+from app.sim.safety.layer import SafetySettings
 
 DEFAULT_EPISODES = 100_000
 OUTSIDE_SHARE = 10
@@ -55,9 +54,7 @@ def trials() -> dict[str, list[TrialSettings]]:
         "late-tracker": [replace(p, true_delay=LATE) for p in PLACES],
     }
     for name in ("fast-hands", "late-tracker"):
-        rows[f"{name}-cell"] = [
-            replace(p, safety=safety_settings(load_cell(p.cell))) for p in rows[name]
-        ]
+        rows[f"{name}-cell"] = [replace(p, safety=SafetySettings()) for p in rows[name]]
     rows["no-ssm"] = [replace(p, monitored=False) for p in PLACES]
     return rows
 
