@@ -65,6 +65,9 @@ class PickEpisode(FieldGroup):
     anywhere_share: float = number(
         0.2, 0.0, 1.0, "", "Share of targets and of starts drawn away from the stations"
     )
+    safety: Literal["none", "ssm"] = choice(
+        "none", "Safety layer: none, or speed and separation monitoring"
+    )
     observation: Literal["features", "body", "phase", "two-people"] = choice(
         "two-people",
         "Observation: features of one person; also the anthropometry; also the phase of the "
@@ -173,4 +176,7 @@ REACH_ONLY = PickPreset(
     reward=PickReward(c_step=0.005, c_c_end=5.0),
 )
 """The task without a grasp: a target counts when it is reached, as in the thesis."""
-PICK_PRESETS = (PickPreset(), REACH_ONLY)
+MONITORED = PickPreset(name="pick-td3-monitored", episode=PickEpisode(safety="ssm"))
+"""``pick-td3`` under speed and separation monitoring; a person may touch the robot at
+standstill."""
+PICK_PRESETS = (PickPreset(), REACH_ONLY, MONITORED)

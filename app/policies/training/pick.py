@@ -23,7 +23,10 @@ from app.sim.people.human_motion_config import HumanMotionConfig
 from app.sim.people.kernels.people import ABSENT
 from app.sim.pick.batch import OUTCOMES, PickBatch, PickSettings
 from app.sim.pick.kernels.reward import RewardWeights
+from app.sim.pick.monitored_batch import MonitoredPickBatch
 from app.sim.robot.kernels.arm import CONTROLLED
+from app.sim.safety.layer import safety_settings
+from app.sim.scenario.monitoring import MonitoringSettings
 from app.sim.scene.scene import HumanKind
 
 OUTCOME_SEED = 7_000_003
@@ -86,12 +89,23 @@ def settings_of(preset: PickPreset) -> PickSettings:
     )
 
 
+def batch_of(preset: PickPreset, cell: Cell, n_envs: int, seed: int) -> PickBatch:
+    """Return the environments of a preset."""
+    settings = settings_of(preset)
+    if preset.episode.safety == "ssm":
+        monitoring = MonitoringSettings(rest_ends=False)
+        return MonitoredPickBatch(
+            cell, n_envs, seed, settings, safety_settings(cell), monitoring
+        )
+    return PickBatch(cell, n_envs, seed, settings)
+
+
 def start(
     preset: PickPreset, seed: int, resume: Checkpoint | None, cell: Cell
 ) -> tuple[TrainingRun, TrainingMonitor]:
     """Return a training; see :func:`~app.policies.training.td3.start_td3`."""
     first = seed + first_step(resume)
-    batch = PickBatch(cell, preset.learning.n_envs, first, settings_of(preset))
+    batch = batch_of(preset, cell, preset.learning.n_envs, first)
     batch.set_collision_cost(collision_cost(preset, first_step(resume)))
     rng, config = np.random.default_rng(first), preset.exploration
     noise = PerEnvAR1Noise((batch.n_envs, CONTROLLED), batch.arm.dt, config, rng)
@@ -125,8 +139,8 @@ def fit_outcomes(
     Returns:
         The ensemble; None where too few episodes ended to fit one.
     """
-    settings, learning = settings_of(preset), preset.learning
-    batch = PickBatch(cell, learning.n_envs, seed + OUTCOME_SEED, settings)
+    learning = preset.learning
+    batch = batch_of(preset, cell, learning.n_envs, seed + OUTCOME_SEED)
     actor = actor_of(preset, batch.obs_size)
     critic = critics_for(preset, batch.obs_size)
     arrays = policy.arrays()

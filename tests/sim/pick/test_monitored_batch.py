@@ -73,7 +73,7 @@ def test_each_period_is_what_the_layer_decides():
     assert slowed > 5
 
 
-def test_the_moving_robot_touches_nobody_and_takes_longer():
+def test_the_moving_robot_touches_no_person_and_takes_longer():
     guarded, bare = to_the_end(monitored(60)), to_the_end(monitored(60, BARE))
     assert bare.touched_moving.sum() > 3
     assert not guarded.touched_moving.any()

@@ -6,13 +6,15 @@ with the safety layer between policy and robot.
 ``ssm``
     One target; assumptions for work among hands (``AMONG_HANDS``): no protective distance.
 ``ssm-distance``
-    The same with the default protective distance of 0.3 m.
+    ``ssm`` with the default protective distance of 0.3 m.
 ``pfl``
     ``ssm`` with power and force limiting: contacts at admissible speeds are permitted.
 ``no-ssm``
     The same episodes without the safety layer.
 ``choice-ssm``, ``choice-no-ssm``
     Two or three targets, chosen by the critic.
+``choice-ssm-fast-hands``
+    The same with hands of up to 2.8 m/s and a reaction time of 0.05 s.
 
 Contact with a moving link ends an episode, also at a speed that power and force limiting
 admits (``contact_admissible``). A person may touch a robot at standstill: the episode continues
@@ -32,7 +34,8 @@ from app.policies.evaluation.pick.episodes import Evaluator, settings_for
 from app.policies.evaluation.pick.tasks import settings_of
 from app.policies.evaluation.rows import OnRow, ignore_row
 from app.policies.evaluation.statistics import mean_of, wilson
-from app.policies.inference.task_selection import HYSTERESIS, ValueNetworks, pick_preset_of
+from app.policies.inference.task_selection import HYSTERESIS
+from app.policies.inference.value_networks import ValueNetworks, pick_preset_of
 from app.sim.cells.cell import Cell
 from app.sim.pick.batch import PickBatch, PickSettings
 from app.sim.pick.monitored_batch import AMONG_HANDS, MonitoredPickBatch
@@ -43,6 +46,8 @@ Json = dict[str, Any]
 DEFAULT_EPISODES = 20_000
 TIME_LIMIT_S = 20.0
 """Time limit of an episode [s]."""
+FAST_HANDS = replace(AMONG_HANDS, human_speed=2.8, reaction_time=0.05)
+"""Assumptions that cover hands faster than 1.6 m/s; an episode has no other delay."""
 CHUNK = 5_000
 """Number of episodes that run together."""
 
@@ -68,6 +73,7 @@ CONDITIONS: Mapping[str, Condition] = {
     "pfl": Condition(safety=replace(AMONG_HANDS, pfl=True), against="no-ssm"),
     "choice-no-ssm": Condition(active=False, choice=True),
     "choice-ssm": Condition(choice=True, against="choice-no-ssm"),
+    "choice-ssm-fast-hands": Condition(safety=FAST_HANDS, choice=True, against="choice-no-ssm"),
 }
 """Conditions by row."""
 
