@@ -17,6 +17,7 @@ from app.live.commands import (
     SetPolicy,
     SetSafety,
 )
+from app.live.sorting.snapshot import Order
 from app.live.sorting.table import Block, SortingTable
 
 
@@ -84,6 +85,16 @@ class SetSortingPolicy(LoadingCommand):
     """SHA-256 or alias; null: the exact planner decides alone"""
 
 
+class SetOrder(LiveCommand):
+    """Choose among moves with about the same expected attempts."""
+
+    tag: Literal["set-order"] = "set-order"
+    order: Order
+    """critic: by the values of the pick policy; planner: the first of the sorting policy or
+    planner; nearest: the block nearest to the tool"""
+
+
+PlanningCommand = SetSortingPolicy | SetOrder
 TableCommand = AddObject | RemoveObject | MoveObject | SetGoal | ToggleGoal
 SortingCommand = (
     PeopleCommand
@@ -92,7 +103,7 @@ SortingCommand = (
     | SetSafety
     | TableCommand
     | StartTest
-    | SetSortingPolicy
+    | PlanningCommand
 )
 
 

@@ -1,26 +1,35 @@
 """Choice of moves in a live sorting cell: by the monitored sorting policy, or by the planner.
 
-A new decision follows every attempt and every change of the task. Among moves of equal value
-the critic of the motion policy decides: identical blocks in clutter cells whose grasps fail
-about as often (ALIKE), and first moves of shortest plans of about the same value (MARGIN).
+A new decision follows every attempt and every change of the task. Moves that the exact planner
+expects to take about as many attempts (MARGIN) are equal; by the order set for the cell, the
+critic of the pick policy chooses among them, the nearest block is taken, or the move stays.
 
 Source: docs/method.md 1.4, 3.1 and 4 (the critic's values also decide the symbolic choice).
 """
 
 from dataclasses import dataclass
 
+import numpy as np
+
+from app.live.sorting.commands import PlanningCommand, SetOrder
+from app.live.sorting.snapshot import Order
 from app.live.sorting.table import Block, SortingTable
+from app.sim.core.arrays import Vec
 from app.sim.sorting.batch import apply
 from app.sim.sorting.decision import decide, failure_of
 from app.sim.sorting.decision_types import RankedMove, SortingDecision, Why
+from app.sim.sorting.near_optimal_moves import near_optimal_moves
 from app.sim.sorting.progress_monitor import ProgressMonitor, expect_state, state_key
 from app.sim.sorting.sorting_values import SortingValues
 from app.sim.sorting.state import Move
 
 ALIKE = 0.02
 """Difference of failure probabilities up to which identical blocks count as equal."""
-MARGIN = 0.01
-"""Difference up to which moves count as equal: of Q, or of the planner's attempts."""
+MARGIN = 0.02
+"""Expected attempts up to which moves count as equal; less than in ``near_optimal_moves.py``,
+so that no riskier of two identical blocks is taken."""
+Options = tuple[tuple[Block, Move], ...]
+"""Blocks, each with its move."""
 FALLBACK_REASONS: tuple[Why, ...] = ("repeated", "attempts-exceeded")
 """Reasons for a planner fallback: the policy may decide here but makes no progress."""
 
@@ -33,8 +42,10 @@ class MoveChoice:
     """Pick and place position."""
     block: Block
     """The block to move."""
-    options: tuple[tuple[Block, Move], ...]
-    """Blocks of equal value, each with its move; the chosen one first."""
+    options: Options
+    """Blocks that the critic chooses among; the chosen one first."""
+    n_equal: int = 1
+    """Number of equal moves before the order decided."""
     back: bool = False
     """Whether a held block only returns to where it counts."""
 
@@ -53,6 +64,8 @@ class SortController:
         """The last decision."""
         self.planner_fallbacks = 0
         """Number of planner fallbacks."""
+        self.order: Order = "critic"
+        """Choice among equal moves."""
         self._before: ProgressMonitor | None = None
         self._after: ProgressMonitor | None = None
         self._attempted = False
@@ -64,6 +77,13 @@ class SortController:
         self._before = self._after = None
         self._attempted = False
         self._avoid.clear()
+
+    def change(self, command: PlanningCommand) -> None:
+        """Replace the sorting policy or the order of equal moves."""
+        if isinstance(command, SetOrder):
+            self.order = command.order
+        else:
+            self.policy = command.loaded
 
     def avoid(self, pick: int) -> None:
         """Prefer another move of a shortest plan next: this block was not reached."""
@@ -81,12 +101,16 @@ class SortController:
         """Note that the attempt is over: the grasp failed, or the block is placed."""
         self._attempted = True
 
-    def choose(self, table: SortingTable, kept: Move | None = None) -> MoveChoice | None:
+    def choose(
+        self, table: SortingTable, kept: Move | None = None, tcp: Vec | None = None
+    ) -> MoveChoice | None:
         """Return the next move; None if the goal is reached.
 
         Args:
             table: The table as it is now.
             kept: Present move of a held block; continued while it is on a shortest plan.
+            tcp: Tool centre point [m], shape (3,), for the order of equal moves; None: all of
+                them are options.
         """
         decision = self._decide(table)
         if table.held is not None:
@@ -96,10 +120,20 @@ class SortController:
         move = self._move_of(decision)
         block = table.top(move.pick)
         assert block is not None
-        options = (
-            {block: move} | _duplicates(table, move, block) | self._equal(table, decision, move)
-        )
-        return MoveChoice(move=move, block=block, options=tuple(options.items()))
+        equal = tuple(({block: move} | self._equal(table, move)).items())
+        options = equal if tcp is None else self._ordered(table, equal, tcp)
+        block, move = options[0]
+        return MoveChoice(move=move, block=block, options=options, n_equal=len(equal))
+
+    def _ordered(self, table: SortingTable, equal: Options, tcp: Vec) -> Options:
+        """Return those of equal moves that the critic may choose among."""
+        if self.order == "critic":
+            return equal
+        if self.order == "planner":
+            return equal[:1]
+        points = [table.point(*table.place_of(block)) for block, _ in equal]
+        nearest = int(np.argmin([np.linalg.norm(point - tcp) for point in points]))
+        return equal[nearest : nearest + 1]
 
     def _decide(self, table: SortingTable) -> SortingDecision:
         if self._attempted:  # Otherwise the state is the same.
@@ -111,17 +145,13 @@ class SortController:
             self.planner_fallbacks += 1
         return decision
 
-    def _equal(
-        self, table: SortingTable, decision: SortingDecision, move: Move
-    ) -> dict[Block, Move]:
-        """Return other blocks whose moves begin a shortest plan and have an equal value."""
-        values = {one.move: one.value for one in decision.ranked if one.fewest}
-        best, found = values.get(move), dict[Block, Move]()
-        for other, value in values.items():
+    def _equal(self, table: SortingTable, move: Move) -> dict[Block, Move]:
+        """Return other blocks whose moves take about as many attempts as a near-optimal one."""
+        near = near_optimal_moves(table.state, table.shape, MARGIN)
+        found: dict[Block, Move] = {}
+        for other in near.moves if move in near.moves else ():
             block = table.top(other.pick)
-            if block is None or other.pick in (move.pick, *self._avoid):
-                continue
-            if best is not None and value is not None and abs(value - best) <= MARGIN:
+            if block is not None and other.pick not in (move.pick, *self._avoid):
                 found.setdefault(block, other)
         return found
 
@@ -141,18 +171,6 @@ def has_safer_duplicate(table: SortingTable, cell: int) -> bool:
         one is not None and one.code == block.code and fail < least
         for one, fail in zip(table.clutter, table.fail, strict=False)
     )
-
-
-def _duplicates(table: SortingTable, move: Move, block: Block) -> dict[Block, Move]:
-    """Return identical blocks in clutter cells with about the same failure probability."""
-    if move.pick >= table.shape.n_cells:
-        return {}
-    fail = table.fail[move.pick]
-    return {
-        one: Move(k, move.place)
-        for k, one in enumerate(table.clutter)
-        if one is not None and one.code == block.code and abs(table.fail[k] - fail) <= ALIKE
-    }
 
 
 def _for_held(table: SortingTable, decision: SortingDecision, kept: Move | None) -> MoveChoice:

@@ -1,9 +1,10 @@
 """Status messages of a live sorting cell, one sentence each."""
 
 from app.live.sorting.controller import FALLBACK_REASONS, MoveChoice, SortController
-from app.live.sorting.snapshot import Phase
+from app.live.sorting.snapshot import Order, Phase
 from app.live.sorting.table import Block, SortingTable
 from app.sim.cells.cell import Cell
+from app.sim.pick.task_policy import Decision
 from app.sim.sorting.decision_types import REASONS
 
 NO_GOAL = "Nothing to do: click blocks to add them to the goal."
@@ -34,7 +35,13 @@ class StatusMessages:
         label = self._labels[position]
         return f"the {label}" if position >= self._table.shape.n_cells else label
 
-    def doing(self, phase: Phase, choice: MoveChoice, controller: SortController) -> str:
+    def doing(
+        self,
+        phase: Phase,
+        choice: MoveChoice,
+        controller: SortController,
+        decision: Decision | None,
+    ) -> str:
         """Return the present motion, its reason and the number of remaining moves."""
         block, move = self.block(choice.block), choice.move
         place = self.place(move.place)
@@ -48,7 +55,8 @@ class StatusMessages:
         inside = "in" if move.pick < self._table.shape.n_cells else "on"
         text = f"{verb} {block} {inside} {self.place(move.pick)}, to be placed on {place}: "
         text += f"{self._left(controller)}."
-        return f"{text}{self._duplicates(choice)}{self._fallback(controller)}"
+        why = _preference(choice, controller.order, decision) or self._risk(choice)
+        return f"{text}{why}{self._fallback(controller)}"
 
     def missed(self, block: Block, risk: float) -> str:
         """Return that a grasp failed."""
@@ -72,11 +80,9 @@ class StatusMessages:
         moves = 0 if controller.decision is None else controller.decision.fewest_moves
         return "1 move to go" if moves == 1 else f"{moves} moves to go"
 
-    def _duplicates(self, choice: MoveChoice) -> str:
-        """Return a comparison with identical blocks."""
+    def _risk(self, choice: MoveChoice) -> str:
+        """Return a comparison with an identical block that is riskier to grasp."""
         table = self._table
-        if len(choice.options) > 1:
-            return f" Of {len(choice.options)} equivalent blocks it is the easiest to reach."
         if choice.move.pick >= table.shape.n_cells:
             return ""
         least = table.fail[choice.move.pick]
@@ -97,3 +103,19 @@ class StatusMessages:
             return ""
         took = " Fallback to the exact planner." if decision.why in FALLBACK_REASONS else ""
         return f" {REASONS[decision.why]}{took}"
+
+
+def _preference(choice: MoveChoice, order: Order, decision: Decision | None) -> str:
+    """Return why a move was chosen among equal ones."""
+    if choice.n_equal == 1:
+        return ""
+    text = f" {choice.n_equal} moves are equal; "
+    if order == "planner":
+        return f"{text}this one comes first."
+    if order == "nearest":
+        return f"{text}chosen because it was the nearest."
+    if decision is None or len(decision.values) < 2:
+        return ""
+    own = decision.values[decision.index]
+    best = max(value for i, value in enumerate(decision.values) if i != decision.index)
+    return f"{text}chosen by value {own:.2f} (the next has {best:.2f})."

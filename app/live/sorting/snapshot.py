@@ -17,6 +17,9 @@ closes, up; ``carry``: the policy moves the block over its place; ``place``: dow
 opens, up; ``idle``: no move or no policy."""
 Decider = Literal["policy", "planner"]
 """Source of the present move."""
+Order = Literal["critic", "planner", "nearest"]
+"""Choice among equal moves: by the critic of the pick policy, by the sorting policy or the
+planner, or the block nearest to the tool."""
 MAX_RANKED = 5
 """Maximum number of ranked moves in a snapshot."""
 
@@ -115,8 +118,10 @@ class SortingSnapshot(ReadModel):
     """phase of the move: idle, approach, grasp, carry or place"""
     decided_by: Decider | None
     """source of the move; null without one"""
+    order: Order
+    """choice among equal moves"""
     duplicates: tuple[str, ...]
-    """ids of blocks of equal value; of several the critic selects one"""
+    """ids of the blocks that the robot may take; of several the critic selects one"""
     ranked: tuple[MoveSnapshot, ...]
     """best valid moves, best first"""
     moves_to_go: int

@@ -58,6 +58,7 @@ def task_snapshot(inputs: SnapshotInputs) -> SortingSnapshot:
         move=None if choice is None else _current(inputs, choice),
         phase=inputs.phase,
         decided_by=None if choice is None or decision is None else decision.by,
+        order=inputs.controller.order,
         duplicates=() if choice is None else tuple(block.id for block, _ in choice.options),
         ranked=tuple(_ranked(table, one) for one in ranked),
         moves_to_go=0 if decision is None else decision.fewest_moves,

@@ -29,7 +29,7 @@ from app.live.commands import SetPolicy
 from app.live.people.workers import LiveWorkers
 from app.live.snapshot import Status, WorldSnapshot
 from app.live.sorting.benchmark_run import SortingTestRun, random_task
-from app.live.sorting.commands import SetSortingPolicy, StartTest, TableCommand, change_table
+from app.live.sorting.commands import PlanningCommand, StartTest, TableCommand, change_table
 from app.live.sorting.controller import MoveChoice, SortController, has_safer_duplicate
 from app.live.sorting.explanation import DONE, NO_GOAL, StatusMessages
 from app.live.sorting.snapshot import Phase, SortingCounters
@@ -109,8 +109,8 @@ class LiveSortingWorld(BaseWorld[LiveWorkers]):
                 self._refresh()
             case StartTest():
                 self._start_test(command.id)
-            case SetSortingPolicy():
-                self._controller.policy = command.loaded
+            case _ if isinstance(command, PlanningCommand):
+                self._controller.change(command)
                 self._replan()
             case _ if isinstance(command, TableCommand):
                 self._change_table(command)
@@ -211,7 +211,7 @@ class LiveSortingWorld(BaseWorld[LiveWorkers]):
     def _begin(self, status: Status = "moving") -> None:
         """Choose the next move and begin its motion."""
         kept = self._choice.move if self._choice is not None else None
-        self._choice = self._controller.choose(self._table, kept)
+        self._choice = self._controller.choose(self._table, kept, self.robot.tcp())
         self._version = self._table.version
         self._start_motion(status)
 
@@ -366,7 +366,7 @@ class LiveSortingWorld(BaseWorld[LiveWorkers]):
         if status in ("moving", "picking") and (reason := self.slowed()) is not None:
             return reason
         if status in ("moving", "picking") and (chosen := self._chosen()) is not None:
-            return self._messages.doing(self._phase, chosen, self._controller)
+            return self._messages.doing(self._phase, chosen, self._controller, self.decision)
         if status == "solved":
             return DONE
         if status == "no candidates":

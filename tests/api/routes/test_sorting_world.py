@@ -114,6 +114,7 @@ def test_planner_decides_alone_where_no_sorting_policy_is_set(client: TestClient
         ({"tag": "toggle-goal", "id": "purple-large"}, "id"),
         ({"tag": "start-test", "id": "test-9"}, "id"),
         ({"tag": "set-sorting-policy", "checkpoint": "nothing"}, "checkpoint"),
+        ({"tag": "set-order", "order": "random"}, "order"),
         ({"tag": "set-candidates", "ids": ["cell0"]}, "tag"),
     ],
 )

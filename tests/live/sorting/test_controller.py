@@ -1,9 +1,13 @@
+import numpy as np
 import pytest
 
+from app.live.sorting.commands import SetOrder
 from app.live.sorting.controller import SortController
+from app.live.sorting.snapshot import Order
 from app.live.sorting.table import SortingTable
 from app.sim.cells.cell import load_cell
 from app.sim.sorting.state import Move
+from tests.sorting_values import FixedValues
 
 RED, BLUE = 10, 11
 
@@ -26,6 +30,33 @@ def test_duplicates_that_fail_as_rarely_are_options_and_riskier_ones_are_not(
     moves = {move for _, move in choice.options}
     assert moves == {Move(5, RED), Move(9, RED)}
     assert choice.options[0] == (choice.block, choice.move)
+
+
+@pytest.mark.parametrize(
+    ("order", "tool", "picks"),
+    [
+        ("critic", (0.3, 0.6, 0.2), {5, 9}),
+        ("planner", (0.3, 0.6, 0.2), {5}),
+        ("nearest", (0.3, 0.6, 0.2), {9}),
+        ("nearest", (-0.3, 0.6, 0.2), {5}),
+    ],
+)
+def test_order_decides_which_of_the_equal_moves_are_options(
+    table: SortingTable, order: Order, tool: tuple[float, ...], picks: set[int]
+) -> None:
+    controller = SortController(None)
+    controller.change(SetOrder(order=order))
+    choice = controller.choose(table, tcp=np.array(tool))
+    assert choice is not None
+    assert {move.pick for _, move in choice.options} == picks
+    assert choice.options[0] == (choice.block, choice.move)
+    assert choice.n_equal == 2
+
+
+def test_move_of_a_policy_that_is_no_shortest_plan_has_no_equal(table: SortingTable) -> None:
+    choice = SortController(FixedValues(table.shape, [Move(5, BLUE)])).choose(table)
+    assert choice is not None
+    assert (choice.move, choice.n_equal) == (Move(5, BLUE), 1)
 
 
 def test_block_that_was_not_reached_is_left_for_one_as_good(table: SortingTable) -> None:

@@ -12,10 +12,12 @@ from app.live.sorting.commands import (
     MoveObject,
     RemoveObject,
     SetGoal,
+    SetOrder,
     SetSortingPolicy,
     StartTest,
     ToggleGoal,
 )
+from app.live.sorting.snapshot import Order
 from app.live.sorting.world import LiveSortingWorld
 from app.policies.checkpoints import pretrained
 from app.policies.inference.task_selection import TaskChooser
@@ -183,6 +185,25 @@ def test_critic_may_take_any_duplicate_that_fails_as_rarely() -> None:
     assert {one.id for one in going.candidates} == set(ids.values())
     taken = until(world, phase("grasp")).sorting.move
     assert taken.piece == going.chosen
+    assert until(world, solved).sorting.counters.moves == 1
+
+
+@pytest.mark.parametrize(
+    ("order", "text"),
+    [
+        ("critic", "2 moves are equal; chosen by value "),
+        ("planner", "2 moves are equal; this one comes first."),
+        ("nearest", "2 moves are equal; chosen because it was the nearest."),
+    ],
+)
+def test_order_of_equal_moves_is_followed_and_named(order: Order, text: str) -> None:
+    world = empty_world()
+    lay(world, {"cell5": "red-large", "cell9": "red-large"}, {"red": ("large",)})
+    world.apply(SetOrder(order=order))
+    going = until(world, phase("approach"))
+    assert going.sorting.order == order
+    assert len(going.sorting.duplicates) == (2 if order == "critic" else 1)
+    assert text in going.message
     assert until(world, solved).sorting.counters.moves == 1
 
 

@@ -29,7 +29,7 @@ export function Moves({ sorting, cell }) {
             sorting=${sorting} cell=${cell} chosen=${isChosen(one)}
             share=${Number.isFinite(one.value) ? share(one.value) : 0} />`)}
         </ol>`}
-    ${sorting.duplicates.length > 1 && html`<p class="faint duplicates">${sorting.duplicates.length} equivalent blocks;
+    ${sorting.duplicates.length > 1 && html`<p class="faint duplicates">${sorting.duplicates.length} equal moves;
       the critic of the pick policy selected one.</p>`}
   </section>`;
 }
@@ -85,7 +85,22 @@ function worth(value, by) {
     : `Expected discounted reward if it comes first: ${format.value(value)}.`;
 }
 
-/** Counters and the task planner. */
+const ORDERS = [
+  ["critic", "critic of the pick policy"],
+  ["planner", "task planner's first"],
+  ["nearest", "nearest block"],
+];
+
+/** What decides among moves with about the same expected grasps. */
+function Order({ order, send }) {
+  return html`<label class="sorting-policy"><span>Among equal moves</span>
+    <select value=${order} data-role="order"
+      onChange=${(event) => send({ tag: "set-order", order: event.target.value })}>
+      ${ORDERS.map(([value, text]) => html`<option key=${value} value=${value}>${text}</option>`)}
+    </select></label>`;
+}
+
+/** Counters, the task planner and the order of equal moves. */
 export function SortingSmallPrint({ world, cell, checkpoints, jobs, send }) {
   const counters = { ...world.sorting.counters, ...world.counters };
   const shown = [["attempts", "Grasps"], ["failures", "Failed"], ["moves", "Moves"],
@@ -98,10 +113,10 @@ export function SortingSmallPrint({ world, cell, checkpoints, jobs, send }) {
     </dl>
     <${TaskPlanner} sorting=${world.sorting} cell=${cell} checkpoints=${checkpoints} jobs=${jobs}
       send=${send} />
+    <${Order} order=${world.sorting.order} send=${send} />
     <p class="range">${world.checkpoint
       ? html`<span>Motions between them by ${world.policy_title ?? "checkpoint"}
-          ${" "}<code title=${world.checkpoint}>${format.short(world.checkpoint)}</code>, which also
-          chooses among equal blocks.</span>`
+          ${" "}<code title=${world.checkpoint}>${format.short(world.checkpoint)}</code>.</span>`
       : html`<span>No policy moves the arm.</span>`}</p>
   </section>`;
 }
