@@ -1,0 +1,37 @@
+"""The pictures of the case studies and of the calibration show what the results state."""
+
+import json
+
+import numpy as np
+
+from tools.docs.pick_plots import IMAGES, RESULTS, ROOT, cases, reliability
+
+
+def stored(name: str) -> dict:
+    return json.loads((RESULTS / f"{name}.json").read_text("utf-8"))
+
+
+def test_each_case_shows_the_values_of_both_goals_over_time() -> None:
+    result = stored("pick-cases")
+    for view, row in zip(cases(result).axes, result["results"], strict=True):
+        curves = result["curves"][row["name"]]
+        medians = {tuple(line.get_ydata()) for line in view.lines}
+        assert medians == {tuple(np.array(one)[:, 1]) for one in curves["values"].values()}
+        assert row["name"] in view.get_title(loc="left")
+        assert "(expected)" in str([text.get_text() for text in view.get_legend().get_texts()])
+
+
+def test_the_reliability_diagram_shows_every_bin() -> None:
+    result = stored("risk-calibration")
+    for view, row in zip(reliability(result).axes, result["results"], strict=False):
+        assert view.get_title(loc="left") == row["name"]
+        success = view.lines[0]
+        rates = [100.0 * one["rate"] for one in row["success"]["bins"]]
+        np.testing.assert_allclose(success.get_ydata(), rates)
+
+
+def test_the_page_shows_the_pictures() -> None:
+    page = (ROOT / "docs/results/pick.md").read_text("utf-8")
+    for image in ("cases.png", "reliability.png"):
+        assert (IMAGES / image).is_file()
+        assert f"(../img/pick/{image})" in page
