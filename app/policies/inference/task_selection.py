@@ -36,7 +36,7 @@ from app.sim.perception.observed_people import (
 )
 from app.sim.pick.batch import TaskView, observation_workspace_of, observe, step_robot
 from app.sim.pick.kernels.grasp import LIFT, GraspRules
-from app.sim.pick.kernels.observation import DISTANCE_SCALE
+from app.sim.pick.kernels.observation_layout import DISTANCE_SCALE
 from app.sim.pick.task_policy import (
     FRESH,
     NOT_BEGUN,

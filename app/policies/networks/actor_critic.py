@@ -16,7 +16,7 @@ import torch
 from torch import nn
 from torch.nn import functional
 
-from app.sim.pick.kernels.observation import BASE_START, N_FEATURES
+from app.sim.pick.kernels.observation_layout import BASE_START, N_FEATURES
 from app.sim.robot.kernels.arm import CONTROLLED
 
 BASE_WEIGHT = 0.9

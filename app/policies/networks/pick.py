@@ -2,7 +2,7 @@
 
 from app.policies.configs.pick import PickPreset
 from app.policies.networks.actor_critic import Critics, Fade, MeanCritics, ResidualActor
-from app.sim.pick.kernels.observation import (
+from app.sim.pick.kernels.observation_layout import (
     BODY_SIZES,
     DISTANCE_SCALE,
     LAYOUT,

@@ -20,17 +20,19 @@ from app.sim.human import model as human
 from app.sim.people.human_motion_config import USUAL, HumanMotionConfig
 from app.sim.people.kernels.motion import record_palms
 from app.sim.people.kernels.people import People, new_people_geometry
-from app.sim.pick.kernels import episode
+from app.sim.pick.kernels import episode, starts
 from app.sim.pick.kernels.grasp import DESCEND, REACH_ONLY, GraspRules
-from app.sim.pick.kernels.observation import (
+from app.sim.pick.kernels.observation import observe_batch
+from app.sim.pick.kernels.observation_layout import (
     N_FEATURES,
     N_PICK,
     N_WITH_BODY,
     N_WITH_PHASE,
+)
+from app.sim.pick.kernels.observation_workspace import (
     PickObservationWorkspace,
     PickQuery,
     new_pick_observation_workspace,
-    observe_batch,
 )
 from app.sim.pick.kernels.reward import RewardWeights
 from app.sim.prediction.weights import new_worker_predictor
@@ -117,7 +119,7 @@ WHOLE_PICK = PickSettings(time_limit_s=12.0, grasp=GraspRules(), observation="tw
 """Approach, grasp and lift, observed with the phase and two people."""
 
 
-def _world_of(cell: Cell, settings: PickSettings) -> episode.PickCell:
+def _world_of(cell: Cell, settings: PickSettings) -> starts.PickCell:
     if (lack := lacks_stations(cell)) is not None:
         raise InvalidInput("cell", cell.name, f"cannot be used for picking: it {lack}")
     arm, stations = arm_of(cell), cell.pick_stations
@@ -130,7 +132,7 @@ def _world_of(cell: Cell, settings: PickSettings) -> episode.PickCell:
                 station.position,
                 "must be reachable by the robot with its tool pointing down",
             )
-    return episode.PickCell(
+    return starts.PickCell(
         stations=positions,
         station_q=postures,
         n_cubes=len(cell.stations_of("cube")),
@@ -139,10 +141,10 @@ def _world_of(cell: Cell, settings: PickSettings) -> episode.PickCell:
     )
 
 
-def _rules_of(settings: PickSettings, stations: Vec) -> episode.PickRules:
+def _rules_of(settings: PickSettings, stations: Vec) -> starts.PickRules:
     box = np.stack([stations.min(axis=0), stations.max(axis=0)])
     box += np.outer((-1.0, 1.0), BOX_MARGIN)
-    return episode.PickRules(
+    return starts.PickRules(
         time_limit=settings.time_limit_s,
         short_limit=settings.short_limit_s,
         short_share=settings.short_share,
@@ -170,7 +172,7 @@ class PickBatch(EnvBatch):
     """
 
     _kernel = episode
-    world: episode.PickCell
+    world: starts.PickCell
 
     def __init__(
         self, cell: Cell, n_envs: int, seed: int, settings: PickSettings, first_env: int = 0
@@ -179,7 +181,7 @@ class PickBatch(EnvBatch):
         self.settings, world = settings, _world_of(self.cell, settings)
         super().__init__(
             world,
-            episode.PickTask(
+            starts.PickTask(
                 _rules_of(settings, world.stations),
                 settings.grasp,
                 settings.action.rule(),
@@ -207,13 +209,13 @@ class PickBatch(EnvBatch):
         """Set new targets [m], shape (len(envs), 3), in some environments."""
         shared = self.world, self.settings.grasp, self.state
         for e, goal in zip(envs, goals, strict=True):
-            episode.set_goal(*shared, int(e), as_kernel_array(goal), self._work.robot)
+            starts.set_goal(*shared, int(e), as_kernel_array(goal), self._work.robot)
 
     def set_starts(self, q: Vec) -> None:
         """Put the robots at rest at other starts [rad], shape (n_envs, 6)."""
         shared = self.world, self.settings.grasp, self.state
         self.state.q[:], self.state.qd[:], self.state.qdd[:] = q, 0.0, 0.0
-        episode.measure_starts(*shared, self._work)
+        starts.measure_starts(*shared, self._work)
 
 
 def observation_workspace_of(cell: Cell) -> PickObservationWorkspace:

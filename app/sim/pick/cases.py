@@ -93,8 +93,8 @@ CASES = (
         id="case-3",
         title="Blocked for a while",
         text=(
-            "The left arm moves from cube 4 to dock 1 across cube 3, the nearer goal; the robot "
-            "should switch while cube 3 is blocked, and end there."
+            "The left arm moves from cube 4 to dock 1 across cube 3, the nearer goal; the "
+            "robot should switch while cube 3 is blocked, and end there."
         ),
         robot_start="cube5",
         goals=("cube1", "cube3"),

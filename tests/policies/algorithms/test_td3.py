@@ -14,7 +14,7 @@ from app.policies.training import reach as reach_training
 from app.policies.training.run import TrainingRun
 from app.sim.cells.cell import load_cell
 from app.sim.pick.batch import PickBatch, PickSettings
-from app.sim.pick.kernels.observation import LAYOUT, N_FEATURES, N_PICK
+from app.sim.pick.kernels.observation_layout import LAYOUT, N_FEATURES, N_PICK
 from tests.policies.conftest import preset_of
 
 

@@ -13,7 +13,7 @@ from app.sim.cells.cell import load_cell
 from app.sim.human import model as human
 from app.sim.human.anthropometry import percentile_body
 from app.sim.human.person import Person
-from app.sim.pick.kernels.observation import N_FEATURES, N_PICK, N_WITH_BODY
+from app.sim.pick.kernels.observation_layout import N_FEATURES, N_PICK, N_WITH_BODY
 from app.sim.pick.task_policy import Candidate
 from tests.policies.conftest import TINY, Recorder, preset_of
 

@@ -13,7 +13,7 @@ from app.sim.envs.pick import PickEnv, PickVectorEnv
 from app.sim.human.anthropometry import MEDIAN, percentile_body
 from app.sim.people.human_motion_config import HumanMotionConfig
 from app.sim.pick.batch import WHOLE_PICK, PickBatch, PickSettings
-from app.sim.pick.kernels.observation import N_FEATURES, N_WITH_BODY
+from app.sim.pick.kernels.observation_layout import N_FEATURES, N_WITH_BODY
 
 
 def actions(n: int) -> np.ndarray:

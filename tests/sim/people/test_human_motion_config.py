@@ -19,7 +19,7 @@ from app.sim.people.human_motion_config import (
 )
 from app.sim.people.kernels.people import ABSENT
 from app.sim.pick.batch import OUTCOMES, PickBatch, PickSettings
-from app.sim.pick.kernels.observation import LAYOUT
+from app.sim.pick.kernels.observation_layout import LAYOUT
 from app.sim.scenario.kernels.episode import COLLISION
 from app.sim.scene.scene import arm_of, people_of
 from tests.sim.recorded_person import working

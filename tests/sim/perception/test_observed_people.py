@@ -24,7 +24,7 @@ from app.sim.pick.batch import (
     observation_workspace_of,
     observe,
 )
-from app.sim.pick.kernels.observation import N_FEATURES
+from app.sim.pick.kernels.observation_layout import N_FEATURES
 from app.sim.scene.scene import NO_CYLINDERS, arm_of, people_of
 
 CELL = load_cell()

@@ -12,7 +12,7 @@ from app.sim.human import model as human
 from app.sim.pick import batch as pick
 from app.sim.pick.batch import OUTCOMES, PickBatch, PickSettings, TaskView
 from app.sim.pick.kernels import observation as features
-from app.sim.pick.kernels.observation import LAYOUT
+from app.sim.pick.kernels.observation_layout import LAYOUT
 from app.sim.robot.kernels import actions
 from app.sim.robot.kernels.joints import JointPath
 from app.sim.scene.scene import arm_of, people_of

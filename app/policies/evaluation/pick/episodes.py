@@ -28,13 +28,8 @@ from app.sim.pick.batch import (
     target_configurations,
 )
 from app.sim.pick.kernels.grasp import APPROACH, LIFT
-from app.sim.pick.kernels.observation import (
-    DISTANCE_SCALE,
-    LAYOUT,
-    N_PICK,
-    PICK_SIZES,
-    observe_batch,
-)
+from app.sim.pick.kernels.observation import observe_batch
+from app.sim.pick.kernels.observation_layout import DISTANCE_SCALE, LAYOUT, N_PICK, PICK_SIZES
 from app.sim.scenario.kernels import episode as kernel
 
 Index = NDArray[np.int64]

@@ -49,10 +49,8 @@ from app.sim.pick.batch import (
     target_configurations,
 )
 from app.sim.pick.kernels.grasp import APPROACH, LIFT
-from app.sim.pick.kernels.observation import (
-    LAYOUT,
-    observe_batch,
-)
+from app.sim.pick.kernels.observation import observe_batch
+from app.sim.pick.kernels.observation_layout import LAYOUT
 from app.sim.robot.kernels.arm import CONTROLLED, new_robot_pose, place_robot
 from app.sim.scenario.kernels.episode import COLLISION, RUNNING, SUCCESS, TIMEOUT
 from app.sim.sorting.layout import APPROACH_M, above, reaching_cell, require_workspace

@@ -1,8 +1,11 @@
 """Compiled pick episodes.
 
-episode         Episodes of the pick scenario: starts, steps, ends and rewards (compiled)
-monitored_step  Steps of the pick scenario under speed and separation monitoring (compiled)
-observation     Observation of the pick scenario: state of robot, person and target as features
-                (compiled)
-reward          Reward of the pick scenario (docs/method.md 3.3, compiled)
+episode                Steps, ends and rewards of episodes
+grasp                  Phases of a pick
+monitored_step         Steps under speed and separation monitoring
+observation            State of robot, people and target as features
+observation_layout     Groups of features and their units
+observation_workspace  Query and work space of observations
+reward                 Reward (docs/method.md 3.3)
+starts                 Targets, candidates and starts of episodes
 """

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.sim.core.jit import kernel
-from app.sim.pick.kernels.episode import PickCell, PickTask, conclude
+from app.sim.pick.kernels.episode import conclude
+from app.sim.pick.kernels.starts import PickCell, PickTask
 from app.sim.scenario.kernels.episode import RUNNING, EpisodeState, Indices, StepWorkspace
 from app.sim.scenario.kernels.monitored_motion import (
     begin_account,

@@ -15,17 +15,49 @@ more slowly (1 % against 90 % after 2.7 k updates in trials beside the pedestria
 """
 
 import math
-from typing import Any, NamedTuple
-
-import numpy as np
 
 from app.sim.core.arrays import Vec
 from app.sim.core.jit import FAR, kernel
-from app.sim.core.observation_layout import slices_of
-from app.sim.geometry.capsules import nearest_parts, new_columns, padded_size
+from app.sim.geometry.capsules import nearest_parts
 from app.sim.geometry.segments import segment_nearest
 from app.sim.human.kernels import kinematics as body
-from app.sim.prediction.kernels.worker import WorkerPredictor, predict_worker
+from app.sim.pick.kernels.observation_layout import (
+    ARMS,
+    AT_GOAL_AHEAD,
+    BASE_START,
+    CLOSE_SCALE,
+    DISTANCE_SCALE,
+    FARTHEST,
+    MOTION,
+    N_FEATURES,
+    N_PICK,
+    N_WITH_BODY,
+    N_WITH_PHASE,
+    NEAREST,
+    PELVIS,
+    PRESENT_WITHIN,
+    SCALARS,
+    SECOND_ARMS,
+    SECOND_CLEARANCE,
+    STILL_AHEAD,
+    TIME_SCALE,
+)
+from app.sim.pick.kernels.observation_workspace import (
+    ALONG_BASE,
+    AT_GOAL,
+    COARSE_FIRST,
+    COARSE_LINK,
+    COARSE_P0,
+    COARSE_SPAN,
+    FIRST_PART,
+    LAST_PART,
+    N_COARSE,
+    STILL,
+    PickObservationWorkspace,
+    PickQuery,
+    query_at,
+)
+from app.sim.prediction.kernels.worker import predict_worker
 from app.sim.robot.kernels import kinematics
 from app.sim.robot.kernels.arm import (
     CONTROLLED,
@@ -43,213 +75,9 @@ from app.sim.scenario.kernels.person_observation import (
     Obs,
     PersonWorkspace,
     extrapolate_capsules,
-    new_person_workspace,
     place_person,
     place_predicted,
 )
-
-TIME_SCALE = 10.0
-"""Unit of the time left [s]."""
-DISTANCE_SCALE = 0.5
-"""Unit of distances [m]; they are clipped at three units."""
-FARTHEST = 3.0 * DISTANCE_SCALE
-"""Distance at which clearances are clipped [m]."""
-
-SIZES = (
-    ("q", 5),
-    ("qd", 5),
-    ("sin_q", 5),
-    ("cos_q", 5),
-    ("human_q", 18),
-    ("human_qd", 18),
-    ("tcp", 3),
-    ("goal_minus_tcp", 3),
-    ("tcp_velocity", 3),
-    ("tool_axis", 3),
-    ("hands_and_elbows", 36),
-    ("hand_velocities", 6),
-    ("goal_posture_minus_q", 5),
-    ("base", 5),
-    ("distance_tilt_clearance_time", 4),
-    ("nearest_by_group", 16),
-    ("look_ahead_still", 3),
-    ("look_ahead_base", 3),
-    ("goal_clearance", 4),
-)
-
-LAYOUT = slices_of(SIZES)
-"""Slice of each group of features in the observation."""
-N_FEATURES = sum(size for _, size in SIZES)
-"""Length of the observation."""
-BODY_SIZES = (*SIZES, ("body", body.N_SIZE))
-"""Groups of the observation that includes the person's body dimensions."""
-N_WITH_BODY = N_FEATURES + body.N_SIZE
-"""Length of that observation."""
-PHASE_SIZES = (*SIZES, ("phase", 3), ("closing", 1), ("near_clearance", 1))
-"""Groups of the observation of a pick beside one person."""
-N_WITH_PHASE = sum(size for _, size in PHASE_SIZES)
-"""Length of that observation."""
-PICK_SIZES = (
-    *PHASE_SIZES,
-    ("second_pelvis", 3),
-    ("second_hands_and_elbows", 24),
-    ("second_hand_velocities", 6),
-    ("second_clearance", 1),
-    ("second_look_ahead_still", 3),
-    ("second_look_ahead_base", 3),
-    ("second_goal_clearance", 4),
-)
-"""Groups of the observation of a pick beside several people."""
-N_PICK = sum(size for _, size in PICK_SIZES)
-"""Length of that observation."""
-(PELVIS, SECOND_ARMS, SECOND_CLEARANCE) = (
-    slices_of(PICK_SIZES)[name].start
-    for name in ("second_pelvis", "second_hands_and_elbows", "second_clearance")
-)
-CLOSE_SCALE = 0.1
-"""Unit of the clearance that decides on a grasp [m]; it is clipped at one unit."""
-MAX_PEOPLE = 4
-"""Most people in a cell."""
-PRESENT_WITHIN = 4.0
-"""Distance from the robot's base from which on nobody is observed as a second person [m]."""
-BASE_START = LAYOUT["base"].start
-"""Index of the base motion, for the residual action."""
-(ARMS, MOTION, SCALARS, NEAREST, STILL_AHEAD, BASE_AHEAD, AT_GOAL_AHEAD) = (
-    LAYOUT[name].start
-    for name in (
-        "hands_and_elbows",
-        "goal_posture_minus_q",
-        "distance_tilt_clearance_time",
-        "nearest_by_group",
-        "look_ahead_still",
-        "look_ahead_base",
-        "goal_clearance",
-    )
-)
-
-COARSE_LINK = np.array([2, 3, 4, 5, 6], dtype=np.int64)
-COARSE_P0 = np.array(
-    [[0.0, -0.045, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]]
-)
-COARSE_SPAN = np.array(
-    [
-        [0.0, 0.0, 0.612],
-        [0.0, 0.0, 0.57],
-        [0.0, 0.115, 0.0],
-        [0.0, 0.0, 0.116],
-        [0.0, 0.17, 0.0],
-    ]
-)
-COARSE_RADIUS = np.array([0.09, 0.075, 0.066, 0.066, 0.045])
-COARSE_FIRST = (0, 1, 2, 4, 5)
-"""First coarse capsule of each of the four link groups, and their number."""
-N_COARSE = 5
-STILL, ALONG_BASE, AT_GOAL = 0, N_COARSE, 2 * N_COARSE
-"""First lane of three robot configurations that are evaluated together: now, along the base
-motion, at the goal."""
-N_LANES = padded_size(3 * N_COARSE)
-FIRST_PART, LAST_PART = body.C_ABDOMEN, body.C_HAND_L
-"""Human capsules used by the features: those above the table."""
-
-
-class PickQuery(NamedTuple):
-    """A state of robot, people and target; or n states, with a leading axis of n."""
-
-    q: Vec
-    """Joint positions [rad], shape (6,)."""
-    qd: Vec
-    """Joint speeds [rad/s], shape (6,)."""
-    human_q: Vec
-    """Joint positions of P people, the nearest first [m, rad], shape (P, 18)."""
-    human_qd: Vec
-    """Their joint speeds [m/s, rad/s], shape (P, 18)."""
-    size: Vec
-    """Their body dimensions [m], shape (P, body.N_SIZE)."""
-    goal: Vec
-    """Target of the tcp in this phase [m], shape (3,)."""
-    q_goal: Vec
-    """Vertical-tool configuration at the target [rad], shape (6,)."""
-    q_grasp: Vec
-    """The same at the object [rad], shape (6,); that at the target where nothing is grasped."""
-    phase: Any
-    """Phase of the pick (``grasp.py``), 0 where nothing is grasped."""
-    closing: Any
-    """Share of the closing time that has passed, 0 to 1."""
-
-
-class PickObservationWorkspace(NamedTuple):
-    """Work space of one observation."""
-
-    person: PersonWorkspace
-    """The first person, now and extrapolated."""
-    second: PersonWorkspace
-    """The second person, likewise."""
-    far: PersonWorkspace
-    """The person far away who is observed where there is no second one."""
-    lanes: Vec
-    """Coarse capsules of the robot in three configurations, shape (9, N_LANES)."""
-    gap: Vec
-    """Distance of each lane to the person [m], shape (N_LANES,)."""
-    part: Vec
-    """The person's capsule nearest to each lane, shape (N_LANES,)."""
-    rot: Vec
-    """R_world_link of another configuration, shape (7, 3, 3)."""
-    pos: Vec
-    """Origins of its links [m], shape (7, 3)."""
-    q: Vec
-    """Its joints [rad], shape (6,)."""
-    base: Vec
-    """The base motion, shape (6,)."""
-    gap_vector: Vec
-    """From robot to person [m], shape (3,)."""
-    human_q: Vec
-    """Joint positions of the people [m, rad], shape (MAX_PEOPLE, 18)."""
-    human_qd: Vec
-    """Their joint speeds [m/s, rad/s], shape (MAX_PEOPLE, 18)."""
-    human_size: Vec
-    """Their body dimensions [m], shape (MAX_PEOPLE, body.N_SIZE)."""
-    point: Vec
-    """Target of the tcp in the present phase [m], shape (3,)."""
-    predictor: WorkerPredictor
-    """Predicts the motion of the observed people in picks."""
-    ahead: Vec
-    """Their predicted joint positions [m, rad], shape (2, 3, 18)."""
-
-
-def new_pick_observation_workspace(
-    floor_z: float, far_q: Vec, far_size: Vec, predictor: WorkerPredictor
-) -> PickObservationWorkspace:
-    """Return work space for one observation at a time.
-
-    Args:
-        floor_z: Height of the floor [m].
-        far_q: Joint positions of the person far away [m, rad], shape (18,).
-        far_size: Body dimensions of that person [m], shape (body.N_SIZE,).
-        predictor: Motion predictor; its work space becomes part of this one.
-    """
-    far = new_person_workspace()
-    place_person(floor_z, far_q, np.zeros(18), far_size, far)
-    return PickObservationWorkspace(
-        person=new_person_workspace(),
-        second=new_person_workspace(),
-        far=far,
-        lanes=new_columns(
-            N_LANES, np.tile(COARSE_RADIUS, 3), np.tile((COARSE_SPAN**2).sum(axis=1), 3)
-        ),
-        gap=np.zeros(N_LANES),
-        part=np.zeros(N_LANES),
-        rot=np.zeros((7, 3, 3)),
-        pos=np.zeros((7, 3)),
-        q=np.zeros(6),
-        base=np.zeros(6),
-        gap_vector=np.zeros(3),
-        human_q=np.zeros((MAX_PEOPLE, 18)),
-        human_qd=np.zeros((MAX_PEOPLE, 18)),
-        human_size=np.zeros((MAX_PEOPLE, body.N_SIZE)),
-        point=np.zeros(3),
-        predictor=predictor,
-        ahead=np.zeros((2, len(HORIZONS), 18)),
-    )
 
 
 @kernel(inline="always")
@@ -521,23 +349,6 @@ def observe(
         out[SECOND_CLEARANCE] = _lane_clearance(STILL, work)
         out[SECOND_CLEARANCE + 7] = _lane_clearance(AT_GOAL, work)
     _write_look_ahead(arm, floor_z, state, second, work, out)
-
-
-@kernel(inline="always")
-def query_at(states: PickQuery, i: int) -> PickQuery:
-    """Return state ``i`` of n states."""
-    return PickQuery(
-        states.q[i],
-        states.qd[i],
-        states.human_q[i],
-        states.human_qd[i],
-        states.size[i],
-        states.goal[i],
-        states.q_goal[i],
-        states.q_grasp[i],
-        states.phase[i],
-        states.closing[i],
-    )
 
 
 @kernel()

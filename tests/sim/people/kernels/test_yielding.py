@@ -8,7 +8,7 @@ from app.sim.human import model as human
 from app.sim.people.human_motion_config import HumanMotionConfig
 from app.sim.people.kernels.yielding import D_SLOW, D_STOP, LEAN, closeness, lean_away
 from app.sim.pick.batch import PickBatch, PickSettings
-from app.sim.pick.kernels.observation import LAYOUT
+from app.sim.pick.kernels.observation_layout import LAYOUT
 from app.sim.scenario.kernels.episode import RUNNING
 
 DT = 0.05

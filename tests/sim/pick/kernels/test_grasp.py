@@ -14,7 +14,7 @@ from app.sim.pick.kernels.grasp import (
     distance_left,
     next_phase,
 )
-from app.sim.pick.kernels.observation import LAYOUT
+from app.sim.pick.kernels.observation_layout import LAYOUT
 
 RULES = GraspRules()
 GOAL = np.array([0.3, 0.7, 0.12])

@@ -11,7 +11,7 @@ from app.sim.human import model as human
 from app.sim.pick import batch as pick
 from app.sim.pick.batch import TaskView
 from app.sim.pick.kernels.grasp import DESCEND, GraspRules
-from app.sim.pick.kernels.observation import (
+from app.sim.pick.kernels.observation_layout import (
     DISTANCE_SCALE,
     LAYOUT,
     N_FEATURES,

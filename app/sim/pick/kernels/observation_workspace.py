@@ -1,0 +1,159 @@
+"""Query and work space of the observations of the pick scenario (compiled)."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from app.sim.core.arrays import Vec
+from app.sim.core.jit import kernel
+from app.sim.geometry.capsules import new_columns, padded_size
+from app.sim.human.kernels import kinematics as body
+from app.sim.pick.kernels.observation_layout import MAX_PEOPLE
+from app.sim.prediction.kernels.worker import WorkerPredictor
+from app.sim.scenario.kernels.person_observation import (
+    HORIZONS,
+    PersonWorkspace,
+    new_person_workspace,
+    place_person,
+)
+
+COARSE_LINK = np.array([2, 3, 4, 5, 6], dtype=np.int64)
+COARSE_P0 = np.array(
+    [[0.0, -0.045, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]]
+)
+COARSE_SPAN = np.array(
+    [
+        [0.0, 0.0, 0.612],
+        [0.0, 0.0, 0.57],
+        [0.0, 0.115, 0.0],
+        [0.0, 0.0, 0.116],
+        [0.0, 0.17, 0.0],
+    ]
+)
+COARSE_RADIUS = np.array([0.09, 0.075, 0.066, 0.066, 0.045])
+COARSE_FIRST = (0, 1, 2, 4, 5)
+"""First coarse capsule of each of the four link groups, and their number."""
+N_COARSE = 5
+STILL, ALONG_BASE, AT_GOAL = 0, N_COARSE, 2 * N_COARSE
+"""First lane of three robot configurations that are evaluated together: now, along the base
+motion, at the goal."""
+N_LANES = padded_size(3 * N_COARSE)
+FIRST_PART, LAST_PART = body.C_ABDOMEN, body.C_HAND_L
+"""Human capsules used by the features: those above the table."""
+
+
+class PickQuery(NamedTuple):
+    """A state of robot, people and target; or n states, with a leading axis of n."""
+
+    q: Vec
+    """Joint positions [rad], shape (6,)."""
+    qd: Vec
+    """Joint speeds [rad/s], shape (6,)."""
+    human_q: Vec
+    """Joint positions of P people, the nearest first [m, rad], shape (P, 18)."""
+    human_qd: Vec
+    """Their joint speeds [m/s, rad/s], shape (P, 18)."""
+    size: Vec
+    """Their body dimensions [m], shape (P, body.N_SIZE)."""
+    goal: Vec
+    """Target of the tcp in this phase [m], shape (3,)."""
+    q_goal: Vec
+    """Vertical-tool configuration at the target [rad], shape (6,)."""
+    q_grasp: Vec
+    """The same at the object [rad], shape (6,); that at the target where nothing is grasped."""
+    phase: Any
+    """Phase of the pick (``grasp.py``), 0 where nothing is grasped."""
+    closing: Any
+    """Share of the closing time that has passed, 0 to 1."""
+
+
+@kernel(inline="always")
+def query_at(states: PickQuery, i: int) -> PickQuery:
+    """Return state ``i`` of n states."""
+    return PickQuery(
+        states.q[i],
+        states.qd[i],
+        states.human_q[i],
+        states.human_qd[i],
+        states.size[i],
+        states.goal[i],
+        states.q_goal[i],
+        states.q_grasp[i],
+        states.phase[i],
+        states.closing[i],
+    )
+
+
+class PickObservationWorkspace(NamedTuple):
+    """Work space of one observation."""
+
+    person: PersonWorkspace
+    """The first person, now and extrapolated."""
+    second: PersonWorkspace
+    """The second person, likewise."""
+    far: PersonWorkspace
+    """The person far away who is observed where there is no second one."""
+    lanes: Vec
+    """Coarse capsules of the robot in three configurations, shape (9, N_LANES)."""
+    gap: Vec
+    """Distance of each lane to the person [m], shape (N_LANES,)."""
+    part: Vec
+    """The person's capsule nearest to each lane, shape (N_LANES,)."""
+    rot: Vec
+    """R_world_link of another configuration, shape (7, 3, 3)."""
+    pos: Vec
+    """Origins of its links [m], shape (7, 3)."""
+    q: Vec
+    """Its joints [rad], shape (6,)."""
+    base: Vec
+    """The base motion, shape (6,)."""
+    gap_vector: Vec
+    """From robot to person [m], shape (3,)."""
+    human_q: Vec
+    """Joint positions of the people [m, rad], shape (MAX_PEOPLE, 18)."""
+    human_qd: Vec
+    """Their joint speeds [m/s, rad/s], shape (MAX_PEOPLE, 18)."""
+    human_size: Vec
+    """Their body dimensions [m], shape (MAX_PEOPLE, body.N_SIZE)."""
+    point: Vec
+    """Target of the tcp in the present phase [m], shape (3,)."""
+    predictor: WorkerPredictor
+    """Predicts the motion of the observed people in picks."""
+    ahead: Vec
+    """Their predicted joint positions [m, rad], shape (2, 3, 18)."""
+
+
+def new_pick_observation_workspace(
+    floor_z: float, far_q: Vec, far_size: Vec, predictor: WorkerPredictor
+) -> PickObservationWorkspace:
+    """Return work space for one observation at a time.
+
+    Args:
+        floor_z: Height of the floor [m].
+        far_q: Joint positions of the person far away [m, rad], shape (18,).
+        far_size: Body dimensions of that person [m], shape (body.N_SIZE,).
+        predictor: Motion predictor; its work space becomes part of this one.
+    """
+    far = new_person_workspace()
+    place_person(floor_z, far_q, np.zeros(18), far_size, far)
+    return PickObservationWorkspace(
+        person=new_person_workspace(),
+        second=new_person_workspace(),
+        far=far,
+        lanes=new_columns(
+            N_LANES, np.tile(COARSE_RADIUS, 3), np.tile((COARSE_SPAN**2).sum(axis=1), 3)
+        ),
+        gap=np.zeros(N_LANES),
+        part=np.zeros(N_LANES),
+        rot=np.zeros((7, 3, 3)),
+        pos=np.zeros((7, 3)),
+        q=np.zeros(6),
+        base=np.zeros(6),
+        gap_vector=np.zeros(3),
+        human_q=np.zeros((MAX_PEOPLE, 18)),
+        human_qd=np.zeros((MAX_PEOPLE, 18)),
+        human_size=np.zeros((MAX_PEOPLE, body.N_SIZE)),
+        point=np.zeros(3),
+        predictor=predictor,
+        ahead=np.zeros((2, len(HORIZONS), 18)),
+    )
