@@ -50,8 +50,8 @@ class PickEnv(SingleEnv):
     | 4     | wrist 2        | -6.2 .. 6.2               |
 
     ## Observation space
-    ``Box(-100, 100, (N_PICK,), float32)``; ``app.sim.pick.kernels.observation_layout.PICK_SIZES`` has
-    the size of each group:
+    ``Box(-100, 100, (N_PICK,), float32)``; ``PICK_SIZES`` in
+    ``app.sim.pick.kernels.observation_layout`` has the size of each group:
 
     | group | size | content |
     |-------|------|---------|
