@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.sim.cells.cell import Cell
+from app.sim.core.arrays import Vec
 from app.sim.pick.batch import PickBatch, PickSettings
 from app.sim.pick.kernels import monitored_step
 from app.sim.safety.layer import SafetySettings
@@ -53,6 +54,11 @@ class MonitoredPickBatch(PickBatch):
         super().__init__(cell, n_envs, seed, settings, first_env)
         self.safety = safety
         self._monitor = new_monitored_state(self, safety, monitoring)
+
+    @property
+    def account(self) -> Vec:
+        """Accounts of the present episodes (``monitored_state.py``), (n_envs, N_ACCOUNT)."""
+        return self._monitor.account
 
     def _start(self, envs: Indices) -> None:
         super()._start(envs)

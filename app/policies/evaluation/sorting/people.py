@@ -6,9 +6,11 @@ differs from that of the policy only in its stations; clutter cells and towers a
 docks. Blocks are no obstacles, as in the live cell. All tasks run side by side in one batch;
 the person works on and does not avoid the robot.
 
-After a contact the robot stops, waits until the person is away and begins its motion again. A
-motion that reaches the time limit begins again, too, with the choice of the order rule. A task
-that is not finished within ``LIMIT_S`` has failed.
+The safety layer lies between policy and robot, with the assumptions ``AMONG_HANDS``; the rows
+``...-no-ssm`` are the same tasks without it. A person may touch the robot at standstill. After
+a contact of the moving robot it stops, waits until the person is away and begins its motion
+again. A motion that reaches the time limit begins again, too, with the choice of the order
+rule. A task that is not finished within ``LIMIT_S`` has failed.
 
 Each order rule (``order_rules.py``) runs the same tasks, with the same people and grasps.
 
@@ -36,14 +38,13 @@ from app.policies.evaluation.statistics import mean_of, wilson
 from app.policies.inference.task_selection import HYSTERESIS
 from app.policies.inference.value_networks import ValueNetworks, pick_preset_of
 from app.sim.cells.cell import Cell, load_cell
-from app.sim.collision.contact import clearance
 from app.sim.core.arrays import Vec
 from app.sim.core.kernels import rng as random
 from app.sim.people.kernels.motion import draw_script_of
 from app.sim.people.kernels.people import SCRIPTED
 from app.sim.pick.batch import (
-    PickBatch,
     PickSettings,
+    hand_speeds,
     observation_workspace_of,
     queries,
     target_configurations,
@@ -51,8 +52,11 @@ from app.sim.pick.batch import (
 from app.sim.pick.kernels.grasp import APPROACH, LIFT
 from app.sim.pick.kernels.observation import observe_batch
 from app.sim.pick.kernels.observation_layout import LAYOUT
+from app.sim.pick.monitored_batch import AMONG_HANDS, MonitoredPickBatch
 from app.sim.robot.kernels.arm import CONTROLLED, new_robot_pose, place_robot
 from app.sim.scenario.kernels.episode import COLLISION, RUNNING, SUCCESS, TIMEOUT
+from app.sim.scenario.kernels.monitored_state import PERIODS, STOPPED, TOUCHED_AT_REST
+from app.sim.scenario.monitoring import MonitoringSettings
 from app.sim.sorting.layout import APPROACH_M, above, reaching_cell, require_workspace
 from app.sim.sorting.near_optimal_moves import MARGIN
 
@@ -66,8 +70,10 @@ DEFAULT_TASKS = 300
 N_OBJECTS = 10
 LIMIT_S = 600.0
 """Time after which a task has failed [s]."""
-AT_REST = 0.01
-"""Joint speed below which the robot counts as at rest [rad/s]."""
+MOTION_LIMIT_S = 20.0
+"""Time limit of one motion [s]."""
+NO_SSM = "-no-ssm"
+"""Suffix of the rows without the safety layer."""
 PLACE_TIME_S = 10.0
 """Time left of a motion that is valued before its object is picked [s]."""
 PAUSE_S = 1.0
@@ -85,7 +91,9 @@ class FullTasks:
     moving: Index
     """Contacts of the moving robot."""
     resting: Index
-    """Contacts of the robot at rest."""
+    """Contacts of the robot at standstill."""
+    stopped: NDArray[np.float64]
+    """Share of the control cycles with override 0."""
     attempts: Index
     """Grasps."""
     late: Index
@@ -104,9 +112,10 @@ class FullTasks:
             "without_moving_contact": wilson(free, n),
             "moving_contacts": mean_of(self.moving),
             "contacts_at_rest": mean_of(self.resting),
+            "stopped": mean_of(self.stopped),
             "late_motions": mean_of(self.late),
             "grasps": mean_of(self.attempts),
-            "options_per_grasp": float(self.options.sum() / self.attempts.sum()),
+            "options_per_grasp": float(self.options.sum() / max(1, self.attempts.sum())),
             "cycle_time_s": mean_of(self.cycle_s[self.finished]),
         }
 
@@ -125,6 +134,7 @@ class SortingBesidePeople:
         settings: Settings of the picks.
         n_tasks: Number of tasks.
         seed: Seed of tasks, grasps and people.
+        active: Whether the safety layer acts.
     """
 
     def __init__(
@@ -134,9 +144,18 @@ class SortingBesidePeople:
         settings: PickSettings,
         n_tasks: int,
         seed: int,
+        *,
+        active: bool = True,
     ) -> None:
         self._networks, self._seed = networks, seed
-        self.batch = PickBatch(reaching_cell(cell), n_tasks, seed, settings)
+        self.batch = MonitoredPickBatch(
+            reaching_cell(cell),
+            n_tasks,
+            seed,
+            settings,
+            AMONG_HANDS,
+            MonitoringSettings(active=active, rest_ends=False),
+        )
         self.tasks = TaskStates(cell, n_tasks, N_OBJECTS, seed)
         grasp = settings.grasp
         self._goals = above(self.tasks.points, grasp.depth or APPROACH_M)
@@ -155,17 +174,19 @@ class SortingBesidePeople:
             act[:] = 0.0
             if going.size:
                 act[going] = self._steer(going, rule)
-            before = np.abs(batch.state.qd).max(axis=1)
+            touched = batch.account[:, TOUCHED_AT_REST].copy()
             batch.step(act, auto_reset=False, features=False)
-            self._settle(rows, before)
+            self._count_touches(rows, batch.account[:, TOUCHED_AT_REST] > touched)
+            self._settle(rows)
             self._renew_scripts(rows)
-        state, tasks = batch.state, self.tasks
+        state, tasks, account = batch.state, self.tasks, batch.account
         finished = state.outcome == SUCCESS
         return FullTasks(
             finished=finished,
             cycle_s=np.where(finished, state.elapsed, LIMIT_S),
             moving=self._moving,
             resting=self._resting,
+            stopped=account[:, STOPPED] / account[:, PERIODS],
             attempts=tasks.attempts.copy(),
             late=self._late,
             options=tasks.options.copy(),
@@ -178,7 +199,8 @@ class SortingBesidePeople:
         batch.set_starts(np.tile(batch.arm.home, (n, 1)))
         self.tasks.begin()
         self._scripts = np.zeros(n, dtype=np.int64)
-        self._chosen, self._waiting = np.full(n, -1), np.zeros(n, dtype=np.bool_)
+        self._chosen = np.full(n, -1)
+        self._waiting, self._touched = (np.zeros(n, dtype=np.bool_) for _ in range(2))
         self._moving, self._resting, self._late = (np.zeros(n, np.int64) for _ in range(3))
         for e in range(n):
             self._begin_motion(e)
@@ -255,15 +277,20 @@ class SortingBesidePeople:
 
     # Events.
 
-    def _settle(self, rows: Index, before: NDArray[np.float64]) -> None:
-        """Count the events of a period and begin the motions that follow.
+    def _count_touches(self, rows: Index, touched: Flags) -> None:
+        """Count the contacts at standstill that began in a period.
 
         Args:
             rows: Tasks that ran in the period.
-            before: Largest joint speed of each robot before it [rad/s], shape (n_tasks,).
+            touched: Whether a person touched each robot at standstill in it, shape (n_tasks,).
         """
-        state = self.batch.state
-        outcome = state.outcome[rows].copy()
+        began = touched & ~self._touched & ~self._waiting
+        self._resting[rows] += began[rows]
+        self._touched = touched
+
+    def _settle(self, rows: Index) -> None:
+        """Begin the motions that follow the events of a period in some tasks."""
+        outcome = self.batch.state.outcome[rows].copy()
         for e in rows[outcome == SUCCESS].tolist():
             if not self.tasks.advance(e, int(self._chosen[e])):
                 self._begin_motion(e)
@@ -271,37 +298,24 @@ class SortingBesidePeople:
             self._late[e] += 1
             self._begin_motion(e)
         for e in rows[outcome == COLLISION].tolist():
-            self._stop(e, max(float(before[e]), float(np.abs(state.qd[e]).max())))
+            self._stop(e)
 
-    def _stop(self, e: int, speed: float) -> None:
-        """Stop the robot of one task after a contact at a joint speed [rad/s]."""
-        state = self.batch.state
-        if not self._waiting[e]:
-            counts = self._moving if speed > AT_REST else self._resting
-            counts[e] += 1
+    def _stop(self, e: int) -> None:
+        """Stop the robot of one task after a contact; one in the cell or itself goes home."""
+        batch, state = self.batch, self.batch.state
+        self._moving[e] += 1
         self._waiting[e] = True
         state.qd[e], state.qdd[e] = 0.0, 0.0
+        if state.clear[e, 1:].min() <= 0.0:
+            pose = new_robot_pose(batch.arm)
+            place_robot(batch.arm, batch.arm.home, pose)
+            state.q[e], state.robot[e] = batch.arm.home, pose.columns
         self._begin_motion(e)
 
     def _release(self) -> None:
-        """Let robots move again that are free of contact; place at home those beside no one."""
-        batch, state = self.batch, self.batch.state
-        for e in np.flatnonzero(self._waiting).tolist():
-            people = state.people
-            found = clearance(
-                batch.arm,
-                batch.world.people,
-                state.q[e],
-                people.q[e],
-                people.cylinders[e],
-                people.size[e],
-            )
-            if min(found.cell_m, found.self_m) <= 0.0:
-                pose = new_robot_pose(batch.arm)
-                place_robot(batch.arm, batch.arm.home, pose)
-                state.q[e], state.robot[e] = batch.arm.home, pose.columns
-            state.clear[e] = found.people_m, found.cell_m, found.self_m
-            self._waiting[e] = found.people_m < batch.settings.grasp.start_clearance
+        """Let robots move again whose person is away."""
+        least = self.batch.settings.grasp.start_clearance
+        self._waiting &= self.batch.state.clear[:, 0] < least
 
     def _renew_scripts(self, rows: Index) -> None:
         """Draw another script for workers whose script has ended."""
@@ -332,15 +346,18 @@ def run_sorting_people(
     """
     cell, preset = load_cell(CELL), pick_preset_of(checkpoint)
     require_workspace(cell, cell_of(checkpoint.manifest))
-    settings = replace(settings_for((1, 1), preset), start_clearance_m=0.05)
-    n = episodes or DEFAULT_TASKS
-    bench = SortingBesidePeople(ValueNetworks(checkpoint), cell, settings, n, seed)
+    settings = replace(settings_for((1, 1), preset), time_limit_s=MOTION_LIMIT_S)
+    networks, n = ValueNetworks(checkpoint), episodes or DEFAULT_TASKS
     runs: dict[str, FullTasks] = {}
     rows: list[dict[str, Any]] = []
-    for name, rule in ORDER_RULES.items():
-        runs[name] = bench.run(rule)
-        rows.append(runs[name].row(name))
-        on_row(len(rows), len(ORDER_RULES), rows[-1])
+    for suffix in ("", NO_SSM):
+        active = not suffix
+        bench = SortingBesidePeople(networks, cell, settings, n, seed, active=active)
+        for rule, choose in ORDER_RULES.items():
+            name = rule + suffix
+            runs[name] = bench.run(choose)
+            rows.append(runs[name].row(name))
+            on_row(len(rows), 2 * len(ORDER_RULES), rows[-1])
     return {
         "settings": {
             "cell": CELL,
@@ -349,11 +366,12 @@ def run_sorting_people(
             "motion_limit_s": settings.time_limit_s,
             "margin_attempts": MARGIN,
             "hysteresis": HYSTERESIS,
+            "safety": AMONG_HANDS.describe(),
+            **hand_speeds(bench.batch),
         },
         "results": rows,
-        "paired": [
-            _paired(runs["critic"], runs[name], name) for name in ("planner", "nearest")
-        ],
+        "paired": [_paired(runs["critic"], runs[name], name) for name in ("planner", "nearest")]
+        + [_paired(runs["critic"], runs["critic" + NO_SSM], "critic" + NO_SSM)],
     }
 
 

@@ -67,33 +67,49 @@ def test_targets_are_the_objects_and_then_the_place_of_the_held_one() -> None:
     assert [tasks.points[one].tolist() in towers for one in tasks.targets[0]] == [True]
 
 
-def bench(n: int) -> SortingBesidePeople:
+def bench(n: int, *, active: bool = True) -> SortingBesidePeople:
     checkpoint = pretrained.load("pick")
     settings = settings_for((1, 1), pick_preset_of(checkpoint))
-    return SortingBesidePeople(ValueNetworks(checkpoint), CELL, settings, n, seed=3)
+    networks = ValueNetworks(checkpoint)
+    return SortingBesidePeople(networks, CELL, settings, n, seed=3, active=active)
 
 
 def test_same_rule_repeats_its_run() -> None:
     ran = bench(3)
     first, second = ran.run(order_rules.nearest), ran.run(order_rules.nearest)
-    assert first.finished.all()
+    assert first.finished.all() and first.stopped.any()
     np.testing.assert_array_equal(first.cycle_s, second.cycle_s)
-    np.testing.assert_array_equal(first.moving, second.moving)
-    assert first.moving.sum() > 0
+    np.testing.assert_array_equal(first.resting, second.resting)
 
 
-def test_contact_stops_the_robot_and_counts_once_until_the_person_is_away() -> None:
+def test_contact_of_the_moving_robot_stops_it_until_the_person_is_away() -> None:
     ran = bench(2)
     ran._begin()
     ran.batch.state.qd[:] = 0.3
-    for _ in range(2):
-        ran._stop(0, 0.3)
-    ran._stop(1, 0.0)
-    assert (ran._moving.tolist(), ran._resting.tolist()) == ([1, 0], [0, 1])
-    assert not ran.batch.state.qd.any() and ran._waiting.all()
-    ran.batch.state.people.q[0, 0, :2] = 0.0, 4.0
-    ran._release()
-    assert not ran._waiting[0]
+    ran._stop(0)
+    assert ran._moving.tolist() == [1, 0]
+    assert not ran.batch.state.qd[0].any() and ran._waiting.tolist() == [True, False]
+    for clearance, waiting in ((0.01, True), (0.2, False)):
+        ran.batch.state.clear[0, 0] = clearance
+        ran._release()
+        assert ran._waiting[0] == waiting
+
+
+def test_touch_of_the_robot_at_standstill_counts_once() -> None:
+    ran = bench(2)
+    ran._begin()
+    rows = np.arange(2)
+    for touched in ([True, False], [True, False], [False, False], [True, True]):
+        ran._count_touches(rows, np.array(touched))
+    assert ran._resting.tolist() == [2, 1]
+
+
+def test_safety_layer_stops_the_robot_and_prevents_contacts_of_the_moving_one() -> None:
+    runs = [bench(3, active=active).run(order_rules.planner) for active in (True, False)]
+    assert [run.finished.all() for run in runs] == [True, True]
+    assert runs[0].moving.sum() == 0 < runs[1].moving.sum()
+    assert (runs[0].stopped > 0.0).all() and not runs[1].stopped.any()
+    assert runs[0].cycle_s.mean() > runs[1].cycle_s.mean()
 
 
 def test_task_that_is_cut_off_has_failed(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -110,9 +126,10 @@ def test_result_compares_the_rules_on_the_same_tasks() -> None:
         pretrained.load("pick"), episodes=2, seed=4, on_row=lambda *what: reported.append(what)
     )
     names = [row["name"] for row in result["results"]]
-    assert names == ["critic", "planner", "nearest"]
-    assert [done for done, _, _ in reported] == [1, 2, 3]
-    critic, planner, _ = result["results"]
+    rules = ["critic", "planner", "nearest"]
+    assert names == rules + [f"{rule}-no-ssm" for rule in rules]
+    assert [done for done, _, _ in reported] == [1, 2, 3, 4, 5, 6]
+    critic, planner = result["results"][:2]
     difference = critic["cycle_time_s"]["mean"] - planner["cycle_time_s"]["mean"]
     assert result["paired"][0]["cycle_time_s"]["mean"] == pytest.approx(difference)
 
