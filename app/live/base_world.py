@@ -9,32 +9,31 @@ the person has moved on. Pure numpy: no thread, no screen.
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator
 from dataclasses import replace
-from typing import Any, Generic, Protocol, TypeVar
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 
 from app.errors import ServiceError
 from app.live import commands
-from app.live.arm import HumanGeometry, LiveArm, PeopleInCell
+from app.live.arm import HumanGeometry, LiveArm
 from app.live.command_checks import Command, check
+from app.live.people.interfaces import MovingPeople
 from app.live.read_model import frozen
 from app.live.safety import explanation
 from app.live.safety.layer import LiveSafety
 from app.live.snapshot import (
     PICK_PHASES,
-    CandidateSnapshot,
     ContactSnapshot,
     Counters,
     PersonSnapshot,
     Status,
     WorldSnapshot,
+    candidate_snapshots,
 )
 from app.sim.cells.cell import Cell
 from app.sim.collision.contact import Contact
 from app.sim.core.arrays import Vec
-from app.sim.human.person import Person
 from app.sim.pick import batch as pick
 from app.sim.pick.task_policy import NOT_BEGUN, Candidate, Decision, TaskPolicy
 from app.sim.robot.trajectory_segment import TrajectorySegment
@@ -46,57 +45,13 @@ CONTACT_HOLD_S = 2.0
 NOTE_S = 2.5
 """Time for which a note is shown [s]."""
 NEAR_M = 0.25
-"""Separation distance below which a motion by inverse kinematics ends, so that the policy can
-move away [m]."""
+"""Separation distance below which a motion by inverse kinematics ends [m]."""
 STANDSTILL = 1e-3
 """Joint speed below which the robot is at standstill [rad/s]."""
 APART_M = 0.02
 """Separation distance from which a contact at standstill is over [m]."""
 
 _TOUCHED = {"cell": "table", "self": "robot"}
-
-
-class PersonLike(Protocol):
-    """One person of a live cell."""
-
-    @property
-    def id(self) -> int:
-        """Number of the person."""
-
-    def seen(self) -> Person:
-        """Return the person as observed by a policy."""
-
-    def drag(self, command: commands.MovePerson) -> None:
-        """Set dragged targets."""
-
-    def enter(self, mode: commands.Mode) -> None:
-        """Set the motion source."""
-
-    def play(self, command: commands.SetMotion) -> None:
-        """Play a recording."""
-
-    def resize(self, command: commands.SetAnthropometry) -> None:
-        """Change the body dimensions."""
-
-    def snapshot(self, clearance_m: float, *, nearest: bool) -> PersonSnapshot:
-        """Return the read model of the person."""
-
-
-class MovingPeople(PeopleInCell, Protocol):
-    """The people of a live cell, as a world moves them."""
-
-    def __iter__(self) -> Iterator[PersonLike]: ...
-
-    def __getitem__(self, id: int) -> PersonLike: ...
-
-    def move(self, dt: float) -> None:
-        """Move all people for ``dt`` [s]."""
-
-    def move_while_paused(self, dt: float) -> bool:
-        """Move dragged people for ``dt`` [s]; return whether one moved."""
-
-    def change(self, command: commands.AddPerson | commands.RemovePerson) -> None:
-        """Add or remove a person."""
 
 
 P = TypeVar("P", bound=MovingPeople)
@@ -345,8 +300,6 @@ class BaseWorld(ABC, Generic[P]):
         added = {name: getattr(so_far, name) + n for name, n in events.items()}
         self.counters = replace(so_far, **added)
 
-    # Deciding.
-
     def begin_motion(self) -> None:
         """Start a new motion of the policy, with the whole time limit and no decision."""
         self.time_left = TIME_LIMIT_S
@@ -398,23 +351,6 @@ class BaseWorld(ABC, Generic[P]):
         """The note shown at present."""
         return self._note if self.t < self._note_until else None
 
-    def _candidate(self, index: int, candidate: Candidate) -> CandidateSnapshot:
-        decision = self.decision
-        outcome = None
-        if decision is not None and decision.outcomes is not None:
-            outcome = decision.outcomes[index]
-        return CandidateSnapshot(
-            id=candidate.id,
-            position=frozen(candidate.position),
-            value=None if decision is None else decision.values[index],
-            success=None if outcome is None else outcome.success,
-            contact=None if outcome is None else outcome.contact,
-            time_s=None if outcome is None else outcome.time_s,
-            chosen=decision is not None and decision.index == index,
-            reachable=None if decision is None else decision.reachable[index],
-            outside=() if decision is None else decision.outside_candidates[index],
-        )
-
     def slowed(self) -> str | None:
         """Return why the safety layer reduces the speed; None if it does not."""
         ids = self.people.ids
@@ -444,7 +380,7 @@ class BaseWorld(ABC, Generic[P]):
             tcp=frozen(self.robot.tcp()),
             mode=people[0].mode if people else None,
             people=people,
-            candidates=tuple(self._candidate(i, c) for i, c in enumerate(self.offered)),
+            candidates=candidate_snapshots(self.offered, decision),
             chosen=None if decision is None else decision.chosen,
             previous=self.previous,
             time_left_s=self.time_left,

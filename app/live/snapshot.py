@@ -4,17 +4,19 @@ Robot, people, ``previous`` and ``time_left_s`` are the inputs of the decision i
 snapshot: ``POST /v1/task-selection`` returns the same choice and values for them.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 from app.live.commands import Mode
 from app.live.reach.snapshot import ReachSnapshot
-from app.live.read_model import Internal, Numbers, ReadModel
+from app.live.read_model import Internal, Numbers, ReadModel, frozen
 from app.live.safety.snapshot import SafetySnapshot
 from app.live.sorting.snapshot import SortingSnapshot
 from app.sim.core.arrays import Vec
 from app.sim.core.out_of_range import OutsideField
 from app.sim.pick.case_verdict import Verdict
+from app.sim.pick.task_policy import Candidate, Decision
 
 PickPhase = Literal["approach", "descend", "lift"]
 PICK_PHASES: tuple[PickPhase, ...] = ("approach", "descend", "lift")
@@ -59,6 +61,30 @@ class CandidateSnapshot(ReadModel):
     """whether a configuration with vertical tool exists; null without a decision"""
     outside: tuple[OutsideField, ...]
     """inputs of the candidate outside the training range"""
+
+
+def candidate_snapshots(
+    offered: Sequence[Candidate], decision: Decision | None
+) -> tuple[CandidateSnapshot, ...]:
+    """Return the stations that are offered, with what the decision says of them."""
+    outcomes = None if decision is None else decision.outcomes
+    snapshots = []
+    for k, candidate in enumerate(offered):
+        outcome = None if outcomes is None else outcomes[k]
+        snapshots.append(
+            CandidateSnapshot(
+                id=candidate.id,
+                position=frozen(candidate.position),
+                value=None if decision is None else decision.values[k],
+                success=None if outcome is None else outcome.success,
+                contact=None if outcome is None else outcome.contact,
+                time_s=None if outcome is None else outcome.time_s,
+                chosen=decision is not None and decision.index == k,
+                reachable=None if decision is None else decision.reachable[k],
+                outside=() if decision is None else decision.outside_candidates[k],
+            )
+        )
+    return tuple(snapshots)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
