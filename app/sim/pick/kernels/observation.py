@@ -55,9 +55,9 @@ from app.sim.pick.kernels.observation_workspace import (
     STILL,
     PickObservationWorkspace,
     PickQuery,
+    predict_person,
     query_at,
 )
-from app.sim.prediction.kernels.worker import predict_worker
 from app.sim.robot.kernels import kinematics
 from app.sim.robot.kernels.arm import (
     CONTROLLED,
@@ -76,7 +76,6 @@ from app.sim.scenario.kernels.person_observation import (
     PersonWorkspace,
     extrapolate_capsules,
     place_person,
-    place_predicted,
 )
 
 
@@ -261,29 +260,28 @@ def _write_look_ahead(
 ) -> None:
     """Write the clearances to the observed people at all horizons."""
     q, q_goal, base = state.q, state.q_goal, work.base
-    person, other = work.person, work.second
+    person = work.person
     work.q[5] = q[5]
     predicts = out.shape[0] == N_WITH_PHASE or out.shape[0] == N_PICK
+    human_q, human_qd, size = state.human_q, state.human_qd, state.size
     if predicts:
-        predict_worker(work.predictor, state.human_q[0], state.human_qd[0], work.ahead[0])
+        predict_person(floor_z, human_q[0], human_qd[0], size[0], 0, work)
     if second > 0:
-        human_q, human_qd = state.human_q[second], state.human_qd[second]
-        predict_worker(work.predictor, human_q, human_qd, work.ahead[1])
+        predict_person(floor_z, human_q[second], human_qd[second], size[second], 1, work)
     for i in range(3):
         for j in range(CONTROLLED):
             step = base[j] * arm.limits.qd_max[j] * HORIZONS[i]
             limit = abs(q_goal[j] - q[j])
             work.q[j] = q[j] + min(limit, max(-limit, step))
         _place_lanes(arm, work.q, ALONG_BASE, work)
-        if predicts:
-            place_predicted(floor_z, work.ahead[0, i], state.size[0], person)
-        else:
+        if not predicts:
             extrapolate_capsules(person.now, person.later, HORIZONS[i], person.moved)
-        nearest_parts(work.lanes, person.moved, FIRST_PART, LAST_PART, work.gap, work.part)
+        moved = work.ahead[0, i] if predicts else person.moved
+        nearest_parts(work.lanes, moved, FIRST_PART, LAST_PART, work.gap, work.part)
         _write_clearances(work, STILL_AHEAD, i, out)
         if second > 0:
-            place_predicted(floor_z, work.ahead[1, i], state.size[second], other)
-            nearest_parts(work.lanes, other.moved, FIRST_PART, LAST_PART, work.gap, work.part)
+            moved = work.ahead[1, i]
+            nearest_parts(work.lanes, moved, FIRST_PART, LAST_PART, work.gap, work.part)
             _write_clearances(work, SECOND_CLEARANCE + 1, i, out)
 
 

@@ -9,12 +9,13 @@ from app.sim.core.jit import kernel
 from app.sim.geometry.capsules import new_columns, padded_size
 from app.sim.human.kernels import kinematics as body
 from app.sim.pick.kernels.observation_layout import MAX_PEOPLE
-from app.sim.prediction.kernels.worker import WorkerPredictor
+from app.sim.prediction.kernels.worker import WorkerPredictor, predict_worker
 from app.sim.scenario.kernels.person_observation import (
     HORIZONS,
     PersonWorkspace,
     new_person_workspace,
     place_person,
+    place_predicted,
 )
 
 COARSE_LINK = np.array([2, 3, 4, 5, 6], dtype=np.int64)
@@ -119,8 +120,12 @@ class PickObservationWorkspace(NamedTuple):
     """Target of the tcp in the present phase [m], shape (3,)."""
     predictor: WorkerPredictor
     """Predicts the motion of the observed people in picks."""
+    predicted: Vec
+    """Predicted joint positions of one of them [m, rad], shape (3, 18)."""
     ahead: Vec
-    """Their predicted joint positions [m, rad], shape (2, 3, 18)."""
+    """Their predicted capsules as columns, shape (2, 3, 9, 16)."""
+    known: Vec
+    """Joints, joint speeds and body dimensions to which ``ahead`` belongs, (2, 36 + N_SIZE)."""
 
 
 def new_pick_observation_workspace(
@@ -155,5 +160,28 @@ def new_pick_observation_workspace(
         human_size=np.zeros((MAX_PEOPLE, body.N_SIZE)),
         point=np.zeros(3),
         predictor=predictor,
-        ahead=np.zeros((2, len(HORIZONS), 18)),
+        predicted=np.zeros((len(HORIZONS), 18)),
+        ahead=np.tile(body.capsule_columns(1), (2, len(HORIZONS), 1, 1)),
+        known=np.full((2, 36 + body.N_SIZE), np.nan),
     )
+
+
+@kernel()
+def predict_person(
+    floor_z: float, q: Vec, qd: Vec, size: Vec, who: int, work: PickObservationWorkspace
+) -> None:
+    """Place the predicted capsules of a person, unless they are those of the last call."""
+    known, same = work.known[who], True
+    for j in range(18):
+        same = same and known[j] == q[j] and known[18 + j] == qd[j]
+    for j in range(body.N_SIZE):
+        same = same and known[36 + j] == size[j]
+    if same:
+        return
+    for j in range(18):
+        known[j], known[18 + j] = q[j], qd[j]
+    for j in range(body.N_SIZE):
+        known[36 + j] = size[j]
+    predict_worker(work.predictor, q, qd, work.predicted)
+    for i in range(3):
+        place_predicted(floor_z, work.predicted[i], size, work.person, work.ahead[who, i])

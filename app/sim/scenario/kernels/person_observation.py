@@ -80,18 +80,21 @@ def place_person(floor_z: float, q: Vec, qd: Vec, size: Vec, person: PersonWorks
     body.capsules(person.points, person.frames, size, floor_z, 0, person.now)
 
 
-@kernel(inline="always")
-def place_predicted(floor_z: float, q: Vec, size: Vec, person: PersonWorkspace) -> None:
-    """Place the capsules of a person at predicted joint positions, in ``person.moved``.
+@kernel()
+def place_predicted(
+    floor_z: float, q: Vec, size: Vec, person: PersonWorkspace, capsules: Vec
+) -> None:
+    """Place the capsules of a person at predicted joint positions.
 
     Args:
         floor_z: Height of the floor [m].
         q: The predicted joint positions [m, rad], shape (18,).
         size: The person's body dimensions [m], shape (body.N_SIZE,).
-        person: Filled; its points one ``TICK`` later are overwritten.
+        person: Work space; its points one ``TICK`` later are overwritten.
+        capsules: Filled, shape (9, 16).
     """
     body.points_and_frames(q, size, person.trig, person.points_later, person.frames)
-    body.capsules(person.points_later, person.frames, size, floor_z, 0, person.moved)
+    body.capsules(person.points_later, person.frames, size, floor_z, 0, capsules)
 
 
 @kernel(error_model="numpy", fastmath=FAST)
