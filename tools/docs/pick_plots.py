@@ -33,7 +33,7 @@ def cases(result: Json) -> Figure:
             view.plot(curves["t_s"], middle, color=colour, label=name)
             view.fill_between(curves["t_s"], low, high, color=colour, alpha=0.2, lw=0)
         share = 100.0 * row["as_expected"]["mean"]
-        view.set_title(f"{row['name']}: {case.title}, {share:.0f} % as expected")
+        view.set_title(f"{row['name']}: {case.title} ({share:.0f} %)")
         view.legend(loc="lower right")
     for view in axes[-1]:
         view.set_xlabel("time [s]")
