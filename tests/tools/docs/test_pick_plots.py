@@ -17,14 +17,14 @@ def test_each_case_shows_the_values_of_both_goals_over_time() -> None:
         curves = result["curves"][row["name"]]
         medians = {tuple(line.get_ydata()) for line in view.lines}
         assert medians == {tuple(np.array(one)[:, 1]) for one in curves["values"].values()}
-        assert row["name"] in view.get_title(loc="left")
+        assert row["name"] in view.get_title()
         assert "(expected)" in str([text.get_text() for text in view.get_legend().get_texts()])
 
 
 def test_the_reliability_diagram_shows_every_bin() -> None:
     result = stored("risk-calibration")
     for view, row in zip(reliability(result).axes, result["results"], strict=False):
-        assert view.get_title(loc="left") == row["name"]
+        assert view.get_title() == row["name"]
         success = view.lines[0]
         rates = [100.0 * one["rate"] for one in row["success"]["bins"]]
         np.testing.assert_allclose(success.get_ydata(), rates)
