@@ -87,6 +87,7 @@ def a_view(
         move=move,
         phase="approach",
         decided_by="policy",
+        order="critic",
         duplicates=(),
         ranked=(move,),
         moves_to_go=4,

@@ -154,6 +154,7 @@ def test_nearest_person_is_named_and_distances_are_those_of_each_alone(
 
 
 def test_contact_names_the_person_who_was_touched(world: LivePickWorld) -> None:
+    world.apply(commands.SetSafety(on=False))
     world.apply(commands.AddPerson())
     world.apply(commands.MovePerson(person=0, pelvis=(-0.6, 2.4, -1.57)))
     world.apply(commands.SetCandidates(ids=("cube2",)))

@@ -98,6 +98,7 @@ def test_gizmos_are_seen_in_manual_mode_only_and_sit_on_the_hands(
 def test_contact_shows_what_touched_in_red(
     scene: CellScene, server: viser.ViserServer, world: LivePickWorld, cell: Cell
 ) -> None:
+    world.apply(commands.SetSafety(on=False))
     world.apply(commands.SetCandidates(ids=("cube2",)))
     world.apply(commands.MovePerson(pelvis=(0.0, 1.15, -1.57), right=(-0.1, 0.62, 0.2)))
     for _ in range(300):
