@@ -279,7 +279,8 @@ class SafetyLayer:
     ) -> tuple[int, SeparationTerms] | None:
         """Return the person to which S_p refers, and its terms, right after :meth:`decide`.
 
-        The person is the cause of the override, else the nearest one; None without people.
+        The person is the cause of the override, else the nearest one; the terms are those of
+        the part nearest to the robot. None without people.
 
         Args:
             decision: Last decision.
@@ -293,6 +294,9 @@ class SafetyLayer:
         column = int(self._space.cause[watch_kernel.CAUSE_PART])
         if decision.person is None:
             column = int(np.argmin(gap))
+        elif column < self._shape[0]:
+            first = column - column % body.N_CAPSULES
+            column = first + int(np.argmin(gap[first : first + body.N_CAPSULES]))
         terms = self._terms_of(column, qd, people, decision.stop_time, age)
         return self._person_of(column)[0], terms
 

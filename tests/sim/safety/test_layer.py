@@ -337,6 +337,20 @@ def test_terms_are_for_who_set_it_and_else_for_the_nearest():
     assert layer.terms(alone, PAN, no_people()) is None
 
 
+def test_terms_name_the_nearest_part_of_the_person_and_not_the_first_that_is_too_near():
+    layer = SafetyLayer(ARM, SafetySettings())
+    distances = np.linspace(0.4, 0.1, body.N_CAPSULES)
+    tip, offset, _ = tool()
+    centers = tip + distances[:, None] * offset
+    ends = np.repeat(centers[:, None], 2, axis=1)
+    people = capsule_shapes(ends, np.full(body.N_CAPSULES, 0.05))
+    decision = layer.decide(REST, PAN, NONE, NONE, people)
+    assert (decision.override, decision.person) == (0.0, 0)
+    _, terms = layer.terms(decision, PAN, people)
+    assert terms.separation == pytest.approx(layer._space.gap[0].min())
+    assert terms.separation < 0.1
+
+
 def test_scaled_motion_written_out_in_time_is_the_motion():
     rng = np.random.default_rng(5)
     layer = SafetyLayer(ARM, SafetySettings())
