@@ -67,9 +67,8 @@ VIEWS = {
     "phase": (FEATURES, N_WITH_PHASE),
     "two-people": (FEATURES, N_PICK),
 }
-"""Contents and lengths of observations: the raw state of (5.8); the raw state and features;
-those and the person's body dimensions; those and the phase of a pick; that and a second
-person."""
+"""Contents and lengths of observations: the raw state of (5.8); that and features; those and
+the person's body dimensions; features and the phase of a pick; that and a second person."""
 DEFAULT_WEIGHTS = RewardWeights(
     c_d=0.5, c_th=0.5, c_c=1.0, c_step=0.02, c_v=1.0, d_v=0.1, c_s=1.0, gamma=1.0
 )
