@@ -5,6 +5,7 @@ starts the supervisor, compiles the kernels on a thread and then starts the live
 applications may exist in one process.
 """
 
+import gc
 import logging
 import threading
 from collections.abc import AsyncIterator, Mapping
@@ -132,6 +133,7 @@ class Service:
             self.parts.worlds.clear()
         self.parts.supervisor.stop()
         self.parts.store.close()
+        gc.unfreeze()
 
     def _start_cell(self) -> None:
         """Compile the kernels and start the live cell; update ``readiness``."""
@@ -151,6 +153,9 @@ class Service:
                 return
             cell.start()
             self.parts.worlds[WORLD_ID] = cell
+            # A full collection of all that was imported stops the server for half a second.
+            gc.collect()
+            gc.freeze()
             readiness.ready, readiness.reason = True, "ready"
             logger.info("ready: %s decides in the live cell", policy.title)
             self._look_for_damage()

@@ -30,6 +30,7 @@ HEADERS = {  # defaults
     "Content-Security-Policy": PAGE_POLICY,
     "Cache-Control": "no-cache",
 }
+_RAW = tuple((name.lower().encode(), value.encode()) for name, value in HEADERS.items())
 
 
 class Answers:
@@ -68,11 +69,11 @@ class Answers:
             nonlocal started
             if message["type"] == "http.response.start":
                 started = True
-                headers = MutableHeaders(scope=message)
-                for name, value in HEADERS.items():
-                    headers.setdefault(name, value)
-                if headers.get("location", "").startswith("/"):
-                    headers["Location"] = root_path + headers["location"]
+                headers = message["headers"] = list(message["headers"])
+                given = {name.lower() for name, _ in headers}
+                headers += [pair for pair in _RAW if pair[0] not in given]
+                if b"location" in given:
+                    _below_root_path(message, root_path)
             await send(message)
 
         try:
@@ -84,3 +85,9 @@ class Answers:
                 raise
             detail = "an unexpected error; the server's log has the trace"
             await problem(500, detail, instance=path)(scope, receive, send_complete)
+
+
+def _below_root_path(message: Message, root_path: str) -> None:
+    headers = MutableHeaders(scope=message)
+    if headers["location"].startswith("/"):
+        headers["Location"] = root_path + headers["location"]

@@ -42,6 +42,12 @@ def session_value(token: str) -> str:
     return hmac.new(token.encode(), b"tandem session", hashlib.sha256).hexdigest()
 
 
+@lru_cache(maxsize=64)
+def is_loopback(host: str) -> bool:
+    """Whether the header ``Host`` always means this machine."""
+    return is_loopback_name(_hostname(host))
+
+
 def is_loopback_name(host: str | None) -> bool:
     """Whether a host name, without its port, always means this machine."""
     if host == "localhost":
@@ -94,7 +100,7 @@ class Guard:
     ) -> tuple[int, str, str, dict[str, object]] | None:
         """Return status, kind, detail and data of a refusal, or None."""
         host = headers.get("host", "")
-        if self.token is None and not is_loopback_name(_hostname(host)):
+        if self.token is None and not is_loopback(host):
             rule = "must be a loopback name: this server is open to this machine only"
             return _refusal(421, "wrong-host", "Host", host, rule)
         origin = headers.get("origin")

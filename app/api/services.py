@@ -157,4 +157,8 @@ def services_of(connection: HTTPConnection) -> Services:
     return services
 
 
-ServicesDep = Annotated[Services, Depends(services_of)]
+async def _services(connection: HTTPConnection) -> Services:
+    return services_of(connection)  # FastAPI runs a plain function on a thread
+
+
+ServicesDep = Annotated[Services, Depends(_services)]

@@ -5,13 +5,15 @@ threads (HTTP routes, viser's callbacks) queue commands and read the last snapsh
 
 Simulated time follows the wall clock. After a stall the loop catches up by at most
 ``MAX_BEHIND_S``, so that a busy machine slows the cell down without jumps. At higher speeds
-several steps are drawn as one frame.
+several steps are drawn as one frame. Without a viewer nothing is drawn.
 """
 
 import logging
 import threading
 import time
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import rich
@@ -23,7 +25,7 @@ from app.live.factory import new_world
 from app.live.pick.risk_worker import RiskWorker
 from app.live.pick.world import LivePickWorld
 from app.live.reach.interfaces import LiveReachPolicy
-from app.live.snapshot import RefusedCommand
+from app.live.snapshot import RefusedCommand, WorldSnapshot
 from app.live.world_handle import WorldHandle
 from app.sim.cells.cell import Cell
 from app.sim.pick.task_policy import RiskMap, TaskPolicy
@@ -98,8 +100,9 @@ class LiveCell:
         views = ViewSettings(self._server, self._cell)
         scene = CellScene(self._server, self._cell, self.handle.submit)
         scene.draw(self.handle.snapshot(), 0.0)
+        draw = partial(self._draw, self._server, scene, views)
         self._thread = threading.Thread(
-            target=self._run, args=(scene, views), name=f"world-{self.handle.id}", daemon=True
+            target=self._run, args=(draw,), name=f"world-{self.handle.id}", daemon=True
         )
         self._thread.start()
 
@@ -114,18 +117,18 @@ class LiveCell:
             self._server.stop()
             self._server = None
 
-    def _run(self, scene: CellScene, views: ViewSettings) -> None:
+    def _run(self, draw: Callable[[WorldSnapshot], None]) -> None:
         dt = self._cell.robot.dt
         due = time.monotonic() + dt
         while not self._stop.wait(max(due - time.monotonic(), 0.0)):
             try:
-                self._tick(scene, views, dt)
+                self._tick(draw, dt)
             except Exception:
                 logger.exception("the live cell failed at tick %d", self.handle.snapshot().tick)
                 self._stop.wait(ERROR_PAUSE_S)
             due = max(due + dt, time.monotonic() - MAX_BEHIND_S)
 
-    def _tick(self, scene: CellScene, views: ViewSettings, dt: float) -> None:
+    def _tick(self, draw: Callable[[WorldSnapshot], None], dt: float) -> None:
         for command in self.handle.drain():
             self._done += 1
             try:
@@ -145,9 +148,24 @@ class LiveCell:
         self._ticks += 1
         self._undrawn_s += dt * self._speed
         if self._ticks % max(1, round(FRAME_S / dt)) == 0:
-            shapes, risk = views.is_seen(COLLISION_SHAPES), self._risk_map(views)
-            scene.draw(snapshot, self._undrawn_s, shapes=shapes, risk=risk)
-            self._undrawn_s = 0.0
+            draw(snapshot)
+
+    def _draw(
+        self,
+        server: ViewerServer,
+        scene: CellScene,
+        views: ViewSettings,
+        snapshot: WorldSnapshot,
+    ) -> None:
+        """Draw a snapshot, where a viewer is there to see it."""
+        if not server.has_viewers:
+            server.is_current.clear()
+            scene.note(snapshot)
+            return
+        shapes, risk = views.is_seen(COLLISION_SHAPES), self._risk_map(views)
+        scene.draw(snapshot, self._undrawn_s, shapes=shapes, risk=risk)
+        self._undrawn_s = 0.0
+        server.is_current.set()
 
     def _risk_map(self, views: ViewSettings) -> RiskMap | None:
         """Return the newest risk map; None where nobody looks at it."""

@@ -11,6 +11,7 @@ looks up while it starts, is replaced for the time of its constructor; calls for
 pass through. The message that asks for a public tunnel has no handler.
 """
 
+import asyncio
 import shutil
 import socket
 import tempfile
@@ -22,9 +23,12 @@ from typing import Any
 
 import viser
 import viser._messages
+import viser.infra
 import websockets.asyncio.server
 
 _starting = threading.Lock()
+CURRENT_S = 2.0
+"""Longest time for which a connecting viewer waits for the present scene [s]."""
 
 
 class ViewerServer(viser.ViserServer):
@@ -43,8 +47,22 @@ class ViewerServer(viser.ViserServer):
         except BaseException:
             shutil.rmtree(self.address.parent)
             raise
+        self.is_current = threading.Event()
+        """Whether the scene is the present one; a connecting viewer waits until it is."""
+        self.is_current.set()
+        self._websock_server.on_client_connect(self._wait_until_current)
         for request in (viser._messages.ShareUrlRequest, viser._messages.ShareUrlDisconnect):
             self._websock_server.unregister_handler(request)
+
+    @property
+    def has_viewers(self) -> bool:
+        """Whether a viewer is connected or about to be."""
+        return bool(self._websock_server._client_state_from_id)
+
+    async def _wait_until_current(self, _: viser.infra.WebsockClientConnection) -> None:
+        """Delay the first message to a viewer until the scene is the present one."""
+        if not self.is_current.is_set():
+            await asyncio.to_thread(self.is_current.wait, CURRENT_S)
 
     def request_share_url(self, verbose: bool = True) -> str | None:
         """Refuse: a public tunnel would pass the service's checks by."""

@@ -10,9 +10,10 @@ Source: docs/method.md 2.1 and 2.3 (``shared-workspace``), 3.2 (``pick-and-place
 
 import hashlib
 import json
-from functools import cache
+from collections.abc import Mapping
+from functools import cache, cached_property
 from importlib import resources
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from pydantic import Field, ValidationError
@@ -118,11 +119,19 @@ class Cell(CellData):
         """Return the cell as JSON data, without fields that are not set."""
         return self.model_dump(mode="json", exclude_none=True)
 
-    @property
+    @cached_property
     def sha256(self) -> str:
         """SHA-256 of the content, 64 hexadecimal digits."""
         text = json.dumps(self.model_dump(mode="json"), sort_keys=True, separators=(",", ":"))
         return hashlib.sha256(text.encode()).hexdigest()
+
+    def model_copy(
+        self, *, update: Mapping[str, Any] | None = None, deep: bool = False
+    ) -> Self:
+        """Return a copy, as pydantic does; a changed copy has its own SHA-256."""
+        copied = super().model_copy(update=update, deep=deep)
+        copied.__dict__.pop("sha256", None)  # copied with the fields
+        return copied
 
 
 def require_cell(cell: Cell, name: str, sha256: str) -> None:
@@ -170,6 +179,7 @@ def lacks_for_reach(cell: Cell) -> str | None:
     return "needs a goal_region" if cell.goal_region is None else None
 
 
+@cache
 def cell_names() -> tuple[str, ...]:
     """Return the names of the shipped cells."""
     folder = resources.files("app.sim.cells") / "data"

@@ -128,6 +128,14 @@ def test_any_change_is_another_cell() -> None:
     assert cell.model_copy(update={"robot": slower}).sha256 != cell.sha256
 
 
+def test_identity_of_a_cell_is_no_part_of_its_data() -> None:
+    cell = load_cell()
+    fresh, identity = parse_definition(cell.definition()), cell.sha256
+    assert "sha256" not in cell.model_dump()
+    assert cell == fresh and fresh.sha256 == identity
+    assert cell.model_copy(deep=True).sha256 == identity
+
+
 def test_cell_without_a_worker_says_so() -> None:
     with pytest.raises(NotFound, match="no worker in the cell 'shared-workspace'"):
         _ = load_cell("shared-workspace").human

@@ -140,6 +140,27 @@ def test_drag_of_a_hand_moves_the_person(live: LiveCell) -> None:
         wait_for(lambda: away() < 0.03)
 
 
+def test_nothing_is_drawn_without_a_viewer_but_the_first_one_sees_the_present() -> None:
+    live = LiveCell(load_cell(), None)
+    live.start()
+    server = live._server
+    assert server is not None
+    wait_for(lambda: not server.is_current.is_set())
+    drawn = server._websock_server.get_message_buffer().message_counter
+    live.handle.submit(commands.AddPerson())
+    wait_for(lambda: len(live.handle.snapshot().people) == 2)
+    tick = live.handle.snapshot().tick
+    wait_for(lambda: live.handle.snapshot().tick >= tick + 10)
+    assert server._websock_server.get_message_buffer().message_counter == drawn
+    with ViewerClient(live.viewer_address) as visitor:
+        wait_for(lambda: bool(visitor.heard("ReplayDoneMessage")))
+        types = [one["type"] for one in visitor.received]
+        at_first = visitor.received[: types.index("ReplayDoneMessage")]
+        assert "/gizmos/1" in {one.get("name") for one in at_first}
+    wait_for(lambda: not server.has_viewers)
+    live.stop()
+
+
 def test_stop_ends_thread_and_viewer() -> None:
     cell = load_cell()
     live = LiveCell(cell, None)

@@ -50,6 +50,11 @@ class CellScene:
             self._risk = RiskView(server) if picks else None
             self._path = Arc(server, "/path/arc", lift=PATH_LIFT)
 
+    def note(self, snapshot: WorldSnapshot) -> None:
+        """Remember a snapshot that no viewer is there to see, for the trail of the tool."""
+        if self._reach is not None:
+            self._reach.note(snapshot)
+
     def draw(
         self,
         snapshot: WorldSnapshot,

@@ -73,6 +73,11 @@ class ReachScene:
         self._trail = _Trail(server)
         self._path = Arc(server, "/path", lift=0.05)
 
+    def note(self, snapshot: WorldSnapshot) -> None:
+        """Remember a snapshot for the trail without drawing."""
+        if snapshot.reach is not None:
+            self._trail.note(snapshot)
+
     def draw(self, snapshot: WorldSnapshot) -> None:
         """Show a snapshot; sends only what changed."""
         view = snapshot.reach

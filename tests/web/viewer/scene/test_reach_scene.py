@@ -152,6 +152,18 @@ def test_zone_is_hidden_without_people(
     assert not node(server, "/zone/area").visible
 
 
+def test_trail_holds_what_was_noted_without_drawing(
+    scene: CellScene, server: viser.ViserServer, world: LiveReachWorld
+) -> None:
+    for _ in range(40):
+        world.step()
+        scene.note(world.snapshot())
+    scene.draw(world.snapshot(), 0.8)
+    trail = node(server, "/trail/lines")
+    steps = np.linalg.norm(np.diff(trail.points[-5:, 1], axis=0), axis=1)
+    assert np.all((steps > 3e-3) & (steps < 0.1))
+
+
 def test_trail_follows_the_tool(
     scene: CellScene, server: viser.ViserServer, world: LiveReachWorld
 ) -> None:
