@@ -136,7 +136,9 @@ def open_page(browser: Browser, server: str) -> Iterator[OpenPage]:
         problems: list[str] = []
         page.problems = problems  # type: ignore[attr-defined]
         page.on("console", lambda message: problems.extend(complaint(message)))
-        page.on("pageerror", lambda error: problems.append(f"page error: {error}"))
+        page.on(
+            "pageerror", lambda error: problems.append(f"page error: {error.stack or error}")
+        )
         page.on("requestfailed", lambda request: problems.extend(lost(request)))
         if not scene:
             page.route(

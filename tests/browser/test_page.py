@@ -39,6 +39,38 @@ def test_page_shows_what_the_world_says(open_page: Callable[..., Page], server: 
     expect(page.locator(".story .chip")).not_to_have_text("Paused")
 
 
+def test_value_plot_draws_while_its_data_is_older_than_the_history(
+    open_page: Callable[..., Page],
+) -> None:
+    page = open_page(scene=False)
+    names = page.evaluate(
+        """async () => {
+          const { drawValues } = await import("/static/live/value-plot.js");
+          const { History } = await import("/static/live/history.js");
+          const { themeColours } = await import("/static/palette.js");
+          const at = (t_s, chosen) => ({
+            t_s, decided_s: t_s, chosen, candidates: [{ id: chosen, value: 1 }],
+          });
+          const history = new History();
+          for (const t of [0, 0.05, 0.1]) history.add(at(t, "first"));
+          const named = [];
+          const labelOf = (id) => named.push(id) && id;
+          const live = { history, colourOf: () => "#000", labelOf };
+          const box = document.body.appendChild(document.createElement("div"));
+          const series = [{}, { label: "first", paths: () => null }];
+          const scales = { x: { time: false } };
+          const plot = new uPlot({ width: 300, height: 100, series, scales },
+            history.columns(["first"]), box);
+          await new Promise(requestAnimationFrame);
+          history.samples.pop();
+          history.add(at(0.15, "second"));
+          drawValues(plot, live, themeColours());
+          return named;
+        }"""
+    )
+    assert names == ["first"]
+
+
 def test_goal_chips_change_the_candidates_of_the_world(
     open_page: Callable[..., Page], server: str
 ) -> None:

@@ -60,7 +60,7 @@ export function secondsAgo(v) {
 export function ValuePlot({ history, ids, labelOf, colourOf, chosen, onHover }) {
   const theme = useTheme();
   const live = useRef({});
-  live.current = { history, ids, labelOf, colourOf, onHover };
+  live.current = { history, labelOf, colourOf, onHover };
   const key = ids.join("|");
   const stamp = history.samples.at(-1)?.t;
   const options = useMemo(() => valueOptions(theme, ids, live), [key, theme]);

@@ -6,12 +6,16 @@ const LABEL_GAP = 13;
 const THIN = 1.6;
 const THICK = 3.4;
 
-/** Draw hook of uPlot. */
-export function drawValues(plot, { history, ids, labelOf, colourOf }, theme) {
+/**
+ * Draw hook of uPlot. The history may be newer than the plot's data, so the ids are those of the
+ * plot's series, and what is chosen may have no column yet.
+ */
+export function drawValues(plot, { history, labelOf, colourOf }, theme) {
   const { ctx, bbox } = plot;
   const dpr = devicePixelRatio;
+  const ids = plot.series.slice(1).map((one) => one.label);
   const chosen = history.chosen();
-  const switches = history.switches();
+  const switches = history.switches().filter(({ i }) => ids.includes(chosen[i]));
   const [x, ...columns] = plot.data;
   if (x.length !== chosen.length) return;
   const at = (i, column) => [plot.valToPos(x[i], "x", true), plot.valToPos(column[i], "y", true)];
