@@ -10,6 +10,7 @@
     │   ├── ClockJump        a frame's stamp does not continue those before
     │   └── StaleAttempt     a worker no longer holds its job
     ├── StorageUnavailable   the database does not answer for now
+    │   └── StorageDamaged   its file has damaged pages: the remedy is a backup
     ├── StorageFull          the database or the disk is full
     ├── Damaged              stored data with a wrong digest: kind, name, remedy
     ├── NotReady             the service cannot answer yet, or not now
@@ -307,10 +308,27 @@ class StorageUnavailable(ServiceError):
     def __init__(self, database: str, reason: str) -> None:
         super().__init__(f"{database} cannot be used for now: {reason}")
         self.database, self.reason = database, reason
+        self.short = "database locked" if "locked" in reason else "database unavailable"
+        """The reason in two words, for the state of the queue."""
+        if "disk I/O" in reason:
+            self.short = "disk error"
 
     def problem(self) -> dict[str, object]:
         """Return the database and the reason."""
         return {"database": self.database, "reason": self.reason}
+
+
+class StorageDamaged(StorageUnavailable):
+    """The file of the database is damaged, or is no database."""
+
+    def __init__(self, database: str, reason: str) -> None:
+        super().__init__(database, reason)
+        self.message = (
+            f"{database} is damaged or no database ({reason}): stop the server and restore a "
+            "backup with 'python -m app restore FILE', which keeps the damaged file beside it"
+        )
+        self.args = (self.message,)
+        self.short = "database damaged"
 
 
 class StorageFull(ServiceError):
@@ -319,6 +337,9 @@ class StorageFull(ServiceError):
     Args:
         database: Its URL without password.
     """
+
+    short = "disk full"
+    """The reason in two words, for the state of the queue."""
 
     def __init__(self, database: str) -> None:
         super().__init__(

@@ -9,6 +9,7 @@ recording_catalog  Stored recordings by name: files in, runs of the 18-DoF human
 recording_format   The stored form of a recording
 run                Entry point of a job's process: ``python -m jobs.run --job ID --attempt N``
 spec               Job specs: the body of ``POST /v1/jobs``, stored unchanged with the job
+start              Start of a child process: the parent-death signal, before heavy imports
 supervisor         The supervisor: a thread of the server that starts, monitors and stops
                    workers
 worker             The worker of a job: one attempt in one process

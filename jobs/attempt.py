@@ -13,11 +13,11 @@ import time
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from app.errors import InvalidInput, ServiceError
+from app.errors import InvalidInput, ServiceError, StorageFull, StorageUnavailable
 from app.store.engine import Store
 from app.store.records import Claim
 from app.store.schema import check_schema
-from jobs.worker import JobWorker, Runner, die_with_parent
+from jobs.worker import JobWorker, Runner
 
 logger = logging.getLogger(__name__)
 
@@ -38,15 +38,13 @@ def main(
         arguments: Command line; that of the process by default.
 
     Returns:
-        The exit status: 0 when the job's row contains the result.
+        The exit status: 0 when the job's row contains the result, ``EX_TEMPFAIL`` where the
+        database takes no writes.
     """
     parser = argparse.ArgumentParser(description="Run one attempt of a job.")
     parser.add_argument("--job", required=True, help="id of the job")
     parser.add_argument("--attempt", required=True, type=int, help="claimed attempt")
-    parser.add_argument("--parent", type=int, help="server process that ends this one")
     options = parser.parse_args(arguments)
-    if options.parent is not None:
-        die_with_parent(options.parent)
     os.nice(NICENESS)
     faulthandler.enable()
     _set_up_logging(options.job, options.attempt)
@@ -54,6 +52,9 @@ def main(
         store = Store(database_url)
         check_schema(store)
         worker = JobWorker(store, Claim(job_id=options.job, attempt=options.attempt))
+    except (StorageFull, StorageUnavailable) as error:
+        logger.error("%s", error.message)
+        return os.EX_TEMPFAIL
     except ServiceError as error:
         logger.error("%s", error.message)
         return os.EX_CONFIG

@@ -1,22 +1,22 @@
 """Executors of attempts: the interface, and one local process per attempt.
 
-The child ends with its parent (``jobs.worker.die_with_parent``), so that a killed server leaves
+The child ends with its parent (``jobs.start``), so that a killed server leaves
 no training behind.
 """
 
 import os
 import signal
 import subprocess
-import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
 from app.store.records import Claim
+from jobs.start import child_command
 
 PROJECT_ROOT = Path(__file__).resolve().parent.parent
-"""Working folder of ``python -m jobs.run``."""
+"""Working folder of child processes."""
 TAIL_BYTES = 4000
 """Length of the end of a worker's output in an error [bytes]."""
 
@@ -81,16 +81,16 @@ class LocalProcess:
     Args:
         database_url: The database, for the child.
         data_dir: The data folder; output of job ``ID`` goes to ``logs/ID.log`` in it.
-        command: Command of a worker, before its arguments.
+        module: Module of a worker, which takes ``--job`` and ``--attempt``.
     """
 
     def __init__(
         self,
         database_url: str,
         data_dir: Path,
-        command: Sequence[str] = (sys.executable, "-m", "jobs.run"),
+        module: str = "jobs.run",
     ) -> None:
-        self._command = tuple(command)
+        self._module = module
         self._logs = data_dir.absolute() / "logs"
         self._environment = {
             **os.environ,
@@ -108,10 +108,10 @@ class LocalProcess:
         """Start a worker process for the attempt."""
         self._logs.mkdir(parents=True, exist_ok=True)
         log = self._logs / f"{claim.job_id}.log"
-        attempt = ("--attempt", str(claim.attempt), "--parent", str(os.getpid()))
+        attempt = ("--job", claim.job_id, "--attempt", str(claim.attempt))
         with log.open("ab") as output:
             process = subprocess.Popen(
-                (*self._command, "--job", claim.job_id, *attempt),
+                child_command(self._module, *attempt),
                 cwd=PROJECT_ROOT,
                 env=self._environment,
                 stdin=subprocess.DEVNULL,

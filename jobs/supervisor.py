@@ -1,10 +1,15 @@
 """The supervisor: a thread of the server that starts, monitors and stops workers.
 
 The database has the complete state: after a kill the next server acquires the lock, queues the
-orphaned jobs and continues.
+orphaned jobs and continues. While the disk is full or the database takes no writes, the queue
+waits: no job starts, none is counted as failed, and it goes on by itself.
 """
 
+import errno
 import logging
+import math
+import os
+import shutil
 import threading
 import time
 from collections.abc import Callable
@@ -13,7 +18,7 @@ from datetime import datetime
 from pathlib import Path
 
 from app.errors import NotFound, StaleAttempt, StorageFull, StorageUnavailable
-from app.store import attempts, completion
+from app.store import attempts, completion, reserve
 from app.store.engine import Store
 from app.store.lock import ServerLock
 from app.store.migrate import migrate
@@ -35,8 +40,17 @@ class Timeouts:
     """Time without a heartbeat until a worker is killed [s]."""
     shutdown_s: float = 8.0
     """Time for the workers' last checkpoints when the server stops [s]."""
+    lock_s: float = 30.0
+    """Time for the heartbeat of a silent worker once the database takes writes again [s]."""
+    retry_s: float = 5.0
+    """Time until the next start after a worker that could not write [s]."""
     max_failures: int = 3
     """A job fails with this number of crashes."""
+
+
+MIN_FREE_BYTES = 64 * 1024 * 1024
+"""Free space of the disk below which no job starts [bytes]."""
+DISK_FULL = "disk full"
 
 
 @dataclass(slots=True, kw_only=True)
@@ -46,6 +60,7 @@ class _Worker:
     handle: Handle
     heartbeat_at: datetime | None = None
     heartbeat_seen: float
+    writable_since: float | None = None
     leaving_since: float | None = None
     ended: Exit | None = None
 
@@ -59,6 +74,7 @@ class Supervisor:
         max_running: Largest number of running jobs.
         executor: Runs the attempts; local processes by default.
         timeouts: Timeouts.
+        min_free_bytes: Free space of the disk below which no job starts [bytes].
     """
 
     def __init__(
@@ -69,17 +85,22 @@ class Supervisor:
         max_running: int = 1,
         executor: Executor | None = None,
         timeouts: Timeouts | None = None,
+        min_free_bytes: int = MIN_FREE_BYTES,
     ) -> None:
         self._store = store
         self._lock = ServerLock(store, data_dir)
         self._max_running = max_running
         self._executor = executor or LocalProcess(store.url, data_dir)
         self._timeouts = timeouts or Timeouts()
+        self._data_dir = data_dir
+        self._min_free_bytes = min_free_bytes
         self._workers: dict[Claim, _Worker] = {}
+        self._orphans_queued = False
+        self._not_before = -math.inf
+        self._waiting: str | None = None
         self._wake = threading.Event()
         self._stopping = threading.Event()
         self._thread: threading.Thread | None = None
-        self._trouble: str | None = None
 
     def start(self) -> None:
         """Acquire the lock, upgrade the database, queue orphaned jobs, start the thread.
@@ -90,13 +111,13 @@ class Supervisor:
         self._lock.acquire()
         try:
             migrate(self._store)
-            orphans = completion.requeue_orphans(self._store)
-            self._fill_reserve()
         except BaseException:
             self._lock.release()
             raise
-        for job_id in orphans:
-            logger.info("job %s was interrupted with the last server: it resumes", job_id)
+        self._orphans_queued = False
+        self._guarded(
+            self._queue_orphans
+        )  # where this is impossible now, the thread repeats it
         self._stopping.clear()
         self._thread = threading.Thread(target=self._run, name="job-supervisor", daemon=True)
         self._thread.start()
@@ -115,6 +136,11 @@ class Supervisor:
         self._wake.set()
 
     @property
+    def waiting(self) -> str | None:
+        """Reason for which no job runs, such as ``"disk full"``; None where the queue runs."""
+        return self._waiting
+
+    @property
     def is_alive(self) -> bool:
         """Whether the thread runs."""
         return self._thread is not None and self._thread.is_alive()
@@ -127,23 +153,46 @@ class Supervisor:
         self._shut_down()
 
     def _tick(self) -> None:
+        if not self._orphans_queued:
+            self._queue_orphans()
         self._reap()
-        self._watch()
-        while len(self._workers) < self._max_running and self._start_next():
-            pass
+        waiting = self._watch() or self._lack_of_room()
+        if waiting is None and time.monotonic() >= self._not_before:
+            if self._waiting is not None:
+                self._store.check_writable()
+                self._fill_reserve()
+                logger.info("the queue goes on after: %s", self._waiting)
+            self._waiting = None
+            while len(self._workers) < self._max_running and self._start_next():
+                pass
+        elif waiting is not None:
+            self._wait_for(waiting, waiting)
 
     def _guarded(self, act: Callable[[], object]) -> None:
         """Log an error of the database once and try again at the next tick."""
         try:
             act()
-        except (StorageFull, StorageUnavailable, OSError) as error:
-            if self._trouble != str(error):
-                logger.error("the supervisor waits for the database: %s", error)
-            self._trouble = str(error)
+        except (StorageFull, StorageUnavailable) as error:
+            self._wait_for(error.short, error.message)
+        except OSError as error:
+            self._wait_for(DISK_FULL if _is_full(error) else "disk error", str(error))
         except Exception:
             logger.exception("unexpected error in the supervisor")
-        else:
-            self._trouble = None
+
+    def _wait_for(self, short: str, message: str) -> None:
+        if self._waiting != short:
+            logger.error("the queue waits: %s", message)
+        self._waiting = short
+
+    def _lack_of_room(self) -> str | None:
+        free = shutil.disk_usage(self._data_dir).free
+        return DISK_FULL if free < self._min_free_bytes else None
+
+    def _queue_orphans(self) -> None:
+        for job_id in completion.requeue_orphans(self._store):
+            logger.info("job %s was interrupted with the last server: it resumes", job_id)
+        self._orphans_queued = True
+        self._fill_reserve()
 
     def _start_next(self) -> bool:
         found = attempts.claim_next(self._store)
@@ -154,6 +203,9 @@ class Supervisor:
         try:
             handle = self._executor.start(claim)
         except OSError as error:
+            if _is_full(error):
+                self._give_back(claim)
+                raise
             reason = f"the worker could not be started: {error}"
             failures = self._timeouts.max_failures
             completion.crash(self._store, claim, reason, max_failures=failures)
@@ -171,6 +223,10 @@ class Supervisor:
     def _settle(self, claim: Claim, ended: Exit) -> None:
         """Record the end of an attempt, if its worker has not."""
         failures = self._timeouts.max_failures
+        if ended.code == os.EX_TEMPFAIL:  # the database took no writes
+            self._give_back(claim)
+            self._not_before = time.monotonic() + self._timeouts.retry_s
+            return
         try:
             job = completion.crash(self._store, claim, ended.reason, max_failures=failures)
         except StaleAttempt:
@@ -183,7 +239,8 @@ class Supervisor:
             ended.reason,
         )
 
-    def _watch(self) -> None:
+    def _watch(self) -> str | None:
+        """Stop cancelled and silent workers; return the reason of one that cannot write."""
         now = time.monotonic()
         rows = {job.claim: job for job in attempts.running_jobs(self._store)}
         for claim, worker in self._workers.items():
@@ -200,12 +257,19 @@ class Supervisor:
                 self._executor.stop(worker.handle, force=True)
         for claim in rows.keys() - self._workers.keys():  # claimed, but never started
             self._give_back(claim)
+        return next((row.waiting for row in rows.values() if row.waiting), None)
 
     def _timed_out(self, worker: _Worker, now: float) -> bool:
         leaving = worker.leaving_since
         if leaving is not None and now - leaving > self._timeouts.cancel_s:
             return True
-        return now - worker.heartbeat_seen > self._timeouts.silence_s
+        if now - worker.heartbeat_seen <= self._timeouts.silence_s:
+            worker.writable_since = None
+            return False
+        if worker.writable_since is None:  # no heartbeat reaches a database without writes
+            self._store.check_writable()
+            worker.writable_since = time.monotonic()
+        return now - worker.writable_since > self._timeouts.lock_s
 
     def _shut_down(self) -> None:
         deadline = time.monotonic() + self._timeouts.shutdown_s
@@ -232,6 +296,10 @@ class Supervisor:
 
     def _fill_reserve(self) -> None:
         try:
-            completion.fill_reserve(self._store)
+            reserve.fill_reserve(self._store)
         except StorageFull as error:
             logger.error("%s", error)
+
+
+def _is_full(error: OSError) -> bool:
+    return error.errno in (errno.ENOSPC, errno.EDQUOT)

@@ -1,22 +1,27 @@
 """The worker of a job: one attempt in one process.
 
 A thread reads the job's row twice a second: it stops the runner after a cancel and writes
-heartbeats.
+heartbeats. While the database takes no writes (a full disk, a lock), the runner waits in the
+write: no step is lost, and the job goes on by itself.
 """
 
-import ctypes
 import logging
 import os
 import signal
-import sys
 import threading
 import time
 from collections.abc import Callable, Mapping
 from types import FrameType
 from typing import Any
 
-from app.errors import ServiceError, StaleAttempt, StorageFull, StorageUnavailable
-from app.store import attempts, completion, fencing
+from app.errors import (
+    ServiceError,
+    StaleAttempt,
+    StorageDamaged,
+    StorageFull,
+    StorageUnavailable,
+)
+from app.store import attempts, completion, fencing, metrics
 from app.store.engine import Store
 from app.store.jobs import get_job
 from app.store.records import Claim, JobRecord, NewCheckpoint, ResumeState
@@ -27,8 +32,10 @@ CANCEL_CHECK_S = 0.5
 """Period of the check for a cancel [s]."""
 HEARTBEAT_S = 5.0
 """Period of the heartbeats [s]."""
-
-_PR_SET_PDEATHSIG = 1
+RETRY_S = 1.0
+"""Time from a failed write to its repetition [s]."""
+POLL_S = 0.1
+"""Period of the check for a stop while a write waits [s]."""
 
 Runner = Callable[["JobWorker"], Mapping[str, Any] | None]
 """Runs one kind of job and returns its result."""
@@ -55,6 +62,7 @@ class JobWorker:
         self._interrupted = threading.Event()
         self._lost = threading.Event()
         self._stop_seen = False
+        self._waiting: str | None = None
 
     def resume(self) -> ResumeState | None:
         """Return the state to resume from; None for a new start."""
@@ -63,24 +71,34 @@ class JobWorker:
     def record_progress(
         self, step: int, values: Mapping[str, float | None], *, total_steps: int | None = None
     ) -> None:
-        """Add a point to the job's curve.
+        """Add a point to the job's curve; waits until the database takes it.
 
         Raises:
             StaleAttempt: The attempt no longer holds the job.
-            StorageFull: No room is left.
+            StorageFull: No room is left, and the runner must stop.
         """
-        attempts.record_progress(self.store, self._claim, step, values, total_steps=total_steps)
+
+        def write() -> None:
+            if self._waiting is not None and self._has_point(step):
+                return  # the commit before was reported as failed, and took place
+            attempts.record_progress(
+                self.store, self._claim, step, values, total_steps=total_steps
+            )
+
+        self._wait_to(write)
 
     def record_checkpoint(
         self, step: int, policy: NewCheckpoint, resume: ResumeState | None
     ) -> None:
-        """Store a policy and the state to resume from.
+        """Store a policy and the state to resume from; waits until the database takes them.
 
         Raises:
             StaleAttempt: The attempt no longer holds the job.
-            StorageFull: No room is left.
+            StorageFull: No room is left, and the runner must stop.
         """
-        attempts.record_checkpoint(self.store, self._claim, step, policy, resume)
+        self._wait_to(
+            lambda: attempts.record_checkpoint(self.store, self._claim, step, policy, resume)
+        )
 
     def should_stop(self) -> bool:
         """Whether the runner must write a last checkpoint and return; for every step."""
@@ -100,7 +118,8 @@ class JobWorker:
         """Run the job and record its end.
 
         Returns:
-            The process's exit status: 0 when the job's row contains the end.
+            The process's exit status: 0 when the job's row contains the end, ``EX_TEMPFAIL``
+            where the database takes no writes, so that the job is queued again.
         """
         beat = threading.Thread(target=self._beat, name="beat", daemon=True)
         beat.start()
@@ -109,14 +128,18 @@ class JobWorker:
             self._settle(result)
         except StaleAttempt as error:
             logger.warning("%s", error)
-        except StorageUnavailable:
-            raise  # the supervisor starts another attempt
+        except (StorageFull, StorageUnavailable) as error:
+            logger.error("stopped: %s", error.message)
+            return os.EX_TEMPFAIL
         except ServiceError as error:
             logger.error("the job fails: %s", error.message)
             return self._fail(error.message)
         return 0
 
     def _settle(self, result: Mapping[str, Any] | None) -> None:
+        self._wait_to(lambda: self._record_end(result))
+
+    def _record_end(self, result: Mapping[str, Any] | None) -> None:
         cancelled = fencing.peek(self.store, self._claim).cancel_requested
         if self._stop_seen and cancelled:
             completion.finish(self.store, self._claim, state="cancelled", result=result)
@@ -134,17 +157,45 @@ class JobWorker:
         except StaleAttempt as error:
             logger.warning("%s", error)
         except (StorageFull, StorageUnavailable) as error:
-            logger.error("%s", error.message)  # the supervisor reads it from the log's tail
-            return os.EX_IOERR
+            logger.error("%s", error.message)
+            return os.EX_TEMPFAIL
         return 0
+
+    def _has_point(self, step: int) -> bool:
+        rows = metrics.list_metrics(self.store, self._claim.job_id, after_step=step - 1)
+        return any(row.step == step for row in rows)
+
+    def _wait_to(self, write: Callable[[], None]) -> None:
+        """Write; where the database takes no writes, repeat it until the runner must stop."""
+        while True:
+            try:
+                write()
+            except StorageDamaged:
+                raise
+            except (StorageFull, StorageUnavailable) as error:
+                if self.should_stop():
+                    raise
+                if self._waiting != error.short:
+                    logger.warning("waits: %s", error.message)
+                self._waiting = error.short
+            else:
+                self._waiting = None
+                return
+            again = time.monotonic() + RETRY_S
+            while time.monotonic() < again and not self.should_stop():
+                time.sleep(POLL_S)
 
     def _beat(self) -> None:
         next_heartbeat = time.monotonic() + HEARTBEAT_S
+        recorded: str | None = None
         while not self._lost.wait(CANCEL_CHECK_S):
-            due = time.monotonic() >= next_heartbeat
+            waiting = self._waiting
+            due = time.monotonic() >= next_heartbeat or waiting != recorded
             try:
-                look = attempts.heartbeat if due else fencing.peek
-                job = look(self.store, self._claim)
+                if due:
+                    job = attempts.heartbeat(self.store, self._claim, waiting)
+                else:
+                    job = fencing.peek(self.store, self._claim)
             except StaleAttempt:
                 self._lost.set()
                 return
@@ -152,20 +203,6 @@ class JobWorker:
                 logger.warning("no heartbeat this time: %s", error)
                 continue
             if due:
-                next_heartbeat = time.monotonic() + HEARTBEAT_S
+                next_heartbeat, recorded = time.monotonic() + HEARTBEAT_S, waiting
             if job.cancel_requested:
                 self._cancelled.set()
-
-
-def die_with_parent(parent: int) -> None:
-    """Request the kernel to kill this process when the server ends.
-
-    Linux only; elsewhere fencing alone prevents writes of a left-over worker.
-
-    Args:
-        parent: Process id of the server.
-    """
-    if sys.platform == "linux":
-        ctypes.CDLL(None, use_errno=True).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
-    if os.getppid() != parent:  # it ended before the request
-        raise SystemExit(f"the server (process {parent}) is gone")

@@ -36,6 +36,7 @@ from app.errors import (
     NotReady,
     ServiceError,
     SimulationError,
+    StorageDamaged,
     StorageFull,
     StorageUnavailable,
 )
@@ -53,6 +54,7 @@ STATUS: tuple[tuple[type[ServiceError], int, str], ...] = (
     (NotReady, 503, "not-ready"),
     (MissingPackage, 501, "missing-package"),
     (StorageFull, 507, "storage-full"),
+    (StorageDamaged, 500, "storage-damaged"),
     (StorageUnavailable, 503, "storage-unavailable"),
     (SimulationError, 500, "simulation-error"),
 )

@@ -38,6 +38,8 @@ class RunningJob:
     """Whether a cancel was requested."""
     heartbeat_at: datetime | None
     """Last heartbeat of its worker."""
+    waiting: str | None
+    """Reason for which its worker cannot write."""
 
 
 def claim_next(store: Store) -> tuple[Claim, JobRecord] | None:
@@ -50,6 +52,9 @@ def claim_next(store: Store) -> tuple[Claim, JobRecord] | None:
         The claim and the job, or None if nothing is queued.
     """
     oldest = sa.select(jobs.c.id).where(jobs.c.state == "queued").order_by(jobs.c.number)
+    with store.reading() as connection:  # an empty queue needs no write lock
+        if connection.execute(oldest.limit(1)).scalar() is None:
+            return None
     with store.writing() as connection:
         job_id = connection.execute(oldest.limit(1).with_for_update(skip_locked=True)).scalar()
         if job_id is None:
@@ -63,20 +68,27 @@ def claim_next(store: Store) -> tuple[Claim, JobRecord] | None:
             "started_at": sa.func.coalesce(jobs.c.started_at, now),
             "heartbeat_at": now,
             "step": max(step, 0),
+            "waiting": None,
         }
         data = {"attempt": attempt, "resumed_from_step": max(step, 0)}
         change_state(connection, job_id, "running", changes, data)
         return Claim(job_id=job_id, attempt=attempt), read_job(connection, job_id)
 
 
-def heartbeat(store: Store, claim: Claim) -> JobRecord:
+def heartbeat(store: Store, claim: Claim, waiting: str | None = None) -> JobRecord:
     """Record a heartbeat and return the job, with ``cancel_requested``.
+
+    Args:
+        store: The database.
+        claim: The attempt that writes.
+        waiting: Reason for which its worker cannot write.
 
     Raises:
         StaleAttempt: The attempt no longer holds the job.
     """
+    changes = {"heartbeat_at": datetime.now(UTC), "waiting": waiting}
     with store.writing() as connection:
-        fenced_update(connection, claim, {"heartbeat_at": datetime.now(UTC)}, counts=False)
+        fenced_update(connection, claim, changes, counts=False)
         return read_job(connection, claim.job_id)
 
 
@@ -106,7 +118,7 @@ def record_progress(
         if value is not None and not math.isfinite(value):
             raise InvalidInput(name, value, "must be finite, or None where not defined")
     now = datetime.now(UTC)
-    changes: dict[str, Any] = {"heartbeat_at": now, "step": step}
+    changes: dict[str, Any] = {"heartbeat_at": now, "step": step, "waiting": None}
     if total_steps is not None:
         changes["total_steps"] = total_steps
     with store.writing() as connection:
@@ -147,7 +159,8 @@ def record_checkpoint(
         rule = f"bytes exceed the limit of {MAX_RESUME} bytes"
         raise InvalidInput("resume.tensors", len(resume.tensors), rule)
     with store.writing() as connection:
-        event_id = fenced_update(connection, claim, {"heartbeat_at": datetime.now(UTC)})
+        changes = {"heartbeat_at": datetime.now(UTC), "waiting": None}
+        event_id = fenced_update(connection, claim, changes)
         drop_job_checkpoints(connection, claim.job_id, beyond=step - 1)
         insert_checkpoint(connection, policy)
         link = {"job_id": claim.job_id, "step": step, "sha256": policy.sha256}
@@ -174,6 +187,7 @@ def running_jobs(store: Store) -> tuple[RunningJob, ...]:
             claim=Claim(job_id=job.id, attempt=job.attempt),
             cancel_requested=job.cancel_requested,
             heartbeat_at=job.heartbeat_at,
+            waiting=job.waiting,
         )
         for job in found
     )

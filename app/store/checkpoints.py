@@ -165,7 +165,7 @@ def insert_checkpoint(
         "tensors": new.tensors,
     }
     same = checkpoints.c.sha256 == new.sha256
-    query = sa.select(checkpoints.c.manifest, checkpoints.c.tensors).where(same)
+    query = sa.select(checkpoints).where(same)
     there = connection.execute(query).first()
     if there is None:
         values = {"sha256": new.sha256, "imported": imported, "created_at": datetime.now(UTC)}
@@ -174,7 +174,7 @@ def insert_checkpoint(
     if not has_digest(new.sha256, there.manifest, there.tensors):
         logger.warning("checkpoint %s was damaged: it is stored again", new.sha256)
         connection.execute(sa.update(checkpoints).where(same).values(content))
-    if imported:
+    if imported and not there.imported:
         connection.execute(sa.update(checkpoints).where(same).values(imported=True))
 
 

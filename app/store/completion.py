@@ -9,17 +9,17 @@ from typing import Any, Literal
 
 import sqlalchemy as sa
 
-from app.errors import StorageFull
 from app.store.engine import Store
 from app.store.fencing import change_state, fenced_update, peek
 from app.store.jobs import read_job
 from app.store.records import Claim, JobRecord
-from app.store.tables import jobs, reserve, resume_states
+from app.store.reserve import write_with_reserve
+from app.store.tables import jobs, resume_states
 
 MAX_ERROR = 4000
 """Longest error text of a job [characters]."""
-RESERVE_BYTES = 128 * 1024
-"""Space reserved for marking a job failed in a full database [bytes]."""
+MAX_KILLS = 30
+"""A job fails when its server was killed with it so many times."""
 
 
 def finish(
@@ -35,32 +35,29 @@ def finish(
         StaleAttempt: The attempt no longer holds the job.
         StorageFull: No room is left.
     """
-    with store.writing() as connection:
+    changes = {"result": None if result is None else dict(result)}
+
+    def end(connection: sa.Connection) -> None:
         _drop_resume(connection, claim)
-        changes = {"result": None if result is None else dict(result)}
         _end(connection, claim, state, changes)
+
+    write_with_reserve(store, end)
 
 
 def fail(store: Store, claim: Claim, error: str) -> None:
     """End a job with a permanent error.
 
-    On a full database the reserved space is freed; the supervisor reserves it again at its next
-    start.
-
     Raises:
         StaleAttempt: The attempt no longer holds the job.
-        StorageFull: The reserved space was not sufficient.
+        StorageFull: No room is left.
     """
     changes = {"error": error[-MAX_ERROR:]}
-    try:
-        with store.writing() as connection:
-            _drop_resume(connection, claim)
-            _end(connection, claim, "failed", changes)
-    except StorageFull:
-        with store.writing() as connection:
-            connection.execute(sa.delete(reserve))
-            _drop_resume(connection, claim)
-            _end(connection, claim, "failed", changes)
+
+    def end(connection: sa.Connection) -> None:
+        _drop_resume(connection, claim)
+        _end(connection, claim, "failed", changes)
+
+    write_with_reserve(store, end)
 
 
 def crash(store: Store, claim: Claim, error: str, *, max_failures: int) -> JobRecord:
@@ -81,10 +78,7 @@ def crash(store: Store, claim: Claim, error: str, *, max_failures: int) -> JobRe
     if failures >= max_failures:
         fail(store, claim, f"Failed after {failures} attempts. Last error: {error}")
     else:
-        with store.writing() as connection:
-            changes = {"failures": failures, "error": error[-MAX_ERROR:]}
-            fenced_update(connection, claim, {}, counts=False)
-            _requeue(connection, claim.job_id, changes)
+        _requeue_held(store, claim, {"failures": failures, "error": error[-MAX_ERROR:]})
     with store.reading() as connection:
         return read_job(connection, claim.job_id)
 
@@ -95,34 +89,31 @@ def give_back(store: Store, claim: Claim) -> None:
     Raises:
         StaleAttempt: The attempt no longer holds the job.
     """
-    with store.writing() as connection:
-        fenced_update(connection, claim, {}, counts=False)
-        _requeue(connection, claim.job_id, {})
+    _requeue_held(store, claim, {})
 
 
 def requeue_orphans(store: Store) -> tuple[str, ...]:
     """Queue the running jobs of an earlier server again; requires the server's lock.
 
-    The higher attempt number fences off a worker that still runs. Nothing is counted as a
-    failure. A job with a requested cancel is cancelled.
+    The higher attempt number fences off a worker that still runs. A kill is counted, and no
+    failure; the job fails with its kill number MAX_KILLS. A job with a requested cancel is
+    cancelled.
 
     Returns:
         The ids of these jobs.
+
+    Raises:
+        StorageFull: No room is left.
     """
     running = sa.select(jobs.c.id).where(jobs.c.state == "running").order_by(jobs.c.number)
-    with store.writing() as connection:
+
+    def requeue(connection: sa.Connection) -> tuple[str, ...]:
         orphans = connection.execute(running).scalars().all()
         for job_id in orphans:
-            _requeue(connection, job_id, {})
-    return tuple(orphans)
+            _requeue_killed(connection, job_id)
+        return tuple(orphans)
 
-
-def fill_reserve(store: Store) -> None:
-    """Reserve space, so that a job can be marked failed in a full database."""
-    with store.writing() as connection:
-        if connection.execute(sa.select(reserve.c.id)).first() is None:
-            filler = bytes(RESERVE_BYTES)
-            connection.execute(sa.insert(reserve).values(id=1, filler=filler))
+    return write_with_reserve(store, requeue)
 
 
 def _end(
@@ -134,12 +125,39 @@ def _end(
     if changes.get("error"):
         data["error"] = changes["error"]
     values = {"error": None, **changes, "finished_at": now, "heartbeat_at": now}
+    values["waiting"] = None
     change_state(connection, claim.job_id, state, values, data)
+
+
+def _requeue_killed(connection: sa.Connection, job_id: str) -> None:
+    job = read_job(connection, job_id)
+    kills = job.kills + 1
+    if kills < MAX_KILLS or job.cancel_requested:
+        _requeue(connection, job_id, {"kills": kills})
+        return
+    error = (
+        f"Killed {kills} times with the server, the limit; at step {job.step} of its attempt "
+        f"{job.attempt}. A job that exhausts the memory of the machine ends like this: the "
+        "log of the system names the reason"
+    )
+    _end(connection, Claim(job_id=job_id, attempt=job.attempt), "failed", {"error": error})
+    connection.execute(sa.update(jobs).where(jobs.c.id == job_id).values(kills=kills))
+
+
+def _requeue_held(store: Store, claim: Claim, changes: Mapping[str, Any]) -> None:
+    """Queue a job again, if the claim holds it."""
+
+    def requeue(connection: sa.Connection) -> None:
+        fenced_update(connection, claim, {}, counts=False)
+        _requeue(connection, claim.job_id, changes)
+
+    write_with_reserve(store, requeue)
 
 
 def _requeue(connection: sa.Connection, job_id: str, changes: Mapping[str, Any]) -> None:
     job = read_job(connection, job_id, for_update=True)
     data: dict[str, Any] = {"attempt": job.attempt}
+    changes = {**changes, "waiting": None}
     if job.cancel_requested:
         values = {**changes, "error": None, "finished_at": datetime.now(UTC)}
         connection.execute(sa.delete(resume_states).where(resume_states.c.job_id == job_id))

@@ -20,12 +20,21 @@ from sqlalchemy.engine.interfaces import DBAPIConnection
 from sqlalchemy.exc import ArgumentError, DatabaseError, NoSuchModuleError, OperationalError
 from sqlalchemy.pool import ConnectionPoolEntry
 
-from app.errors import InvalidInput, StorageFull, StorageUnavailable
+from app.errors import (
+    InvalidInput,
+    ServiceError,
+    StorageDamaged,
+    StorageFull,
+    StorageUnavailable,
+)
 
 logger = logging.getLogger(__name__)
 
-BUSY_TIMEOUT_MS = 30_000
-"""How long a writer waits for another one; a 100 MB blob takes below one second."""
+BUSY_TIMEOUT_S = 10.0
+"""Time for which a writer waits for another one [s]; a blob of 100 MB takes below one second.
+
+The query ``?timeout=SECONDS`` of the URL sets another one. Requests end with a 503 after it;
+workers and the supervisor repeat their writes for as long as it takes."""
 
 WAL_SIZE_LIMIT = 64 * 1024 * 1024
 """Size to which the write-ahead log is cut after a large blob [bytes]."""
@@ -33,10 +42,13 @@ WAL_SIZE_LIMIT = 64 * 1024 * 1024
 _PRAGMAS = (
     "PRAGMA journal_mode = WAL",
     "PRAGMA synchronous = FULL",
-    f"PRAGMA busy_timeout = {BUSY_TIMEOUT_MS}",
     "PRAGMA foreign_keys = ON",
     f"PRAGMA journal_size_limit = {WAL_SIZE_LIMIT}",
 )
+
+
+_FULL = ("disk is full", "no space left", "disk full", "quota exceeded")
+_DAMAGED = ("malformed", "not a database")
 
 
 class Store:
@@ -53,7 +65,10 @@ class Store:
         self._url = _checked_url(database_url)
         try:
             self.engine = sa.create_engine(
-                self._url, json_serializer=_to_json, json_deserializer=_from_json
+                self._url,
+                json_serializer=_to_json,
+                json_deserializer=_from_json,
+                connect_args=self._connect_args(),
             )
         except (NoSuchModuleError, ModuleNotFoundError) as error:
             rule = f"needs a database driver that is not installed ({error})"
@@ -78,6 +93,10 @@ class Store:
         is_sqlite = self._url.get_backend_name() == "sqlite"
         return Path(self._url.database or "") if is_sqlite else None
 
+    def _connect_args(self) -> dict[str, Any]:
+        waits = self.sqlite_path is None or "timeout" in self._url.query
+        return {} if waits else {"timeout": BUSY_TIMEOUT_S}
+
     @contextmanager
     def reading(self) -> Iterator[sa.Connection]:
         """Open a transaction that sees one consistent state and writes nothing.
@@ -99,6 +118,17 @@ class Store:
         with self._transaction(writes=True) as connection:
             yield connection
 
+    def check_writable(self) -> None:
+        """Write something that changes nothing.
+
+        Raises:
+            StorageFull: No room is left.
+            StorageUnavailable: The database takes no writes.
+        """
+        same = sa.text("UPDATE alembic_version SET version_num = version_num")
+        with self.writing() as connection:
+            connection.execute(same)
+
     @contextmanager
     def _transaction(self, *, writes: bool) -> Iterator[sa.Connection]:
         try:
@@ -107,11 +137,21 @@ class Store:
                 with connection.begin():
                     yield connection
         except DatabaseError as error:
-            if _is_full(error):
-                raise StorageFull(self.shown_url) from error
-            if not (isinstance(error, OperationalError) or "malformed" in str(error.orig)):
+            explained = self._explained(error)
+            if explained is None:
                 raise
-            raise StorageUnavailable(self.shown_url, str(error.orig)) from error
+            raise explained from error
+
+    def _explained(self, error: DatabaseError) -> ServiceError | None:
+        """Return the storage error of a driver's error; None for another kind of error."""
+        reason = str(error.orig)
+        if any(text in reason.lower() for text in _FULL):
+            return StorageFull(self.shown_url)
+        if any(text in reason for text in _DAMAGED):
+            return StorageDamaged(self.shown_url, reason)
+        if isinstance(error, OperationalError):
+            return StorageUnavailable(self.shown_url, reason)
+        return None
 
     def close(self) -> None:
         """Close every pooled connection."""
@@ -167,8 +207,3 @@ def _prepare_connection(connection: DBAPIConnection, _entry: ConnectionPoolEntry
 def _begin(connection: sa.Connection) -> None:
     writes = connection.get_execution_options().get("tandem_writes", False)
     connection.exec_driver_sql("BEGIN IMMEDIATE" if writes else "BEGIN")
-
-
-def _is_full(error: DatabaseError) -> bool:
-    text = str(error.orig).lower()
-    return "disk is full" in text or "no space left" in text or "disk full" in text

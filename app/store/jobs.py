@@ -21,6 +21,7 @@ from app.store.cursors import check_limit, decode_cursor, encode_cursor
 from app.store.engine import Store
 from app.store.events import append_event
 from app.store.records import JobRecord, JobState, NewJob, Page
+from app.store.reserve import write_with_reserve
 from app.store.tables import jobs
 
 MAX_KEY_LENGTH = 255
@@ -120,14 +121,18 @@ def request_cancel(store: Store, job_id: str) -> JobRecord:
     Raises:
         NotFound: There is no such job.
         Conflict: The job has succeeded or failed.
+        StorageFull: No room is left.
     """
-    with store.writing() as connection:
+
+    def cancel(connection: sa.Connection) -> JobRecord:
         job = read_job(connection, job_id, for_update=True)
         if job.state in ("succeeded", "failed"):
             raise Conflict(f"job {job_id} has already {job.state}: it cannot be cancelled")
         if job.state in ("queued", "running"):
             _cancel(connection, job)
         return read_job(connection, job_id)
+
+    return write_with_reserve(store, cancel)
 
 
 def read_job(connection: sa.Connection, job_id: str, *, for_update: bool = False) -> JobRecord:

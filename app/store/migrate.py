@@ -7,9 +7,8 @@ from alembic import command
 from alembic.config import Config
 from alembic.migration import MigrationContext
 from alembic.script import ScriptDirectory
-from sqlalchemy.exc import DatabaseError
 
-from app.errors import Conflict, InvalidInput
+from app.errors import Conflict
 from app.store.engine import Store
 
 _SCRIPTS = Path(__file__).parent / "migrations"
@@ -20,16 +19,12 @@ def migrate(store: Store) -> None:
 
     Raises:
         Conflict: A newer version of Tandem wrote the database.
-        InvalidInput: The file is no database.
+        StorageDamaged: The file is damaged, or no database.
         StorageUnavailable: It does not answer.
         StorageFull: No room is left.
     """
-    try:
-        with store.writing() as connection:
-            _upgrade(connection, store.shown_url)
-    except DatabaseError as error:  # such as a file that is no database
-        rule = f"cannot be opened ({error.orig})"
-        raise InvalidInput("database_url", store.shown_url, rule) from error
+    with store.writing() as connection:
+        _upgrade(connection, store.shown_url)
 
 
 def alembic_config() -> Config:

@@ -91,6 +91,10 @@ class JobRecord:
     """Result once succeeded: an evaluation's JSON, a training's summary."""
     last_event: int
     """Id of its newest event."""
+    kills: int
+    """Number of attempts that were killed with their server."""
+    waiting: str | None
+    """Reason for which its worker cannot write, such as ``"disk full"``."""
 
     @property
     def is_final(self) -> bool:

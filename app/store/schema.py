@@ -5,7 +5,7 @@ import sqlalchemy as sa
 from app.errors import Conflict
 from app.store.engine import Store
 
-REVISION = "0005"
+REVISION = "0006"
 """The newest migration."""
 
 

@@ -97,6 +97,8 @@ jobs = Table(
     Column("idempotency_key", String(255), unique=True),
     Column("result", JSON(none_as_null=True)),
     Column("last_event", Integer, nullable=False, default=0),
+    Column("kills", Integer, nullable=False, server_default="0"),
+    Column("waiting", String(64)),
     sqlite_autoincrement=True,
 )
 
@@ -197,4 +199,4 @@ reserve = Table(
     Column("id", Integer, primary_key=True, autoincrement=False),
     Column("filler", LargeBinary, nullable=False),
 )
-"""Space that is freed in a full database, so that a job can be marked failed."""
+"""Space that is freed in a full database, so that jobs can be ended or cancelled."""

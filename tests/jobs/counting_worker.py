@@ -3,16 +3,18 @@
 Overrides of a counting job: ``steps`` (to do), ``hold_at`` (list: attempt n waits at the n-th
 of these steps until it is stopped or killed), ``deaf`` (it never asks whether to stop),
 ``raise_at`` (raises an exception at that step), ``refuse_at`` (the same with an InvalidInput),
-``padding`` (extra bytes per checkpoint), ``max_pages`` (size limit of the database in this
-process).
+``padding`` (extra bytes per checkpoint), ``max_pages`` (a file with the size limit of the
+database in this process [pages], read at each transaction).
 """
 
 import os
 import sys
 import time
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
+import sqlalchemy as sa
 from sqlalchemy import event
 
 from app.digests import digest
@@ -75,14 +77,15 @@ def misbehave(wish: Mapping[str, Any], step: int) -> None:
         raise InvalidInput("refuse_at", step, "must not be reached")
 
 
-def limit_database(worker: JobWorker, max_pages: int | None) -> None:
+def limit_database(worker: JobWorker, max_pages: str | None) -> None:
     if max_pages is None:
         return
-    engine = worker.store.engine
-    engine.dispose()
-    event.listen(
-        engine, "connect", lambda c, _: c.execute(f"PRAGMA max_page_count = {max_pages}")
-    )
+
+    def limit(connection: sa.Connection) -> None:
+        pages = int(Path(max_pages).read_text())
+        connection.exec_driver_sql(f"PRAGMA max_page_count = {pages}")
+
+    event.listen(worker.store.engine, "begin", limit, insert=True)
 
 
 if __name__ == "__main__":

@@ -8,7 +8,7 @@ from app.store.engine import Store
 from jobs.executor import LocalProcess
 from jobs.supervisor import Supervisor, Timeouts
 
-COUNTING = (sys.executable, "-m", "tests.jobs.counting_worker")
+COUNTING = "tests.jobs.counting_worker"
 
 
 def main(data_dir: Path) -> None:

@@ -10,6 +10,7 @@ from app.store import attempts, completion, jobs, metrics
 from app.store.engine import Store
 from app.store.migrate import migrate
 from app.store.records import Claim, NewCheckpoint, NewJob, ResumeState
+from app.store.reserve import fill_reserve
 
 
 def fill_up(store: Store, *, spare_pages: int) -> None:
@@ -39,7 +40,7 @@ def test_sqlite_is_durable_and_checks_references(store: Store) -> None:
         "journal_mode": "wal",
         "synchronous": 2,
         "foreign_keys": 1,
-        "busy_timeout": 30_000,
+        "busy_timeout": 10_000,
     }
 
 
@@ -120,7 +121,7 @@ def test_full_database_refuses_new_jobs_with_a_reason(store: Store) -> None:
 def test_job_can_fail_in_a_full_database_with_room_set_aside(
     store: Store, claim: Claim
 ) -> None:
-    completion.fill_reserve(store)
+    fill_reserve(store)
     fill_up(store, spare_pages=10)
     record_until_full(store, claim)
     completion.fail(store, claim, "e" * completion.MAX_ERROR)
@@ -141,8 +142,8 @@ def test_full_database_keeps_the_earlier_resume_state(store: Store, claim: Claim
 
 
 def test_reserve_is_filled_once(store: Store) -> None:
-    completion.fill_reserve(store)
-    completion.fill_reserve(store)
+    fill_reserve(store)
+    fill_reserve(store)
     migrate(store)
     with store.reading() as connection:
         assert connection.execute(sa.text("SELECT count(*) FROM reserve")).scalar() == 1

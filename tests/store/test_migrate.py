@@ -7,7 +7,7 @@ from alembic.autogenerate import compare_metadata
 from alembic.migration import MigrationContext
 from alembic.script import ScriptDirectory
 
-from app.errors import Conflict, InvalidInput
+from app.errors import Conflict, StorageDamaged
 from app.store.engine import Store
 from app.store.migrate import alembic_config, migrate
 from app.store.schema import REVISION, check_schema
@@ -58,6 +58,8 @@ def test_worker_refuses_an_empty_database(tmp_path: Path) -> None:
 def test_file_that_is_no_database_is_named(tmp_path: Path) -> None:
     (tmp_path / "tandem.db").write_text("these are my notes, not a database" * 100)
     store = Store(f"sqlite:///{tmp_path}/tandem.db")
-    with pytest.raises(InvalidInput, match=r"tandem\.db' cannot be opened \(file is not a"):
+    with pytest.raises(
+        StorageDamaged, match=r"tandem\.db is damaged or no database \(file is not a"
+    ):
         migrate(store)
     store.close()

@@ -29,7 +29,7 @@ const LINKS = {
 function App() {
   const cell = useCell();
   const { link, world } = cell;
-  const { jobs, error, refresh } = useJobs(link);
+  const { jobs, error, waiting, refresh } = useJobs(link);
   const active = (jobs ?? []).filter(isActive).length;
   const checkpoints = useCheckpoints(link, `${world?.checkpoint}:${stamp(jobs)}`);
   const [tab, setTab] = useState("cell");
@@ -41,9 +41,9 @@ function App() {
   const training = useMemo(() => {
     const act = ({ purpose, sha256 }) =>
       cell.send({ tag: purpose === "sorting" ? "set-sorting-policy" : "set-policy", checkpoint: sha256 });
-    return html`<${Training} link=${link} jobs=${jobs} error=${error} refresh=${refresh}
+    return html`<${Training} link=${link} jobs=${jobs} error=${error} waiting=${waiting} refresh=${refresh}
       cell=${cell.cell?.name} acting=${[acting, sortingPolicy]} onAct=${act} />`;
-  }, [link, jobs, error, acting, sortingPolicy, cell.cell?.name]);
+  }, [link, jobs, error, waiting, acting, sortingPolicy, cell.cell?.name]);
   if (link === "signin") return html`<${SignIn} />`;
   return html`<div class="frame" data-link=${link}>
     <header class="topbar">

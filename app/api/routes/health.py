@@ -30,11 +30,17 @@ async def health(request: Request, services: ServicesDep) -> dict[str, Any]:
 async def ready(request: Request, services: ServicesDep) -> dict[str, Any]:
     """Answer 200 once the kernels are compiled, a 503 problem until then.
 
-    With the token, the problem contains the present activity, and ``degraded`` names damaged
-    checkpoints; all others can be used.
+    With the token, the problem contains the present activity. ``degraded`` names damaged
+    checkpoints (all others can be used), and says why the queue of jobs waits.
     """
-    damaged = services.checkpoints.damaged if _is_trusted(request, services) else ()
-    return {"status": "degraded", "damaged": damaged} if damaged else {"status": "ready"}
+    if not _is_trusted(request, services):
+        return {"status": "ready"}
+    found: dict[str, Any] = {}
+    if damaged := services.checkpoints.damaged:
+        found["damaged"] = damaged
+    if waiting := services.supervisor.waiting:
+        found["queue"] = f"waiting: {waiting}"
+    return {"status": "degraded" if found else "ready", **found}
 
 
 def _is_trusted(request: Request, services: Services) -> bool:

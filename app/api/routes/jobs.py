@@ -67,7 +67,8 @@ def list_some(
         JobPublic.from_domain(job, None if job.is_final else newest_point(services, job))
         for job in page.items
     ]
-    return JobList(items=items, next_cursor=page.next_cursor)
+    waiting = services.supervisor.waiting
+    return JobList(items=items, next_cursor=page.next_cursor, waiting=waiting)
 
 
 @router.get("/{job_id}", summary="One job")

@@ -34,6 +34,10 @@ class JobPublic(Answer):
     idempotency_key: str | None
     result: dict[str, Any] | None
     last_event: int = Field(description="id of its newest event")
+    kills: int = Field(description="number of attempts killed with the server; it fails at 30")
+    waiting: str | None = Field(
+        description="reason for which its worker waits, such as `disk full`; null if it runs"
+    )
     latest: dict[str, float | None] | None = Field(description="newest point of its curve")
 
     @classmethod
@@ -49,6 +53,9 @@ class JobList(Answer):
 
     items: list[JobPublic]
     next_cursor: str | None = Field(description="`cursor` of the next page")
+    waiting: str | None = Field(
+        description="reason for which no job runs, such as `disk full`; null if the queue runs"
+    )
 
 
 class MetricsPublic(Answer):

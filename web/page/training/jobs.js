@@ -18,7 +18,7 @@ const REWARD = [{ key: "reward", label: "mean reward of an episode", colour: "ac
 
 /** All jobs, newest first, asked for again every two seconds while the server is there. */
 export function useJobs(link) {
-  const [state, setState] = useState({ jobs: null, error: null });
+  const [state, setState] = useState({ jobs: null, error: null, waiting: null });
   const refresh = useRef(() => {});
   useEffect(() => {
     if (link !== "live") return undefined;
@@ -26,7 +26,7 @@ export function useJobs(link) {
     refresh.current = async () => {
       try {
         const page = await get("v1/jobs?limit=50");
-        if (!over) setState({ jobs: page.items, error: null });
+        if (!over) setState({ jobs: page.items, error: null, waiting: page.waiting });
       } catch (error) {
         if (!over) setState((now) => ({ ...now, error }));
       }
@@ -39,6 +39,21 @@ export function useJobs(link) {
     };
   }, [link]);
   return { ...state, refresh: useCallback(() => refresh.current(), []) };
+}
+
+const REMEDIES = {
+  "disk full": "Free some space on the disk of the data folder.",
+  "database locked": "Another program holds the database, such as a backup.",
+  "database damaged": "Stop the server and restore a backup: python -m app restore FILE.",
+  "disk error": "The disk of the data folder reports errors: check it.",
+};
+
+/** Says why no job runs; what was recorded stays, and the queue goes on by itself. */
+export function QueueWaits({ waiting }) {
+  return waiting && html`<p class="notice warn" role="status" data-role="queue-waits">
+    <${Icon} name="alert" /><span><b>Jobs are waiting: ${waiting}.</b> ${REMEDIES[waiting] ??
+    "The database does not answer."} No progress is lost, and the jobs resume by themselves.
+    </span></p>`;
 }
 
 export function isActive(job) {
@@ -71,7 +86,8 @@ function Job({ job, open, onOpen, onChanged, onAct, acting }) {
       onClick=${() => onOpen(open ? null : job.id)}>
       <${Icon} name="chevron" />
       <span class="job-name">${title(job)}</span>
-      <span class=${`chip chip-${TONES[job.state] ?? "quiet"}`}>${job.state}</span>
+      <span class=${`chip chip-${job.waiting ? "warn" : TONES[job.state] ?? "quiet"}`}>${
+        job.waiting ? `waiting: ${job.waiting}` : job.state}</span>
       <span class="job-sub">${subtitle(job)}</span>
     </button>
     ${isActive(job) &&
@@ -104,6 +120,7 @@ function subtitle(job) {
     parts.push(format.ago(job.finished_at ?? job.created_at));
   }
   if (job.attempt > 1) parts.push(`attempt ${job.attempt}`);
+  if (job.kills) parts.push(`killed ${job.kills === 1 ? "once" : `${job.kills} times`}`);
   return parts.join(" · ");
 }
 

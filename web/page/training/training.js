@@ -1,10 +1,10 @@
 // The training side: jobs with their curves, and the form that starts one.
 import { html, useEffect, useState } from "../vendor/htm-preact-standalone.module.js";
 import { Icon } from "../icons.js";
-import { JobList, isActive } from "./jobs.js";
+import { JobList, QueueWaits, isActive } from "./jobs.js";
 import { TrainForm, usePresets } from "./trainform.js";
 
-export function Training({ link, cell, jobs, error, refresh, acting, onAct }) {
+export function Training({ link, cell, jobs, error, waiting, refresh, acting, onAct }) {
   const presets = usePresets(link);
   const [form, setForm] = useState(false);
   const [open, setOpen] = useState(undefined);
@@ -24,6 +24,7 @@ export function Training({ link, cell, jobs, error, refresh, acting, onAct }) {
         ${!form && jobs?.length > 0 && html`<button type="button" class="primary"
           data-action="new-job" onClick=${() => setForm(true)}>
           <${Icon} name="plus" />New training job</button>`}</header>
+      <${QueueWaits} waiting=${waiting} />
       <${JobList} jobs=${jobs} error=${error} open=${open ?? null} onOpen=${setOpen}
         onChanged=${refresh} onAct=${onAct} acting=${acting}
         onNew=${form ? null : () => setForm(true)} />
