@@ -12,9 +12,14 @@ import time
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from app.provenance import describe
+from app.sim.core.arrays import Vec
 
 Row = dict[str, object]
+QUANTILES = ("p50_ms", "p99_ms", "p999_ms")
+"""Columns of the quantiles of a time."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -71,10 +76,13 @@ def row(
         threads: Threads that ran at once.
         **more: Further columns.
     """
+    return row_of(subject.name, values, unit, threads=threads, batch=subject.batch, **more)
+
+
+def row_of(name: str, values: Sequence[float], unit: str, **more: object) -> Row:
+    """Make a result row of anything that has a value in each round."""
     return {
-        "name": subject.name,
-        "threads": threads,
-        "batch": subject.batch,
+        "name": name,
         **more,
         "value": statistics.median(values),
         "low": min(values),
@@ -83,13 +91,22 @@ def row(
     }
 
 
+def quantiles_ms(times: Vec) -> Row:
+    """Return the columns of median, 99th and 99.9th percentile of times [ms]."""
+    return dict(zip(QUANTILES, np.percentile(times, (50.0, 99.0, 99.9)).tolist(), strict=True))
+
+
 def row_without(name: str, reason: str) -> Row:
     """Make the row of something that could not be measured: it is said, not left out."""
     return {"name": name, "value": None, "note": reason}
 
 
 def report(
-    bench: str, rows: Iterable[Row], options: argparse.Namespace, **stated: object
+    bench: str,
+    rows: Iterable[Row],
+    options: argparse.Namespace,
+    shown: Sequence[str] = (),
+    **stated: object,
 ) -> None:
     """Print the rows: as a table, or with ``--json`` as one object.
 
@@ -97,6 +114,7 @@ def report(
         bench: Name of the benchmark.
         rows: Its rows.
         options: From :func:`arguments`.
+        shown: Further columns of the table.
         **stated: What else the result says of how it was measured.
     """
     results = list(rows)
@@ -125,7 +143,9 @@ def report(
         if one["value"] is None:
             print(f"  {one['name']:<24} {one['note']}")
             continue
+        count = f"batch {one['batch']}" if "batch" in one else ""
+        more = "".join(f"  {key} {one[key]:.4g}" for key in (*QUANTILES, *shown) if key in one)
         print(
-            f"  {one['name']:<24} batch {one['batch']:<5} {one['value']:>12,.4g} {one['unit']}"
-            f"  ({one['low']:,.4g} to {one['high']:,.4g})"
+            f"  {one['name']:<24} {count:<11} {one['value']:>12,.4g} {one['unit']}"
+            f"  ({one['low']:,.4g} to {one['high']:,.4g}){more}"
         )
