@@ -1,7 +1,7 @@
 """Job specs: the body of ``POST /v1/jobs``, stored unchanged with the job.
 
 {"kind": "train", "preset": "pick-td3", "seed": 1,
- "overrides": {"learning": {"total_steps": 20480}}}
+ "overrides": {"learning": {"total_steps": 102400}}}
 {"kind": "evaluate", "protocol": "pick-single", "episodes": 1000, "seed": 11,
  "checkpoint": "pick"}
 {"kind": "evaluate", "protocol": "pick-mocap", "recordings": ["wave", "walk"]}
@@ -27,14 +27,14 @@ MAX_SEED = 2**31 - 1
 MAX_RECORDINGS = 32
 """Most recordings of one evaluation."""
 
-Seed = Annotated[int, Field(strict=True, ge=0, le=MAX_SEED)]
+Seed = Annotated[int, Field(ge=0, le=MAX_SEED)]
 Name = Annotated[str, Field(min_length=1, max_length=64)]
 
 
 class _Spec(BaseModel):
-    """A body without unknown fields and non-finite numbers."""
+    """A body without unknown fields, non-finite numbers and values of another JSON type."""
 
-    model_config = ConfigDict(extra="forbid", allow_inf_nan=False, frozen=True)
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False, frozen=True, strict=True)
 
     def _body(self) -> dict[str, Any]:
         return self.model_dump(mode="json", exclude_unset=True)
@@ -76,9 +76,7 @@ class EvaluateSpec(_Spec):
     checkpoint: Name | None = Field(
         None, description="SHA-256 or alias; the protocol's own if null"
     )
-    episodes: int | None = Field(
-        None, strict=True, ge=1, description="episodes; the protocol's own if null"
-    )
+    episodes: int | None = Field(None, ge=1, description="episodes; the protocol's own if null")
     seed: Seed = Field(0, description="seed of the episodes")
     recordings: list[Name] = Field(
         default_factory=list,

@@ -4,6 +4,8 @@ answers           Outermost ASGI layer: completes every answer
 application       The HTTP application: routers, error handlers, access control and the
                   page
 bodies            ASGI layer that checks address and body of a request before its route
+description       The OpenAPI document: answers of every operation, access, and names of
+                  operations
 known_people      Conversion of the people of a request to person states
 problems          Errors as problem documents (RFC 9457, ``application/problem+json``)
 registry          Cache of loaded policies, and names of stored checkpoints

@@ -70,6 +70,8 @@ class Answers:
             if message["type"] == "http.response.start":
                 started = True
                 headers = message["headers"] = list(message["headers"])
+                if message["status"] == 204:  # FastAPI states the type of its default answer
+                    headers[:] = [pair for pair in headers if pair[0] != b"content-type"]
                 given = {name.lower() for name, _ in headers}
                 headers += [pair for pair in _RAW if pair[0] not in given]
                 if b"location" in given:

@@ -9,7 +9,7 @@ from starlette.middleware.gzip import GZipMiddleware
 from starlette.responses import FileResponse, Response
 from starlette.staticfiles import StaticFiles
 
-from app.api import problems
+from app.api import description, problems
 from app.api.answers import Answers
 from app.api.bodies import BodyRules
 from app.api.routes import (
@@ -59,7 +59,8 @@ def build_app(*, lifespan: Lifespan, static: Path, token: str | None, version: s
         lifespan=lifespan,
         docs_url=None,
         redoc_url=None,
-        responses={422: {"model": problems.Problem, "description": "The input is refused"}},
+        responses={422: {}},
+        generate_unique_id_function=description.operation_id,
     )
     app.state.token = token
     problems.install(app)
@@ -82,6 +83,7 @@ def build_app(*, lifespan: Lifespan, static: Path, token: str | None, version: s
         reference,
     ):
         app.include_router(part.router)
+    description.install(app)
     add_page(app, static)
     app.add_middleware(BodyRules, files=recordings.FILES)
     open_paths = (SESSION_PATH, ICON_PATH, *health.PATHS)

@@ -13,7 +13,7 @@ from typing import Any
 from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse
-from pydantic import BaseModel
+from pydantic import BaseModel, ConfigDict, Field
 from starlette.exceptions import HTTPException
 from starlette.requests import ClientDisconnect
 from starlette.routing import Match
@@ -73,18 +73,31 @@ class ProblemResponse(JSONResponse):
         return _JSON.encode(content).encode("utf-8", "backslashreplace")
 
 
-class Problem(BaseModel):
-    """A problem document (RFC 9457), for the API description."""
+class FaultPublic(BaseModel):
+    """A value that breaks a rule."""
 
-    type: str
-    title: str
+    field: str = Field(description="its path in the request, such as `robot.q[3]`")
+    value: str = Field(description="the value as text; empty or `nothing` where there is none")
+    rule: str = Field(description="the rule, as a sentence part")
+    choices: list[str] = Field([], description="allowed values, where there are few")
+    hint: str | None = Field(None, description="probable intention or remedy")
+
+
+class Problem(BaseModel):
+    """A problem document (RFC 9457); further members depend on its type."""
+
+    model_config = ConfigDict(extra="allow")
+
+    type: str = Field(description="its kind: `urn:tandem:problem:...`")
+    title: str = Field(description="phrase of the status")
     status: int
-    detail: str
-    instance: str
-    field: str | None = None
+    detail: str = Field(description="a sentence on this occurrence")
+    instance: str = Field(description="path of the request")
+    field: str | None = Field(None, description="path of the faulty value; see `errors`")
     value: str | None = None
     rule: str | None = None
     choices: list[str] | None = None
+    errors: list[FaultPublic] | None = Field(None, description="all faults of a body or file")
 
 
 def problem(

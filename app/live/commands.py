@@ -8,7 +8,8 @@ world applies them between two control periods. A command is a pydantic model wi
 
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, PrivateAttr
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PrivateAttr
+from pydantic_core import PydanticCustomError
 
 from app.sim.cells.cell import LIMITS
 from app.sim.human.anthropometry import PERCENTILES
@@ -25,8 +26,15 @@ FIRST = 0
 
 Name = Annotated[str, Field(max_length=64)]
 Coordinate = Annotated[float, Field(ge=-FARTHEST_M, le=FARTHEST_M)]
-Point = tuple[Coordinate, Coordinate, Coordinate]
+Point = Annotated[tuple[Coordinate, Coordinate, Coordinate], Field(strict=False)]
 Percentile = Annotated[float, Field(ge=PERCENTILES[0], le=PERCENTILES[1])]
+
+
+def _no_boolean(value: object) -> object:
+    """Refuse ``true``, which equals 1."""
+    if isinstance(value, bool):
+        raise PydanticCustomError("number", "must be a number")
+    return value
 
 
 def _require_tag(schema: dict[str, Any]) -> None:
@@ -34,12 +42,13 @@ def _require_tag(schema: dict[str, Any]) -> None:
 
 
 class LiveCommand(BaseModel):
-    """Base class of commands: immutable, finite numbers, no unknown fields."""
+    """Base class of commands: immutable, finite numbers, strict types, no unknown fields."""
 
     model_config = ConfigDict(
         extra="forbid",
         allow_inf_nan=False,
         frozen=True,
+        strict=True,
         use_attribute_docstrings=True,
         json_schema_extra=_require_tag,
     )
@@ -156,7 +165,7 @@ class SetSpeed(LiveCommand):
     """Set the ratio of simulated to real time; a busy machine may not reach it."""
 
     tag: Literal["set-speed"] = "set-speed"
-    factor: Literal[1, 2, 4, 8]
+    factor: Annotated[Literal[1, 2, 4, 8], BeforeValidator(_no_boolean)]
     """simulated seconds per second"""
 
 
@@ -200,7 +209,7 @@ class SetCandidates(LiveCommand):
     """Set the stations among which the robot chooses."""
 
     tag: Literal["set-candidates"] = "set-candidates"
-    ids: Annotated[tuple[str, ...], Field(max_length=1000)]
+    ids: Annotated[tuple[str, ...], Field(max_length=1000, strict=False)]
     """station ids; empty: the robot is idle"""
 
 

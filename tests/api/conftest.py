@@ -1,15 +1,17 @@
 """One running service for the tests of this folder: real store, supervisor, policy and cell."""
 
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
+from fastapi import FastAPI
 from fastapi.testclient import TestClient
 
 from app.main import create_app
 from app.settings import Settings
+from tests.api.described import Answered, undescribed
 from tests.api.live_server import WARM_UP_S
 
 ADDRESS = "http://127.0.0.1:8000"
@@ -28,7 +30,19 @@ def client(tmp_path_factory: pytest.TempPathFactory) -> Iterator[TestClient]:
     app = create_app(Settings(data=tmp_path_factory.mktemp("data")))
     with TestClient(app, base_url=ADDRESS) as one:
         wait_until_ready(one)
+        one.event_hooks = {"response": [require_description(app)]}
         yield one
+
+
+def require_description(app: FastAPI) -> Callable[[Answered], None]:
+    """Return a check of every answer of a test: the OpenAPI document describes it."""
+    document = app.openapi()
+
+    def check(answer: Answered) -> None:
+        fault = undescribed(document, answer)
+        assert fault is None, fault
+
+    return check
 
 
 @pytest.fixture

@@ -12,6 +12,7 @@ from fastapi.testclient import TestClient
 from app.main import create_app
 from app.settings import Settings
 from tests.api.conftest import ADDRESS, wait_until_ready
+from tests.api.described import undescribed
 
 API: dict[str, Any] = create_app(Settings(data=Path("nowhere"))).openapi()
 ROUTES = [
@@ -155,6 +156,7 @@ def answered(service: TestClient, method: str, url: str, **more: Any) -> None:
     answer = service.request(method, url, follow_redirects=False, **more)
     assert answer.status_code < 500, (method, url, more, answer.text)
     assert answer.headers["x-content-type-options"] == "nosniff"
+    assert undescribed(API, answer) is None
     if answer.status_code >= 400 and method != "head":
         assert answer.headers["content-type"] == "application/problem+json"
         assert answer.json()["status"] == answer.status_code

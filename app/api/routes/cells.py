@@ -5,36 +5,57 @@ from typing import Any
 from fastapi import APIRouter, Request, Response
 from starlette.concurrency import run_in_threadpool
 
+from app.api.description import CREATED
 from app.api.schemas.cells import CellList, CellPublic, cell_schema
 from app.api.services import Services, ServicesDep
 from app.errors import Conflict
 from app.sim.cell_validation.reader import read_cell
+from app.sim.cells.cell import load_cell
 
 router = APIRouter(prefix="/v1/cells", tags=["cells"])
 
 BODY: dict[str, Any] = {
     "requestBody": {
         "required": True,
-        "content": {"application/json": {"schema": cell_schema()}},
+        "content": {
+            "application/json": {
+                "schema": cell_schema(),
+                "example": load_cell("pick-and-place").definition()
+                | {"name": "my-cell", "title": "My cell"},
+            }
+        },
     }
 }
 """The body is read as bytes, so that its faults carry their place in the text."""
 
 
 @router.get("", summary="List the work cells")
-def list_all(services: ServicesDep) -> CellList:
+def list_cells(services: ServicesDep) -> CellList:
     """Return every cell with its stations, people, limits and case studies."""
     return CellList(items=[CellPublic.from_domain(cell) for cell in services.cells.all()])
 
 
 @router.get("/{name}", summary="One work cell")
-def get_one(name: str, services: ServicesDep) -> CellPublic:
+def get_cell(name: str, services: ServicesDep) -> CellPublic:
     """Return one cell."""
     return CellPublic.from_domain(services.cells.get(name))
 
 
-@router.post("", status_code=201, summary="Add a work cell of your own", openapi_extra=BODY)
-async def create(request: Request, services: ServicesDep, response: Response) -> CellPublic:
+@router.post(
+    "",
+    status_code=201,
+    summary="Add a work cell of your own",
+    openapi_extra=BODY,
+    responses={
+        200: {"model": CellPublic, "description": "The same cell is stored already", **CREATED},
+        201: CREATED,
+        409: {"description": "Another cell has the name, or too many are stored"},
+        507: {},
+    },
+)
+async def create_cell(
+    request: Request, services: ServicesDep, response: Response
+) -> CellPublic:
     """Check a cell and store it; the same cell again answers 200; `errors` has all faults."""
     content = await request.body()
     cell = await run_in_threadpool(read_cell, content)
@@ -44,8 +65,16 @@ async def create(request: Request, services: ServicesDep, response: Response) ->
     return CellPublic.from_domain(cell)
 
 
-@router.delete("/{name}", status_code=204, summary="Remove a work cell of your own")
-def remove(name: str, services: ServicesDep) -> None:
+@router.delete(
+    "/{name}",
+    status_code=204,
+    summary="Remove a work cell of your own",
+    responses={
+        409: {"description": "It is shipped, a job trains in it, or a live world shows it"},
+        507: {},
+    },
+)
+def delete_cell(name: str, services: ServicesDep) -> None:
     """Remove a cell; policies trained in it have their own copy."""
     _require_unused(services, name)
     services.cells.remove(name)

@@ -3,10 +3,12 @@
 Both routes are open; without the token they tell nothing else.
 """
 
-from typing import Any
+from typing import Literal
 
 from fastapi import APIRouter, Request
+from pydantic import Field
 
+from app.api.schemas.numbers import Answer
 from app.api.services import Services, ServicesDep
 from app.errors import NotReady
 
@@ -15,32 +17,55 @@ HEALTH, READY = PATHS = ("/healthz", "/readyz")
 """Paths answered without the token."""
 
 
-@router.get(HEALTH, summary="200 when the service can decide")
-async def health(request: Request, services: ServicesDep) -> dict[str, Any]:
+class HealthPublic(Answer):
+    """The service can decide."""
+
+    status: Literal["ok"] = "ok"
+    worlds: list[str] | None = Field(
+        default=None, description="ids of the live worlds, with the token"
+    )
+
+
+class ReadinessPublic(Answer):
+    """The service has warmed up."""
+
+    status: Literal["ready", "degraded"]
+    damaged: list[str] | None = Field(
+        default=None, description="names of damaged checkpoints, with the token"
+    )
+    queue: str | None = Field(
+        default=None, description="why the queue of jobs waits, with the token"
+    )
+
+
+@router.get(HEALTH, summary="200 when the service can decide", response_model_exclude_none=True)
+async def health(request: Request, services: ServicesDep) -> HealthPublic:
     """Answer 200 when the service can decide, a 503 problem otherwise.
 
     With the token, it names the live worlds, and the problem contains the reason.
     """
     if _is_trusted(request, services):
-        return {"status": "ok", "worlds": list(services.worlds)}
-    return {"status": "ok"}
+        return HealthPublic(worlds=list(services.worlds))
+    return HealthPublic()
 
 
-@router.get(READY, summary="503 while the kernels are compiled")
-async def ready(request: Request, services: ServicesDep) -> dict[str, Any]:
+@router.get(
+    READY, summary="503 while the kernels are compiled", response_model_exclude_none=True
+)
+async def ready(request: Request, services: ServicesDep) -> ReadinessPublic:
     """Answer 200 once the kernels are compiled, a 503 problem until then.
 
     With the token, the problem contains the present activity. ``degraded`` names damaged
     checkpoints (all others can be used), and says why the queue of jobs waits.
     """
     if not _is_trusted(request, services):
-        return {"status": "ready"}
-    found: dict[str, Any] = {}
-    if damaged := services.checkpoints.damaged:
-        found["damaged"] = damaged
-    if waiting := services.supervisor.waiting:
-        found["queue"] = f"waiting: {waiting}"
-    return {"status": "degraded" if found else "ready", **found}
+        return ReadinessPublic(status="ready")
+    damaged, waiting = services.checkpoints.damaged, services.supervisor.waiting
+    return ReadinessPublic(
+        status="degraded" if damaged or waiting else "ready",
+        damaged=list(damaged) or None,
+        queue=f"waiting: {waiting}" if waiting else None,
+    )
 
 
 def _is_trusted(request: Request, services: Services) -> bool:

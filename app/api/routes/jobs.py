@@ -4,10 +4,12 @@ import asyncio
 from collections.abc import AsyncIterator
 from typing import Annotated
 
-from fastapi import APIRouter, Depends, Header, Query, Response
+from fastapi import APIRouter, Body, Depends, Header, Query, Response
 from fastapi.sse import EventSourceResponse, ServerSentEvent
 from starlette.concurrency import run_in_threadpool
 
+from app.api.description import CREATED
+from app.api.schemas.examples import JOBS, named
 from app.api.schemas.jobs import JobList, JobPublic, MetricsPublic
 from app.api.services import Services, ServicesDep
 from app.policies.configs import presets
@@ -30,9 +32,18 @@ def job_of_path(job_id: str, services: ServicesDep) -> JobRecord:
 JobDep = Annotated[JobRecord, Depends(job_of_path)]
 
 
-@router.post("", status_code=202, summary="Post a job")
-def create(
-    body: JobSpec,
+@router.post(
+    "",
+    status_code=202,
+    summary="Post a job",
+    responses={
+        202: CREATED,
+        409: {"description": "The idempotency key belongs to another body"},
+        507: {},
+    },
+)
+def create_job(
+    body: Annotated[JobSpec, Body(openapi_examples=named(JOBS))],
     services: ServicesDep,
     response: Response,
     idempotency_key: Annotated[
@@ -55,7 +66,7 @@ def create(
 
 
 @router.get("", summary="List the jobs")
-def list_some(
+def list_jobs(
     services: ServicesDep,
     cursor: Annotated[str | None, Query(description="next_cursor of the page before")] = None,
     limit: Annotated[int, Query(description="length of the page, 1 to 200")] = 50,
@@ -72,13 +83,18 @@ def list_some(
 
 
 @router.get("/{job_id}", summary="One job")
-def get_one(job: JobDep, services: ServicesDep) -> JobPublic:
+def get_job(job: JobDep, services: ServicesDep) -> JobPublic:
     """Return one job with the newest point of its curve."""
     return JobPublic.from_domain(job, newest_point(services, job))
 
 
-@router.post("/{job_id}/cancel", status_code=202, summary="Cancel a job")
-def cancel(job: JobDep, services: ServicesDep) -> JobPublic:
+@router.post(
+    "/{job_id}/cancel",
+    status_code=202,
+    summary="Cancel a job",
+    responses={409: {"description": "The job has ended"}, 507: {}},
+)
+def cancel_job(job: JobDep, services: ServicesDep) -> JobPublic:
     """Cancel a queued job at once; a running one stops after its next checkpoint."""
     cancelled = jobs.request_cancel(services.store, job.id)
     services.supervisor.wake()
@@ -86,7 +102,7 @@ def cancel(job: JobDep, services: ServicesDep) -> JobPublic:
 
 
 @router.get("/{job_id}/metrics", summary="A job's learning curve")
-def get_metrics(
+def get_job_metrics(
     job: JobDep,
     services: ServicesDep,
     after_step: Annotated[
@@ -102,7 +118,7 @@ def get_metrics(
 @router.get(
     "/{job_id}/events", response_class=EventSourceResponse, summary="Follow a job as it runs"
 )
-async def stream(
+async def stream_job(
     job: JobDep,
     services: ServicesDep,
     last_event_id: Annotated[

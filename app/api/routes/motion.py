@@ -20,6 +20,7 @@ from pydantic import ValidationError
 from starlette.concurrency import run_in_threadpool
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
+from app.api.description import MISMATCH
 from app.api.known_people import known_people, nearest_places, renumbered, take_time
 from app.api.problems import (
     member_problem,
@@ -50,8 +51,8 @@ CHECK_S = 0.2
 router = APIRouter(prefix=PATH, tags=["deciding"])
 
 
-@router.post("", summary="Decide how the robot moves next")
-async def move(request: MotionRequest, services: ServicesDep) -> MotionAnswer:
+@router.post("", summary="Decide how the robot moves next", responses=MISMATCH)
+async def decide_motion(request: MotionRequest, services: ServicesDep) -> MotionAnswer:
     """Return the next trajectory segment, the speed override and its reason.
 
     Calls are independent: state, people and goal may change at any time. For loops,

@@ -8,6 +8,7 @@ from dataclasses import replace
 from fastapi import APIRouter
 from starlette.concurrency import run_in_threadpool
 
+from app.api.description import MISMATCH
 from app.api.known_people import people_for_policy
 from app.api.schemas.plan import PlanAnswer, PlanRequest
 from app.api.services import ServicesDep
@@ -19,8 +20,10 @@ from app.sim.sorting.names import names_of
 router = APIRouter(prefix="/v1/plan", tags=["deciding"])
 
 
-@router.post("", summary="Choose the next move of a sorting task and its motion")
-async def plan(request: PlanRequest, services: ServicesDep) -> PlanAnswer:
+@router.post(
+    "", summary="Choose the next move of a sorting task and its motion", responses=MISMATCH
+)
+async def plan_move(request: PlanRequest, services: ServicesDep) -> PlanAnswer:
     """Return the next move, its motion and every move that the choice was among.
 
     The exact planner gives the moves that it expects to take about as many attempts; among them

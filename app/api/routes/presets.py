@@ -11,7 +11,7 @@ router = APIRouter(prefix="/v1/presets", tags=["jobs"])
 
 
 @router.get("", summary="List the presets")
-def list_all(services: ServicesDep) -> PresetList:
+def list_presets(services: ServicesDep) -> PresetList:
     """Return every preset with its fields, their values, limits and units."""
     cells, items = services.cells.all(), []
     for name, preset in PRESETS.items():

@@ -6,6 +6,7 @@ from fastapi import APIRouter, Depends, Query, Request, Response
 from starlette.concurrency import run_in_threadpool
 
 from app.api.bodies import FILE_TYPES
+from app.api.description import CREATED
 from app.api.schemas.recordings import RecordingItem, RecordingList, RecordingPublic
 from app.api.services import MAX_UPLOADS, Services, ServicesDep
 from app.errors import NotReady
@@ -54,7 +55,7 @@ def read_options(
 
 
 @router.get("", summary="List the recordings")
-def list_all(services: ServicesDep) -> RecordingList:
+def list_recordings(services: ServicesDep) -> RecordingList:
     """Return every recording with its measures and the error of its import."""
     return RecordingList(
         items=[RecordingItem.from_domain(one) for one in services.recordings.all()]
@@ -62,13 +63,28 @@ def list_all(services: ServicesDep) -> RecordingList:
 
 
 @router.get("/{name}", summary="One recording")
-def get_one(name: str, services: ServicesDep) -> RecordingPublic:
+def get_recording(name: str, services: ServicesDep) -> RecordingPublic:
     """Return one recording with its clean runs and the artifacts cut out of it."""
     return RecordingPublic.from_domain(services.recordings.record(name))
 
 
-@router.post("", status_code=201, summary="Import a recording", openapi_extra=BODY)
-async def create(
+@router.post(
+    "",
+    status_code=201,
+    summary="Import a recording",
+    openapi_extra=BODY,
+    responses={
+        200: {
+            "model": RecordingPublic,
+            "description": "The same file is stored already",
+            **CREATED,
+        },
+        201: CREATED,
+        409: {"description": "Another file has the name, or too many are stored"},
+        507: {},
+    },
+)
+async def create_recording(
     request: Request,
     services: ServicesDep,
     response: Response,
@@ -89,8 +105,13 @@ async def create(
     return RecordingPublic.from_domain(record)
 
 
-@router.delete("/{name}", status_code=204, summary="Remove a recording")
-def remove(name: str, services: ServicesDep) -> None:
+@router.delete(
+    "/{name}",
+    status_code=204,
+    summary="Remove a recording",
+    responses={507: {}},
+)
+def delete_recording(name: str, services: ServicesDep) -> None:
     """Remove a recording."""
     services.recordings.remove(name)
 

@@ -83,6 +83,12 @@ def _operation(api: Node, method: str, path: str, operation: Node) -> str:
         if status.startswith("2"):
             rows = "".join(_fields(api, schema))
             parts.append(f"<h3>Answer {escape(status)}</h3><table>{rows}</table>")
+    refusals = "".join(
+        f"<tr><td>{status}<td>{escape(_resolved(api, answer)['description'])}</tr>"
+        for status, answer in operation["responses"].items()
+        if status >= "4"
+    )
+    parts.append(f"<h3>Problems</h3><table>{refusals}</table>")
     return (
         f"<details><summary><span class=method>{method.upper()}</span>"
         f"<code>{escape(path)}</code> <span class=faint>{escape(operation['summary'])}</span>"
@@ -118,7 +124,8 @@ def _resolved(api: Node, schema: Node) -> Node:
     reference = schema.get("$ref")
     if reference is None:
         return schema
-    found: Node = api["components"]["schemas"][reference.rpartition("/")[2]]
+    _, _, kind, name = reference.split("/")
+    found: Node = api["components"][kind][name]
     return found
 
 

@@ -6,6 +6,7 @@ Source: docs/method.md 3.1.
 from fastapi import APIRouter
 from starlette.concurrency import run_in_threadpool
 
+from app.api.description import MISMATCH
 from app.api.known_people import people_for_policy
 from app.api.schemas.risk_map import RiskMapAnswer, RiskMapRequest
 from app.api.services import ServicesDep
@@ -16,8 +17,10 @@ from app.sim.pick.task_policy import MovedPerson
 router = APIRouter(prefix="/v1/risk-map", tags=["deciding"])
 
 
-@router.post("", summary="Choose beside a person at each position of a grid")
-async def draw(request: RiskMapRequest, services: ServicesDep) -> RiskMapAnswer:
+@router.post(
+    "", summary="Choose beside a person at each position of a grid", responses=MISMATCH
+)
+async def map_risk(request: RiskMapRequest, services: ServicesDep) -> RiskMapAnswer:
     """Return the choice, its value and its probabilities at every position of a person.
 
     At each position the answer is that of `/v1/task-selection` beside the person there.

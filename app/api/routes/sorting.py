@@ -9,6 +9,7 @@ import numpy as np
 from fastapi import APIRouter
 from starlette.concurrency import run_in_threadpool
 
+from app.api.description import MISMATCH
 from app.api.registry import SORTING_ALIASES
 from app.api.schemas.sorting import SortingAnswer, SortingRequest, outside_of
 from app.api.services import Services, ServicesDep
@@ -22,8 +23,8 @@ from app.sim.sorting.sorting_values import SortingValues
 router = APIRouter(prefix="/v1/sorting", tags=["deciding"])
 
 
-@router.post("", summary="Choose the next move of a sorting task")
-async def next_move(request: SortingRequest, services: ServicesDep) -> SortingAnswer:
+@router.post("", summary="Choose the next move of a sorting task", responses=MISMATCH)
+async def choose_sorting_move(request: SortingRequest, services: ServicesDep) -> SortingAnswer:
     """Return the next move with its reason, and every valid move with its value.
 
     Calls are independent: goal and objects may change at any time. A caller that returns

@@ -8,6 +8,7 @@ from functools import partial
 from fastapi import APIRouter
 from starlette.concurrency import run_in_threadpool
 
+from app.api.description import MISMATCH
 from app.api.known_people import people_for_policy, take_time
 from app.api.schemas.task_selection import TaskSelection, TaskSelectionRequest
 from app.api.services import ServicesDep
@@ -19,8 +20,8 @@ MAX_INLINE_CANDIDATES = 32
 router = APIRouter(prefix="/v1/task-selection", tags=["deciding"])
 
 
-@router.post("", summary="Choose what the robot does next")
-async def choose(request: TaskSelectionRequest, services: ServicesDep) -> TaskSelection:
+@router.post("", summary="Choose what the robot does next", responses=MISMATCH)
+async def select_task(request: TaskSelectionRequest, services: ServicesDep) -> TaskSelection:
     """Return the selected candidate, every candidate's value and the policy's action."""
     # A few candidates take about a millisecond, less than a change of thread.
     services.readiness.require()

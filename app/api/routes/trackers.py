@@ -8,6 +8,7 @@ from typing import Annotated
 from fastapi import APIRouter, Query, Response
 from starlette.concurrency import run_in_threadpool
 
+from app.api.description import CREATED
 from app.api.schemas.trackers import (
     EstimatesPublic,
     FrameCreate,
@@ -20,8 +21,13 @@ from app.api.services import ServicesDep
 router = APIRouter(prefix="/v1/trackers", tags=["trackers"])
 
 
-@router.post("", status_code=201, summary="Open a tracker")
-async def create(
+@router.post(
+    "",
+    status_code=201,
+    summary="Open a tracker",
+    responses={201: CREATED, 409: {"description": "Too many trackers are open"}},
+)
+async def create_tracker(
     body: TrackerCreate, services: ServicesDep, response: Response
 ) -> TrackerPublic:
     """Open a tracker; requests of decisions can then name its people."""
@@ -34,14 +40,18 @@ async def create(
 
 
 @router.get("", summary="List the trackers")
-async def list_all(services: ServicesDep) -> TrackerList:
+async def list_trackers(services: ServicesDep) -> TrackerList:
     """Return every open tracker."""
     return TrackerList(
         items=[TrackerPublic.from_domain(one) for one in services.trackers.all()]
     )
 
 
-@router.post("/{tracker_id}/frames", summary="Submit a frame")
+@router.post(
+    "/{tracker_id}/frames",
+    summary="Submit a frame",
+    responses={409: {"description": "The stamp does not continue those before"}},
+)
 async def submit_frame(
     tracker_id: str, body: FrameCreate, services: ServicesDep
 ) -> EstimatesPublic:
@@ -61,7 +71,7 @@ async def submit_frame(
 
 
 @router.get("/{tracker_id}", summary="Estimates of a tracker's people")
-async def get_one(
+async def get_tracker(
     tracker_id: str,
     services: ServicesDep,
     t: Annotated[
@@ -83,6 +93,6 @@ async def get_one(
 
 
 @router.delete("/{tracker_id}", status_code=204, summary="Delete a tracker")
-async def remove(tracker_id: str, services: ServicesDep) -> None:
+async def delete_tracker(tracker_id: str, services: ServicesDep) -> None:
     """Delete a tracker and its estimates."""
     services.trackers.close(tracker_id)

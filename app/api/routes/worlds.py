@@ -4,10 +4,12 @@ import asyncio
 from collections.abc import AsyncIterator
 from typing import Annotated
 
-from fastapi import APIRouter, Depends
+from fastapi import APIRouter, Body, Depends
 from fastapi.sse import EventSourceResponse, ServerSentEvent
 from starlette.concurrency import run_in_threadpool
 
+from app.api.description import MISMATCH
+from app.api.schemas.examples import COMMANDS, named
 from app.api.schemas.worlds import (
     CommandAccepted,
     WorldCell,
@@ -51,21 +53,28 @@ WorldDep = Annotated[LiveWorld, Depends(live_world)]
 
 
 @router.get("", summary="List the live worlds")
-async def list_all(services: ServicesDep) -> WorldList:
+async def list_worlds(services: ServicesDep) -> WorldList:
     """Return every live world; none while the service warms up."""
     snapshots = [world.handle.snapshot() for world in services.worlds.values()]
     return WorldList(items=[WorldSummary.from_domain(one) for one in snapshots])
 
 
 @router.get("/{world_id}", summary="One live world, with the state a decision needs")
-async def get_one(world: WorldDep) -> WorldState:
+async def get_world(world: WorldDep) -> WorldState:
     """Return the last snapshot; its ``state`` can be posted to /v1/task-selection as it is."""
     return state_of(world.handle.snapshot())
 
 
-@router.post("/{world_id}/commands", status_code=202, summary="Change a live world")
-async def command(
-    world: WorldDep, body: CommandMessage, services: ServicesDep
+@router.post(
+    "/{world_id}/commands",
+    status_code=202,
+    summary="Change a live world",
+    responses=MISMATCH,
+)
+async def command_world(
+    world: WorldDep,
+    body: Annotated[CommandMessage, Body(openapi_examples=named(COMMANDS))],
+    services: ServicesDep,
 ) -> CommandAccepted:
     """Queue one command; the world applies it before its next tick."""
     tick, cell = world.handle.snapshot().tick, world.cell
@@ -79,7 +88,9 @@ async def command(
     response_class=EventSourceResponse,
     summary="Stream a live world, ten times a second",
 )
-async def stream(world: WorldDep, services: ServicesDep) -> AsyncIterator[ServerSentEvent]:
+async def stream_world(
+    world: WorldDep, services: ServicesDep
+) -> AsyncIterator[ServerSentEvent]:
     """Send a light snapshot whenever the world has changed, until the client leaves."""
     last, world_id = None, world.handle.id
     while not services.stopping.is_set():
@@ -95,8 +106,12 @@ async def stream(world: WorldDep, services: ServicesDep) -> AsyncIterator[Server
         await asyncio.sleep(STREAM_PERIOD_S)
 
 
-@router.put("/{world_id}/cell", summary="Start a live world again in another cell")
-def set_cell(world_id: str, body: WorldCell, services: ServicesDep) -> WorldSummary:
+@router.put(
+    "/{world_id}/cell",
+    summary="Start a live world again in another cell",
+    responses=MISMATCH,
+)
+def set_world_cell(world_id: str, body: WorldCell, services: ServicesDep) -> WorldSummary:
     """Stop the world and start it in a cell to pick and place, sort or reach in; streams end.
 
     The policy is the named one, else the shipped one of the cell, else the newest trained in

@@ -50,7 +50,40 @@ PLAN: dict[str, Any] = {
     ],
     "goal": {"red": ["large", "small"]},
 }
+SORTING: dict[str, Any] = {
+    "cell": "sorting-e0",
+    "objects": [
+        {"id": "a", "colour": "red", "size": "large", "at": "cell2"},
+        {"id": "b", "colour": "red", "size": "large", "at": "cell5"},
+        {"id": "c", "colour": "blue", "size": "small", "at": "red", "level": 0},
+    ],
+    "goal": {"red": ["large"]},
+    "decider": "planner",
+}
+TRACKER: dict[str, Any] = {"cell": "pick-and-place", "n_people": 1}
 FRAME: dict[str, Any] = {"t": 12.3, "people": [{"keypoints": KEYPOINTS}]}
+
+JOBS: dict[str, Any] = {
+    "train": {
+        "kind": "train",
+        "preset": "pick-td3",
+        "seed": 1,
+        "overrides": {"learning": {"total_steps": 102400}},
+    },
+    "evaluate": {"kind": "evaluate", "protocol": "pick-single", "episodes": 100},
+}
+COMMANDS: dict[str, Any] = {
+    "pause": {"tag": "pause"},
+    "move a person": {"tag": "move-person", "pelvis": [0.2, 1.4, -1.57]},
+    "set the candidates": {"tag": "set-candidates", "ids": ["cube1", "cube2"]},
+    "resume": {"tag": "resume"},
+}
+WORLD_CELL: dict[str, Any] = {"cell": "pick-and-place"}
+
+
+def named(examples: dict[str, Any]) -> dict[str, Any]:
+    """Return examples of a body of several kinds, for ``Body(openapi_examples=...)``."""
+    return {name: {"value": value} for name, value in examples.items()}
 
 
 def shows(example: dict[str, Any]) -> ConfigDict:

@@ -12,9 +12,13 @@ Vector18 = Annotated[list[Finite], Field(min_length=18, max_length=18)]
 
 
 class Body(BaseModel):
-    """Base of requests: unknown fields and non-finite numbers are errors."""
+    """Base of requests.
 
-    model_config = ConfigDict(extra="forbid", allow_inf_nan=False, frozen=True)
+    Errors are unknown fields, non-finite numbers, and values of another JSON type, such as
+    ``true`` or ``"1"`` for a number; an integer is a number.
+    """
+
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False, frozen=True, strict=True)
 
 
 class Answer(BaseModel):

@@ -33,7 +33,14 @@ Speed = Annotated[float, Field(ge=-FASTEST, le=FASTEST)]
 Place = Annotated[float, Field(ge=-FARTHEST_M, le=FARTHEST_M)]
 Radius = Annotated[float, Field(ge=0.0, le=FARTHEST_M)]
 Walk = Annotated[float, Field(ge=0.0, le=FASTEST)]
-Coordinate = Annotated[float, Field(allow_inf_nan=True)] | None
+Coordinate = Annotated[
+    Annotated[float, Field(allow_inf_nan=True)] | None,
+    BeforeValidator(
+        lambda value: None if value == "NaN" else value,
+        json_schema_input_type=float | Literal["NaN"] | None,
+    ),
+]
+"""A number, or missing; NaN also as text, which JSON has no number for."""
 Keypoint = Annotated[list[Coordinate], Field(max_length=8)] | None
 Lengths = Annotated[list[Finite], Field(min_length=N_SIZE, max_length=N_SIZE)]
 ORDER = ", ".join(BODY_25)
@@ -175,7 +182,10 @@ class CylinderPerson(Body):
     vy: Speed = Field(description="velocity [m/s]")
     r: Annotated[float, Field(ge=0.01, le=FARTHEST_M)] = Field(description="radius [m]")
     growth: Speed = Field(0.0, description="rate of the radius [m/s]; used by reach policies")
-    past: Annotated[list[tuple[Radius, Walk]], Field(max_length=MOST_REMEMBERED)] = Field(
+    past: Annotated[
+        list[Annotated[tuple[Radius, Walk], Field(strict=False)]],
+        Field(max_length=MOST_REMEMBERED),
+    ] = Field(
         [],
         description="radius [m] and walking speed [m/s] 0.1 s, 0.2 s, ... ago, the newest "
         "first; constant before the last; used by policies with motion prediction",

@@ -18,7 +18,8 @@ from app.sim.pick.task_policy import ChoiceTerms, RiskMap
 CONTACT = "contact"
 Reason = Literal["contact", "unreachable"]
 Coordinate = Annotated[float, Field(ge=-4.9, le=4.9, allow_inf_nan=False)]
-Count = Annotated[int, Field(ge=1, le=50, strict=True)]
+Bounds = Annotated[tuple[Coordinate, Coordinate], Field(strict=False)]
+Count = Annotated[int, Field(ge=1, le=50)]
 
 
 class GridFields(Body):
@@ -29,12 +30,12 @@ class GridFields(Body):
         description="what is moved: the whole `person`, the pelvis to each position, or one "
         "`hand`, the pelvis stays",
     )
-    person: Annotated[int, Field(ge=0, lt=MAX_SKELETONS, strict=True)] = Field(
+    person: Annotated[int, Field(ge=0, lt=MAX_SKELETONS)] = Field(
         0, description="index of the person in `people`"
     )
     hand: Literal["right", "left"] = Field("right", description="the moved hand")
-    x: tuple[Coordinate, Coordinate] = Field(description="least and greatest x [m]")
-    y: tuple[Coordinate, Coordinate] = Field(description="least and greatest y [m]")
+    x: Bounds = Field(description="least and greatest x [m]")
+    y: Bounds = Field(description="least and greatest y [m]")
     z: Annotated[float, Field(ge=-1.0, le=2.0)] = Field(
         0.15, description="height of the palm over the table [m], for `hand`"
     )

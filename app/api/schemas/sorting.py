@@ -6,6 +6,7 @@ from typing import Annotated, Self
 import numpy as np
 from pydantic import BeforeValidator, Field
 
+from app.api.schemas.examples import SORTING, shows
 from app.api.schemas.numbers import Answer, Body, Finite
 from app.api.schemas.task_selection import Stamp
 from app.errors import InvalidInput
@@ -162,6 +163,8 @@ class SortingFields(Body):
 
 class SortingRequest(SortingFields):
     """State of a sorting task."""
+
+    model_config = shows(SORTING)
 
     cell: str | None = Field(
         None,

@@ -6,7 +6,7 @@ from typing import Annotated, Literal, Self
 import numpy as np
 from pydantic import Field
 
-from app.api.schemas.examples import FRAME, shows
+from app.api.schemas.examples import FRAME, TRACKER, shows
 from app.api.schemas.numbers import Answer, Body, Time
 from app.api.schemas.people import IMPLAUSIBLE, UNUSABLE, BodyPercentiles, KeypointsSeen
 from app.api.tracker_sessions import IDLE_S, TrackedPeople, TrackerSession
@@ -17,6 +17,8 @@ from app.sim.perception.person_estimator import PersonEstimate
 
 class TrackerCreate(Body):
     """A tracker to open."""
+
+    model_config = shows(TRACKER)
 
     cell: str = Field(description="name of the work cell", examples=["pick-and-place"])
     n_people: Annotated[int, Field(ge=1, le=4)] = Field(

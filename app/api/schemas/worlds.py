@@ -5,6 +5,7 @@ from typing import Any, ClassVar, Self
 
 from pydantic import ConfigDict, Field, TypeAdapter
 
+from app.api.schemas.examples import WORLD_CELL, shows
 from app.api.schemas.numbers import Answer, Body
 from app.api.schemas.robot_state import RobotState
 from app.api.schemas.task_selection import CandidateState, PersonState, TaskSelectionRequest
@@ -83,6 +84,8 @@ class WorldSummary(Answer):
 
 class WorldCell(Body):
     """The next cell of a live world."""
+
+    model_config = shows(WORLD_CELL)
 
     cell: str = Field(max_length=64, description="name of a pick, sorting or reach cell")
     checkpoint: str | None = Field(

@@ -25,7 +25,7 @@ class MoveGoal(LiveCommand):
     """Move the goal while the robot moves."""
 
     tag: Literal["move-goal"] = "move-goal"
-    position: tuple[float, float, float]
+    position: Annotated[tuple[float, float, float], Field(strict=False)]
     """target of the tool centre point, inside the cell's goal region [m]"""
 
 

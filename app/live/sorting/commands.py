@@ -56,7 +56,8 @@ class SetGoal(LiveCommand):
 
     tag: Literal["set-goal"] = "set-goal"
     towers: Annotated[
-        dict[Name, Annotated[tuple[Name, ...], Field(max_length=64)]], Field(max_length=5)
+        dict[Name, Annotated[tuple[Name, ...], Field(max_length=64, strict=False)]],
+        Field(max_length=5),
     ]
     """sizes from the bottom, by tower"""
 

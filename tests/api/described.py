@@ -1,0 +1,45 @@
+"""Comparison of an answer with the OpenAPI document."""
+
+import re
+from typing import Any, Protocol
+
+
+class Answered(Protocol):
+    """An answer of ``httpx`` or of ``httpx2``."""
+
+    @property
+    def status_code(self) -> int: ...
+    @property
+    def headers(self) -> Any: ...
+    @property
+    def request(self) -> Any: ...
+
+
+def operation_of(document: dict[str, Any], method: str, path: str) -> dict[str, Any] | None:
+    """Return the operation that answers a request; None where none is described."""
+    method = "get" if method == "HEAD" else method.lower()
+    fitting = [
+        (template.count("{"), operations[method])
+        for template, operations in document["paths"].items()
+        if method in operations
+        and re.fullmatch(re.sub(r"\\\{\w+\\\}", "[^/]+", re.escape(template)), path)
+    ]
+    return min(fitting, key=lambda one: one[0])[1] if fitting else None
+
+
+def undescribed(document: dict[str, Any], answer: Answered) -> str | None:
+    """Return what the document does not say of an answer; None where it says all."""
+    method, path = answer.request.method, answer.request.url.path
+    operation = operation_of(document, method, path)
+    if operation is None:
+        return None
+    said = operation["responses"].get(str(answer.status_code))
+    if said is None:
+        return f"{method} {path} answers {answer.status_code}, which is not described"
+    if "$ref" in said:
+        said = document["components"]["responses"][said["$ref"].rpartition("/")[2]]
+    kind = answer.headers.get("content-type", "").partition(";")[0]
+    kinds = list(said.get("content", {}))
+    if (kind or kinds) and kind not in kinds:
+        return f"{method} {path} answers {answer.status_code} as {kind!r}, not as {kinds}"
+    return None
