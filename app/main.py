@@ -19,6 +19,7 @@ from starlette.concurrency import run_in_threadpool
 import web
 from app.api.application import build_app
 from app.api.known_people import warm_up
+from app.api.metrics import Metrics
 from app.api.registry import (
     DEFAULT_ALIAS,
     REACH_ALIAS,
@@ -70,10 +71,11 @@ def create_app(settings: Settings) -> FastAPI:
         InvalidInput: The settings give unprotected access.
     """
     check_access(settings)
+    counts = Metrics(VERSION)
 
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
-        service = await run_in_threadpool(Service, settings)
+        service = await run_in_threadpool(Service, settings, counts)
         app.state.services = service.parts
         try:
             yield
@@ -81,7 +83,13 @@ def create_app(settings: Settings) -> FastAPI:
             service.parts.stopping.set()
             await run_in_threadpool(service.close)
 
-    return build_app(lifespan=lifespan, static=STATIC, token=settings.secret, version=VERSION)
+    return build_app(
+        lifespan=lifespan,
+        static=STATIC,
+        token=settings.secret,
+        version=VERSION,
+        counts=counts,
+    )
 
 
 class Service:
@@ -89,12 +97,13 @@ class Service:
 
     Args:
         settings: Where and how the service runs.
+        counts: Metrics of the application.
 
     Raises:
         Conflict: Another server uses the same database.
     """
 
-    def __init__(self, settings: Settings) -> None:
+    def __init__(self, settings: Settings, counts: Metrics) -> None:
         settings.data.mkdir(parents=True, exist_ok=True)
         store = Store(settings.database)
         supervisor = Supervisor(store, settings.data)
@@ -116,7 +125,9 @@ class Service:
             cells=CellCatalog(store),
             recordings=RecordingCatalog(store, self._imports),
             start_world=start_world,
+            count_outside=counts.count_outside,
         )
+        counts.watch(self.parts)
         self._warm_up = threading.Thread(target=self._start_cell, name="warm-up", daemon=True)
         self._warm_up.start()
 

@@ -6,6 +6,7 @@ Only ``app.main``, ``app.cli`` and ``jobs.run`` read them; every other part has 
 import ipaddress
 import os
 from pathlib import Path
+from typing import Literal
 
 from pydantic import Field, SecretStr, ValidationError
 from pydantic_settings import BaseSettings, SettingsConfigDict
@@ -30,6 +31,7 @@ class Settings(BaseSettings):
     token: SecretStr | None = Field(
         None, description="Bearer token; required for any address but loopback."
     )
+    log: Literal["text", "json"] = Field("text", description="Form of the log's lines.")
     root_path: str = Field(
         "",
         pattern=r"^(/[A-Za-z0-9._~-]+)*$",

@@ -8,11 +8,10 @@ import faulthandler
 import logging
 import os
 import signal
-import sys
-import time
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from app import logs
 from app.errors import InvalidInput, ServiceError, StorageFull, StorageUnavailable
 from app.store.engine import Store
 from app.store.records import Claim
@@ -28,6 +27,7 @@ NICENESS = 10
 def main(
     runners: Mapping[str, Runner],
     database_url: str,
+    style: logs.Style = "text",
     arguments: Sequence[str] | None = None,
 ) -> int:
     """Run the attempt of the command line.
@@ -35,6 +35,7 @@ def main(
     Args:
         runners: Runner of each kind of job.
         database_url: The database with the job.
+        style: Form of the log's lines.
         arguments: Command line; that of the process by default.
 
     Returns:
@@ -47,7 +48,7 @@ def main(
     options = parser.parse_args(arguments)
     os.nice(NICENESS)
     faulthandler.enable()
-    _set_up_logging(options.job, options.attempt)
+    logs.set_up(style, job_id=options.job, attempt=options.attempt)
     try:
         store = Store(database_url)
         check_schema(store)
@@ -68,12 +69,3 @@ def _runner(kind: str, runners: Mapping[str, Runner]) -> Runner:
         raise InvalidInput("kind", kind, "must be a kind of job", sorted(runners))
 
     return runners.get(kind, refuse)
-
-
-def _set_up_logging(job_id: str, attempt: int) -> None:
-    where = f"job={job_id} attempt={attempt}"
-    line = logging.Formatter(f"%(asctime)sZ %(levelname)s {where} %(name)s: %(message)s")
-    line.converter = time.gmtime
-    handler = logging.StreamHandler(sys.stderr)
-    handler.setFormatter(line)
-    logging.basicConfig(level=logging.INFO, handlers=[handler])

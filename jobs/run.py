@@ -103,4 +103,5 @@ RUNNERS: Mapping[str, Runner] = {"train": train, "evaluate": evaluate}
 
 if __name__ == "__main__":
     torch.set_num_threads(1)
-    sys.exit(main(RUNNERS, load_settings().database))
+    settings = load_settings()
+    sys.exit(main(RUNNERS, settings.database, settings.log))

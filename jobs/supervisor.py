@@ -13,7 +13,7 @@ import shutil
 import threading
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from datetime import datetime
 from pathlib import Path
 
@@ -190,7 +190,8 @@ class Supervisor:
 
     def _queue_orphans(self) -> None:
         for job_id in completion.requeue_orphans(self._store):
-            logger.info("job %s was interrupted with the last server: it resumes", job_id)
+            text = "the job was interrupted with the last server: it resumes"
+            logger.info(text, extra={"job_id": job_id})
         self._orphans_queued = True
         self._fill_reserve()
 
@@ -199,7 +200,7 @@ class Supervisor:
         if found is None:
             return False
         claim, job = found
-        logger.info("job %s (%s): attempt %d starts", job.id, job.kind, claim.attempt)
+        logger.info("%s starts", job.kind, extra=asdict(claim))
         try:
             handle = self._executor.start(claim)
         except OSError as error:
@@ -231,13 +232,8 @@ class Supervisor:
             job = completion.crash(self._store, claim, ended.reason, max_failures=failures)
         except StaleAttempt:
             return  # the worker recorded it: the normal case
-        logger.warning(
-            "job %s: attempt %d crashed, the job is %s now: %s",
-            claim.job_id,
-            claim.attempt,
-            job.state,
-            ended.reason,
-        )
+        reason = "the attempt crashed, the job is %s now: %s"
+        logger.warning(reason, job.state, ended.reason, extra=asdict(claim))
 
     def _watch(self) -> str | None:
         """Stop cancelled and silent workers; return the reason of one that cannot write."""
@@ -253,7 +249,7 @@ class Supervisor:
             elif row.heartbeat_at != worker.heartbeat_at:
                 worker.heartbeat_at, worker.heartbeat_seen = row.heartbeat_at, now
             if self._timed_out(worker, now):
-                logger.warning("job %s: its worker timed out and is killed", claim.job_id)
+                logger.warning("the worker timed out and is killed", extra=asdict(claim))
                 self._executor.stop(worker.handle, force=True)
         for claim in rows.keys() - self._workers.keys():  # claimed, but never started
             self._give_back(claim)

@@ -1,18 +1,25 @@
 """Outermost ASGI layer: completes every answer.
 
-Adds security headers and the root path of ``Location``, turns an unexpected error into a
-problem, and answers ``HEAD`` with the headers of ``GET``, without a body.
+Adds security headers, the id of the request and the root path of ``Location``, turns an
+unexpected error into a problem, measures the time to the answer, and answers ``HEAD`` with the
+headers of ``GET``, without a body. The log has a line for each request that changes something
+or is refused.
 """
 
 import logging
+import re
+from random import Random
+from time import perf_counter
 
 import anyio
 import anyio.lowlevel
 from starlette.datastructures import MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from app.api.metrics import UNROUTED, Metrics
 from app.api.problems import problem
 from app.api.security import path_of
+from app.logs import REQUEST_ID
 
 logger = logging.getLogger(__name__)
 
@@ -31,6 +38,20 @@ HEADERS = {  # defaults
     "Cache-Control": "no-cache",
 }
 _RAW = tuple((name.lower().encode(), value.encode()) for name, value in HEADERS.items())
+ID_HEADER = b"x-request-id"
+_ID = re.compile(rb"[A-Za-z0-9._:/+=-]{1,128}")
+_RANDOM = Random()
+READS = ("GET", "HEAD", "OPTIONS")
+DECIDING = "deciding"
+"""Tag of the routes whose answers are not logged one by one."""
+
+
+def id_of(scope: Scope) -> str:
+    """Return the id of a request: the client's if well-formed, otherwise a new one."""
+    for name, value in scope["headers"]:
+        if name == ID_HEADER and _ID.fullmatch(value):
+            return str(value, "ascii")
+    return f"{_RANDOM.getrandbits(64):016x}"
 
 
 class Answers:
@@ -38,15 +59,21 @@ class Answers:
 
     Args:
         app: The inner layers.
+        metrics: Counts the answers.
     """
 
-    def __init__(self, app: ASGIApp) -> None:
+    def __init__(self, app: ASGIApp, *, metrics: Metrics) -> None:
         self.app = app
+        self.metrics = metrics
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Pass a request on and complete its answer."""
-        if scope["type"] != "http":
+        if scope["type"] not in ("http", "websocket"):
             await self.app(scope, receive, send)
+            return
+        REQUEST_ID.set(id_of(scope))
+        if scope["type"] == "websocket":
+            await self.app(scope, receive, _with_id(send))
             return
         if scope["method"] != "HEAD":
             await self._answer(scope, receive, send)
@@ -63,17 +90,19 @@ class Answers:
             await self._answer({**scope, "method": "GET"}, receive, send_head)
 
     async def _answer(self, scope: Scope, receive: Receive, send: Send) -> None:
-        started, root_path = False, scope.get("root_path", "")
+        started, root_path, begin = False, scope.get("root_path", ""), perf_counter()
 
         async def send_complete(message: Message) -> None:
             nonlocal started
             if message["type"] == "http.response.start":
                 started = True
+                self._count(scope, message["status"], perf_counter() - begin)
                 headers = message["headers"] = list(message["headers"])
                 if message["status"] == 204:  # FastAPI states the type of its default answer
                     headers[:] = [pair for pair in headers if pair[0] != b"content-type"]
                 given = {name.lower() for name, _ in headers}
                 headers += [pair for pair in _RAW if pair[0] not in given]
+                headers.append((ID_HEADER, (REQUEST_ID.get() or "").encode()))
                 if b"location" in given:
                     _below_root_path(message, root_path)
             await send(message)
@@ -88,8 +117,31 @@ class Answers:
             detail = "an unexpected error; the server's log has the trace"
             await problem(500, detail, instance=path)(scope, receive, send_complete)
 
+    def _count(self, scope: Scope, status: int, seconds: float) -> None:
+        """Count an answer; log it where it changes something or is refused."""
+        route, method = scope.get("route"), scope["method"]
+        self.metrics.observe(method, getattr(route, "path", UNROUTED), status, seconds)
+        changes = method not in READS and DECIDING not in getattr(route, "tags", ())
+        if status >= 400 or changes:
+            fields = {"status": status, "duration_s": round(seconds, 6)}
+            logger.info("%s %s", method, path_of(scope), extra=fields)
+
 
 def _below_root_path(message: Message, root_path: str) -> None:
     headers = MutableHeaders(scope=message)
     if headers["location"].startswith("/"):
         headers["Location"] = root_path + headers["location"]
+
+
+def _with_id(send: Send) -> Send:
+    """Return ``send`` of a socket that adds the id of the request to the handshake."""
+
+    async def send_complete(message: Message) -> None:
+        if message["type"] == "websocket.accept":
+            message["headers"] = [
+                *message["headers"],
+                (ID_HEADER, (REQUEST_ID.get() or "").encode()),
+            ]
+        await send(message)
+
+    return send_complete

@@ -12,11 +12,13 @@ from starlette.staticfiles import StaticFiles
 from app.api import description, problems
 from app.api.answers import Answers
 from app.api.bodies import BodyRules
+from app.api.metrics import Metrics
 from app.api.routes import (
     cells,
     checkpoints,
     health,
     jobs,
+    metrics,
     motion,
     plan,
     presets,
@@ -43,7 +45,9 @@ DESCRIPTION = (
 )
 
 
-def build_app(*, lifespan: Lifespan, static: Path, token: str | None, version: str) -> FastAPI:
+def build_app(
+    *, lifespan: Lifespan, static: Path, token: str | None, version: str, counts: Metrics
+) -> FastAPI:
     """Return the application; its lifespan sets ``app.state.services``.
 
     Args:
@@ -51,6 +55,7 @@ def build_app(*, lifespan: Lifespan, static: Path, token: str | None, version: s
         static: Folder of the page.
         token: The token required of every request; None on loopback.
         version: Version of the service.
+        counts: Metrics of the application.
     """
     app = FastAPI(
         title="Tandem",
@@ -63,6 +68,7 @@ def build_app(*, lifespan: Lifespan, static: Path, token: str | None, version: s
         generate_unique_id_function=description.operation_id,
     )
     app.state.token = token
+    app.state.metrics = counts
     problems.install(app)
     for part in (
         task_selection,
@@ -78,6 +84,7 @@ def build_app(*, lifespan: Lifespan, static: Path, token: str | None, version: s
         cells,
         recordings,
         health,
+        metrics,
         session,
         viewer,
         reference,
@@ -88,7 +95,7 @@ def build_app(*, lifespan: Lifespan, static: Path, token: str | None, version: s
     app.add_middleware(BodyRules, files=recordings.FILES)
     open_paths = (SESSION_PATH, ICON_PATH, *health.PATHS)
     app.add_middleware(Guard, token=token, open_paths=open_paths)
-    app.add_middleware(Answers)
+    app.add_middleware(Answers, metrics=counts)
     return app
 
 

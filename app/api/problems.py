@@ -40,6 +40,7 @@ from app.errors import (
     StorageFull,
     StorageUnavailable,
 )
+from app.logs import REQUEST_ID
 
 logger = logging.getLogger(__name__)
 
@@ -93,6 +94,7 @@ class Problem(BaseModel):
     status: int
     detail: str = Field(description="a sentence on this occurrence")
     instance: str = Field(description="path of the request")
+    request_id: str | None = Field(None, description="id of the request, as in `X-Request-ID`")
     field: str | None = Field(None, description="path of the faulty value; see `errors`")
     value: str | None = None
     rule: str | None = None
@@ -128,6 +130,8 @@ def problem(
         "detail": detail,
         "instance": instance,
     }
+    if (request_id := REQUEST_ID.get()) is not None:
+        members["request_id"] = request_id
     return ProblemResponse(
         {**members, **(data or {})}, status, headers=dict(headers) if headers else None
     )

@@ -13,6 +13,7 @@ from starlette.requests import HTTPConnection
 from app.api.registry import CheckpointNames, PolicyRegistry
 from app.api.tracker_sessions import TrackerSessions
 from app.errors import InvalidInput, NotFound, NotReady
+from app.live.lateness import Lateness
 from app.live.reach.interfaces import LiveReachPolicy
 from app.live.world_handle import WorldHandle
 from app.policies.inference.motion_decision import MotionDecider
@@ -42,6 +43,10 @@ class LiveWorld(Protocol):
     @property
     def cell(self) -> Cell:
         """Its work cell."""
+
+    @property
+    def lateness(self) -> Lateness:
+        """Lateness of its ticks."""
 
     @property
     def viewer_address(self) -> Path:
@@ -101,6 +106,8 @@ class Services:
     """Recordings of human motion by name."""
     start_world: StartWorld
     """Starts a live world."""
+    count_outside: Callable[..., None]
+    """Counts a decision with inputs outside a range: its endpoint, and lists of fields."""
     worlds: dict[str, LiveWorld] = field(default_factory=dict)
     """Live worlds by id; empty until the kernels are compiled."""
     trackers: TrackerSessions = field(default_factory=TrackerSessions)

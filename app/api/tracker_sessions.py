@@ -104,6 +104,10 @@ class TrackerSession:
             self.n_frames += 1
             return self._tracked(estimates, 0.0)
 
+    def since_frame_s(self) -> float:
+        """Return the time since its newest frame, or since it was opened without one [s]."""
+        return self.timeline.ahead(self.clock())
+
     def people(self, t: float | None = None) -> TrackedPeople:
         """Return the estimates for the present.
 

@@ -5,13 +5,13 @@ Exit status: 0 whatever the result, 1 where this machine is in the way (port tak
 in use), 2 for a wrong call.
 """
 
-import logging
 import os
 import sys
 from collections.abc import Sequence
 
 import typer
 
+from app import logs
 from app.cli import cells, evaluate, recordings, serve, train
 from app.errors import InvalidInput, NotFound, ServiceError
 
@@ -40,13 +40,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns:
         The exit status.
     """
-    logging.basicConfig(
-        level=logging.INFO,
-        stream=sys.stderr,
-        format="%(asctime)s %(levelname)s %(name)s: %(message)s",
-    )
-    for chatty in ("alembic", "websockets", "uvicorn"):
-        logging.getLogger(chatty).setLevel(logging.WARNING)
+    logs.set_up("text")
     try:
         app(arguments, prog_name="python -m app")
     except SystemExit as end:

@@ -58,9 +58,11 @@ def prepared_settings(
     Raises:
         InvalidInput: A setting is unknown or breaks a rule.
     """
+    from app import logs
     from app.settings import load_settings
     from app.sim.core.kernel_cache import kernel_cache
 
     settings = load_settings(host=host, port=port, data=data)
+    logs.set_up(settings.log)
     os.environ.setdefault("NUMBA_CACHE_DIR", str(kernel_cache(settings.data)))
     return settings

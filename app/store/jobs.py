@@ -11,7 +11,7 @@ Writes of workers and of the supervisor are in ``app.store.attempts`` and ``.com
 import uuid
 from collections.abc import Mapping
 from datetime import UTC, datetime
-from typing import Any
+from typing import Any, get_args
 
 import sqlalchemy as sa
 from sqlalchemy.exc import IntegrityError
@@ -113,6 +113,17 @@ def list_jobs(
     items = tuple(job_from_row(row) for row in rows[:limit])
     more = len(rows) > limit
     return Page(items=items, next_cursor=encode_cursor(items[-1].number) if more else None)
+
+
+def count_jobs(store: Store) -> dict[JobState, int]:
+    """Return the number of jobs in each state, 0 included."""
+    query = sa.select(jobs.c.state, jobs.c.cancel_requested, sa.func.count())
+    with store.reading() as connection:
+        rows = connection.execute(query.group_by(jobs.c.state, jobs.c.cancel_requested)).all()
+    found = dict.fromkeys(get_args(JobState), 0)
+    for state, cancel, n in rows:
+        found["cancelling" if state == "running" and cancel else state] += n
+    return found
 
 
 def request_cancel(store: Store, job_id: str) -> JobRecord:

@@ -22,6 +22,7 @@ from app.errors import ServiceError
 from app.live import commands
 from app.live.command_checks import Command
 from app.live.factory import new_world
+from app.live.lateness import Lateness
 from app.live.pick.risk_worker import RiskWorker
 from app.live.pick.world import LivePickWorld
 from app.live.reach.interfaces import LiveReachPolicy
@@ -72,6 +73,8 @@ class LiveCell:
         self._world = new_world(cell, policy, seed, id, sorting_policy, reach_policy)
         self.handle = WorldHandle(id, cell, self._world.snapshot())
         """Commands in, snapshots out."""
+        self.lateness = Lateness()
+        """Lateness of its ticks."""
         self._speed = 1
         self._ticks, self._undrawn_s = 0, 0.0
         self._done = 0
@@ -121,6 +124,7 @@ class LiveCell:
         dt = self._cell.robot.dt
         due = time.monotonic() + dt
         while not self._stop.wait(max(due - time.monotonic(), 0.0)):
+            self.lateness.add(max(0.0, time.monotonic() - due))
             try:
                 self._tick(draw, dt)
             except Exception:

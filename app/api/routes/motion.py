@@ -74,8 +74,11 @@ async def answer(request: MotionRequest, services: Services) -> MotionAnswer:
     decided = partial(decide, request, cell, decider, services.trackers)
     # Without a rollout a decision takes less than a millisecond, on the event loop.
     if request.rollout is not False or take_time(request.people):
-        return await run_in_threadpool(decided)
-    return decided()
+        found = await run_in_threadpool(decided)
+    else:
+        found = decided()
+    services.count_outside(PATH, found.outside, found.state_outside)
+    return found
 
 
 async def _decider(name: str | None, services: Services) -> MotionDecider:

@@ -44,7 +44,9 @@ async def plan_move(request: PlanRequest, services: ServicesDep) -> PlanAnswer:
         with request.robot.faults_in_place():
             found = SortingPlanner(policy, cell).plan(query)
         if found.decision is not None:
-            found = replace(found, decision=people.in_request(found.decision))
+            decision = people.in_request(found.decision)
+            services.count_outside(router.prefix, decision.outside)
+            found = replace(found, decision=decision)
         uses = people.uses(None if found.decision is None else found.decision.seen)
         return PlanAnswer.from_domain(found, query, request, names, uses)
 

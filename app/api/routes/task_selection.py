@@ -46,6 +46,7 @@ async def select_task(request: TaskSelectionRequest, services: ServicesDep) -> T
         people = people_for_policy(request.people, cell, services.trackers, q)
         with request.robot.faults_in_place():
             decision = people.in_request(decide(people.people))
+        services.count_outside(router.prefix, decision.outside, *decision.outside_candidates)
         uses = people.uses(decision.seen)
         return TaskSelection.from_domain(decision, candidates, uses, request.stamp)
 

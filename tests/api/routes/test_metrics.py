@@ -1,0 +1,131 @@
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+from fastapi.testclient import TestClient
+from prometheus_client.parser import text_string_to_metric_families
+
+from app.api.metrics import Metrics
+
+SOCKET = "ws://127.0.0.1:8000/v1/motion/stream"
+PAGE = (Path(__file__).resolve().parents[3] / "docs" / "operations.md").read_text("utf-8")
+
+
+def scrape(client: TestClient) -> dict[str, Any]:
+    answer = client.get("/metrics")
+    assert answer.status_code == 200
+    return {one.name: one for one in text_string_to_metric_families(answer.text)}
+
+
+def value(client: TestClient, name: str, **labels: str) -> float:
+    family = name.removesuffix("_total").removesuffix("_count")
+    samples = scrape(client)[family].samples
+    found = [s.value for s in samples if s.name == name and labels.items() <= s.labels.items()]
+    return sum(found)
+
+
+def test_request_is_counted_by_route_method_and_status(client: TestClient) -> None:
+    name = "tandem_request_duration_seconds_count"
+    labels = {"method": "GET", "endpoint": "/v1/jobs/{job_id}", "status": "404"}
+    before = value(client, name, **labels)
+    client.get("/v1/jobs/none")
+    client.get("/v1/jobs/nothing")
+    assert value(client, name, **labels) == before + 2
+
+
+def test_unknown_paths_and_methods_share_one_endpoint(client: TestClient) -> None:
+    name = "tandem_request_duration_seconds_count"
+    client.request("BREW", "/pot-1")
+    client.get("/pot-2")
+    assert value(client, name, endpoint="none", status="404", method="other") >= 1
+    assert value(client, name, endpoint="none", status="404", method="GET") >= 1
+    assert "pot" not in client.get("/metrics").text
+
+
+def test_decision_outside_the_training_range_is_counted(
+    client: TestClient, state: dict[str, Any]
+) -> None:
+    name, labels = "tandem_decisions_outside_training_total", {"endpoint": "/v1/task-selection"}
+    before = value(client, name, **labels)
+    far = [{"id": "far", "position": [0.0, 3.0, 0.1]}]
+    answer = client.post("/v1/task-selection", json={**state, "candidates": far})
+    assert answer.json()["candidates"][0]["outside"]
+    assert value(client, name, **labels) == before + 1
+
+
+def test_live_world_is_read(client: TestClient) -> None:
+    world = {"world": "main", "cell": "pick-and-place"}
+    assert 0.0 <= value(client, "tandem_live_override_ratio", **world) <= 1.0
+    ticks = value(client, "tandem_live_tick_lateness_seconds_count", world="main")
+    assert ticks > 0
+    assert value(client, "tandem_ready") == 1.0
+
+
+def test_tracker_has_an_age_until_it_is_deleted(client: TestClient) -> None:
+    tracker = client.post("/v1/trackers", json={"cell": "pick-and-place"}).json()["id"]
+    samples = scrape(client)["tandem_tracker_age_seconds"].samples
+    assert [s.value >= 0.0 for s in samples if s.labels["tracker"] == tracker] == [True]
+    client.delete(f"/v1/trackers/{tracker}")
+    samples = scrape(client)["tandem_tracker_age_seconds"].samples
+    assert tracker not in {s.labels["tracker"] for s in samples}
+
+
+def test_jobs_are_counted_by_state(client: TestClient) -> None:
+    before = value(client, "tandem_jobs", state="cancelled")
+    body = {"kind": "train", "preset": "sorting-e0-dqn", "seed": 1}
+    job = client.post("/v1/jobs", json=body).json()
+    client.post(f"/v1/jobs/{job['id']}/cancel")
+    total = sum(value(client, "tandem_jobs", state=s) for s in ("cancelled", "cancelling"))
+    assert total >= before + 1
+    assert value(client, "tandem_jobs", state="failed") == 0.0
+    assert value(client, "tandem_database_up") == 1.0
+
+
+def test_open_sockets_are_counted(client: TestClient) -> None:
+    with client.websocket_connect(SOCKET):
+        assert value(client, "tandem_sockets_open", kind="motion") == 1.0
+    assert value(client, "tandem_sockets_limit", kind="motion") >= 1.0
+
+
+def test_openmetrics_is_answered_where_it_is_accepted(client: TestClient) -> None:
+    answer = client.get("/metrics", headers={"Accept": "application/openmetrics-text"})
+    assert answer.headers["content-type"].startswith("application/openmetrics-text")
+    assert answer.text.endswith("# EOF\n")
+
+
+def test_operations_page_lists_every_metric_and_no_other(client: TestClient) -> None:
+    offered = {name for name in scrape(client) if name.startswith("tandem_")}
+    offered -= {name for name in offered if name.endswith("_created")}
+    table = PAGE.split("## Metrics\n")[1].split("\n## ")[0]
+    listed = set(re.findall(r"^\| `(tandem_\w+?)(?:_total)?`", table, re.MULTILINE))
+    assert listed == {name.removesuffix("_info") for name in offered}
+
+
+def test_two_applications_count_apart() -> None:
+    one, two = Metrics("1"), Metrics("1")
+    one.observe("GET", "/a", 200, 0.001)
+    text = "tandem_request_duration_seconds_count"
+    labels = {"method": "GET", "endpoint": "/a", "status": "200"}
+    assert one.registry.get_sample_value(text, labels) == 1.0
+    assert two.registry.get_sample_value(text, labels) is None
+
+
+@pytest.mark.parametrize("given", ["build-7:step/2", "a" * 128, "0af7-65.1_x+y="])
+def test_well_formed_request_id_is_returned(client: TestClient, given: str) -> None:
+    answer = client.get("/v1/jobs/none", headers={"X-Request-ID": given})
+    assert answer.headers["x-request-id"] == given == answer.json()["request_id"]
+
+
+@pytest.mark.parametrize("given", ["", "a" * 129, "two words", 'quo"te', "ünicode"])
+def test_other_request_id_is_replaced(client: TestClient, given: str) -> None:
+    answer = client.get("/v1/jobs/none", headers={"X-Request-ID": given.encode()})
+    assert re.fullmatch("[0-9a-f]{16}", answer.headers["x-request-id"])
+    assert answer.json()["request_id"] == answer.headers["x-request-id"]
+
+
+def test_handshake_of_a_socket_has_the_request_id(client: TestClient) -> None:
+    headers = {"X-Request-ID": "socket-1"}
+    with client.websocket_connect(SOCKET, headers=headers) as socket:
+        accepted = dict(socket.extra_headers or [])
+        assert accepted[b"x-request-id"] == b"socket-1"
