@@ -7,6 +7,7 @@
     │   ├── BadRecording     faults of a motion file, each with its place
     │   └── GoalOutside      a goal outside the targets: axes and distances
     ├── Conflict             the request contradicts the present state
+    │   ├── WrongState       an object is in another state: field, value, rule, choices
     │   ├── ClockJump        a frame's stamp does not continue those before
     │   └── StaleAttempt     a worker no longer holds its job
     ├── StorageUnavailable   the database does not answer for now
@@ -204,6 +205,33 @@ class GoalOutside(InvalidInput):
 
 class Conflict(ServiceError):
     """The request contradicts the present state."""
+
+
+class WrongState(Conflict):
+    """An object is not in the state that an action requires.
+
+    Args:
+        field: The member of the object that contradicts the action, such as ``"state"``.
+        value: Its present value.
+        rule: The rule, as a sentence part: ``"must be failed to retry job 5"``.
+        choices: Values that the action accepts, where there are few.
+    """
+
+    def __init__(
+        self, field: str, value: object, rule: str, choices: Sequence[str] = ()
+    ) -> None:
+        super().__init__(f"{field} = {value!r} {rule}")
+        self.field, self.value, self.rule = field, value, rule
+        self.choices = tuple(choices)
+
+    def problem(self) -> dict[str, object]:
+        """Return field, value, rule and choices."""
+        return {
+            "field": self.field,
+            "value": repr(self.value),
+            "rule": self.rule,
+            "choices": list(self.choices),
+        }
 
 
 class ClockJump(Conflict):

@@ -31,13 +31,37 @@ Seed = Annotated[int, Field(ge=0, le=MAX_SEED)]
 Name = Annotated[str, Field(min_length=1, max_length=64)]
 
 
-class _Spec(BaseModel):
-    """A body without unknown fields, non-finite numbers and values of another JSON type."""
+class JobLabels(BaseModel):
+    """What people write on a job; it changes nothing of what the job computes."""
 
     model_config = ConfigDict(extra="forbid", allow_inf_nan=False, frozen=True, strict=True)
 
+    name: Annotated[str, Field(pattern=r"^[^\x00-\x1f]*$", max_length=80)] | None = Field(
+        None, description="a name for people, one line"
+    )
+    notes: Annotated[str, Field(max_length=4000)] | None = Field(
+        None, description="text for people"
+    )
+    priority: Annotated[int, Field(ge=-100, le=100)] = Field(
+        0, description="queued jobs of a higher priority start first"
+    )
+
+    def labels(self) -> dict[str, Any]:
+        """Return the labels; an empty text counts as none."""
+        return {
+            "name": (self.name or "").strip() or None,
+            "notes": (self.notes or "").strip() or None,
+            "priority": self.priority,
+        }
+
+
+class _Spec(JobLabels):
+    """A body without unknown fields, non-finite numbers and values of another JSON type."""
+
     def _body(self) -> dict[str, Any]:
-        return self.model_dump(mode="json", exclude_unset=True)
+        """Return the spec to store: the given fields, without labels."""
+        labels = set(JobLabels.model_fields)
+        return self.model_dump(mode="json", exclude_unset=True, exclude=labels)
 
 
 class TrainSpec(_Spec):
@@ -65,6 +89,7 @@ class TrainSpec(_Spec):
             seed=self.seed,
             overrides=self.overrides,
             total_steps=presets.resolve(self.preset, self.overrides).learning.total_steps,
+            **self.labels(),
         )
 
 
@@ -102,7 +127,7 @@ class EvaluateSpec(_Spec):
         check_motions(self.protocol, self.recordings, "recordings")
         checkpoint = self.checkpoint or default_checkpoint(self.protocol)
         spec = {**self._body(), "checkpoint": checkpoint}
-        return NewJob(kind=self.kind, spec=spec, seed=self.seed)
+        return NewJob(kind=self.kind, spec=spec, seed=self.seed, **self.labels())
 
 
 JobSpec = Annotated[TrainSpec | EvaluateSpec, Field(discriminator="kind")]
@@ -116,3 +141,23 @@ def parse_spec(body: Mapping[str, Any]) -> TrainSpec | EvaluateSpec:
         pydantic.ValidationError: A field is missing, unknown or breaks a rule.
     """
     return _JOB_SPEC.validate_python(body)
+
+
+def spec_type(kind: str) -> type[TrainSpec] | type[EvaluateSpec]:
+    """Return the type of a kind's specs."""
+    return TrainSpec if kind == "train" else EvaluateSpec
+
+
+def merge(spec: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a spec with changes: members of objects are merged, null removes one.
+
+    Source: RFC 7396, JSON merge patch.
+    """
+    merged = {name: value for name, value in spec.items() if name not in changes}
+    for name, value in changes.items():
+        if isinstance(value, Mapping):
+            inner = spec.get(name)
+            merged[name] = merge(inner if isinstance(inner, Mapping) else {}, value)
+        elif value is not None:
+            merged[name] = value
+    return merged

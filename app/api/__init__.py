@@ -6,6 +6,8 @@ application       The HTTP application: routers, error handlers, access control 
 bodies            ASGI layer that checks address and body of a request before its route
 description       The OpenAPI document: answers of every operation, access, and names of
                   operations
+job_requests      Jobs of requests: the one a path names, checks before one is queued,
+                  its answer
 known_people      Conversion of the people of a request to person states
 problems          Errors as problem documents (RFC 9457, ``application/problem+json``)
 registry          Cache of loaded policies, and names of stored checkpoints

@@ -20,6 +20,7 @@ from starlette.routing import Match
 
 from app.api.validation import (
     NOTHING,
+    BodyFault,
     Member,
     body_models,
     member,
@@ -187,7 +188,8 @@ async def on_service_error(request: Request, error: Exception) -> ProblemRespons
 async def on_validation_error(request: Request, error: Exception) -> ProblemResponse:
     """Answer a request that does not match its schema."""
     assert isinstance(error, RequestValidationError)
-    return validation_problem(error.errors(), body_models(request), request.url.path)
+    models = [error.model] if isinstance(error, BodyFault) else body_models(request)
+    return validation_problem(error.errors(), models, request.url.path)
 
 
 def validation_problem(

@@ -5,9 +5,10 @@ Pydantic's locations are inside our models; fields are paths in the JSON of the 
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, get_args
+from typing import Any, TypeVar, get_args
 
-from pydantic import BaseModel, Tag
+from fastapi.exceptions import RequestValidationError
+from pydantic import BaseModel, Tag, ValidationError
 from starlette.requests import Request
 
 MAX_VALUE_CHARACTERS = 200
@@ -15,6 +16,7 @@ MAX_LISTED_ITEMS = 8
 NOTHING = "nothing"
 
 Member = dict[str, object]
+M = TypeVar("M", bound=BaseModel)
 
 
 def dotted(location: Sequence[str | int]) -> str:
@@ -159,6 +161,31 @@ def without_tag(
             if location[1] in get_args(field.annotation):
                 return {**error, "loc": (location[0], *location[2:])}, variant
     return error, None
+
+
+class BodyFault(RequestValidationError):
+    """A body does not match a model that its route has chosen.
+
+    Args:
+        errors: Pydantic's errors.
+        model: The model.
+    """
+
+    def __init__(self, errors: Sequence[Mapping[str, Any]], model: type[BaseModel]) -> None:
+        super().__init__([{**one, "loc": ("body", *one["loc"])} for one in errors])
+        self.model = model
+
+
+def validated(model: type[M], body: Mapping[str, Any]) -> M:
+    """Return a body as the model that a route has chosen.
+
+    Raises:
+        BodyFault: It does not match.
+    """
+    try:
+        return model.model_validate(body)
+    except ValidationError as error:
+        raise BodyFault(error.errors(), model) from None
 
 
 def body_models(request: Request) -> list[type[BaseModel]]:

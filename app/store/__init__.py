@@ -8,6 +8,7 @@ cursors      Cursors of lists: opaque text with the number of the last item of a
 engine       The connection to the database: SQLite by default, PostgreSQL by URL
 events       Events of jobs, the source of event streams
 fencing      Fencing of writes about a running job by its attempt number
+job_actions  Actions on jobs beside cancel: resume, name, notes, priority
 jobs         Jobs: submit, read, cancel
 lock         Lock for one server per data folder and database
 metrics      Learning curves of jobs: one row per step

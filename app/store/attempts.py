@@ -43,7 +43,7 @@ class RunningJob:
 
 
 def claim_next(store: Store) -> tuple[Claim, JobRecord] | None:
-    """Claim the oldest queued job for its next attempt.
+    """Claim the oldest queued job of the highest priority for its next attempt.
 
     Points of the curve and checkpoints beyond the last resume state are deleted, since the new
     attempt repeats those steps.
@@ -51,12 +51,13 @@ def claim_next(store: Store) -> tuple[Claim, JobRecord] | None:
     Returns:
         The claim and the job, or None if nothing is queued.
     """
-    oldest = sa.select(jobs.c.id).where(jobs.c.state == "queued").order_by(jobs.c.number)
+    queued = sa.select(jobs.c.id).where(jobs.c.state == "queued")
+    first = queued.order_by(jobs.c.priority.desc(), jobs.c.number)
     with store.reading() as connection:  # an empty queue needs no write lock
-        if connection.execute(oldest.limit(1)).scalar() is None:
+        if connection.execute(first.limit(1)).scalar() is None:
             return None
     with store.writing() as connection:
-        job_id = connection.execute(oldest.limit(1).with_for_update(skip_locked=True)).scalar()
+        job_id = connection.execute(first.limit(1).with_for_update(skip_locked=True)).scalar()
         if job_id is None:
             return None
         step = _forget_beyond_resume(connection, job_id)

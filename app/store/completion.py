@@ -29,7 +29,7 @@ def finish(
     state: Literal["succeeded", "cancelled"] = "succeeded",
     result: Mapping[str, Any] | None = None,
 ) -> None:
-    """End a job as succeeded or cancelled.
+    """End a job as succeeded or cancelled; a cancelled one keeps its state to resume from.
 
     Raises:
         StaleAttempt: The attempt no longer holds the job.
@@ -38,14 +38,16 @@ def finish(
     changes = {"result": None if result is None else dict(result)}
 
     def end(connection: sa.Connection) -> None:
-        _drop_resume(connection, claim)
+        if state == "succeeded":  # first, which frees space in a full database
+            mine = resume_states.c.job_id == claim.job_id
+            connection.execute(sa.delete(resume_states).where(mine))
         _end(connection, claim, state, changes)
 
     write_with_reserve(store, end)
 
 
 def fail(store: Store, claim: Claim, error: str) -> None:
-    """End a job with a permanent error.
+    """End a job with a permanent error; it keeps its state to resume from.
 
     Raises:
         StaleAttempt: The attempt no longer holds the job.
@@ -54,7 +56,6 @@ def fail(store: Store, claim: Claim, error: str) -> None:
     changes = {"error": error[-MAX_ERROR:]}
 
     def end(connection: sa.Connection) -> None:
-        _drop_resume(connection, claim)
         _end(connection, claim, "failed", changes)
 
     write_with_reserve(store, end)
@@ -160,16 +161,8 @@ def _requeue(connection: sa.Connection, job_id: str, changes: Mapping[str, Any])
     changes = {**changes, "waiting": None}
     if job.cancel_requested:
         values = {**changes, "error": None, "finished_at": datetime.now(UTC)}
-        connection.execute(sa.delete(resume_states).where(resume_states.c.job_id == job_id))
         change_state(connection, job_id, "cancelled", values, data)
         return
     if changes.get("error"):
         data["error"] = changes["error"]
     change_state(connection, job_id, "queued", changes, data)
-
-
-def _drop_resume(connection: sa.Connection, claim: Claim) -> None:
-    """Delete the resume state first, which frees space in a full database."""
-    fenced_update(connection, claim, {}, counts=False)
-    mine = resume_states.c.job_id == claim.job_id
-    connection.execute(sa.delete(resume_states).where(mine))

@@ -12,7 +12,7 @@ import sqlalchemy as sa
 from app.errors import StaleAttempt
 from app.store.engine import Store
 from app.store.events import append_event
-from app.store.jobs import read_job
+from app.store.jobs import job_from_row
 from app.store.records import Claim, JobRecord
 from app.store.tables import jobs
 
@@ -55,7 +55,11 @@ def peek(store: Store, claim: Claim) -> JobRecord:
         StaleAttempt: The attempt no longer holds the job.
     """
     with store.reading() as connection:
-        job = read_job(connection, claim.job_id)
+        row = connection.execute(sa.select(jobs).where(jobs.c.id == claim.job_id))
+        found = row.mappings().first()
+    if found is None:  # deleted after its end
+        raise StaleAttempt(claim.job_id, claim.attempt)
+    job = job_from_row(found)
     if job.attempt != claim.attempt or job.state not in ("running", "cancelling"):
         raise StaleAttempt(claim.job_id, claim.attempt)
     return job

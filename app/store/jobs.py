@@ -3,24 +3,27 @@
     queued ──claim──> running ──> succeeded | failed
       │ ^               │  └──cancel──> cancelling ──> cancelled
       │ └──crash, restart of the server──┘
+      │ └──resume── failed | cancelled
       └──cancel──> cancelled
 
-Writes of workers and of the supervisor are in ``app.store.attempts`` and ``.completion``.
+Writes of workers and of the supervisor are in ``app.store.attempts`` and ``.completion``,
+actions on ended jobs in ``.job_actions``.
 """
 
 import uuid
 from collections.abc import Mapping
+from dataclasses import asdict
 from datetime import UTC, datetime
 from typing import Any, get_args
 
 import sqlalchemy as sa
 from sqlalchemy.exc import IntegrityError
 
-from app.errors import Conflict, InvalidInput, NotFound
+from app.errors import Conflict, InvalidInput, NotFound, WrongState
 from app.store.cursors import check_limit, decode_cursor, encode_cursor
 from app.store.engine import Store
 from app.store.events import append_event
-from app.store.records import JobRecord, JobState, NewJob, Page
+from app.store.records import FINAL_STATES, JobRecord, JobState, NewJob, Page
 from app.store.reserve import write_with_reserve
 from app.store.tables import jobs
 
@@ -38,40 +41,25 @@ def create_job(store: Store, new: NewJob, *, idempotency_key: str | None = None)
 
     Raises:
         Conflict: The key was used for another spec.
+        NotFound: The parent was deleted.
+        WrongState: An equal repetition of its parent has not ended.
         InvalidInput: The key is empty or too long.
         StorageFull: No room is left.
     """
     if idempotency_key is not None and not 1 <= len(idempotency_key) <= MAX_KEY_LENGTH:
         rule = f"must have 1 to {MAX_KEY_LENGTH} characters"
         raise InvalidInput("idempotency_key", idempotency_key, rule)
-    values = {
-        "id": str(uuid.uuid4()),
-        "kind": new.kind,
-        "preset": new.preset,
-        "seed": new.seed,
-        "overrides": dict(new.overrides or {}),
-        "spec": dict(new.spec),
-        "state": "queued",
-        "total_steps": new.total_steps,
-        "idempotency_key": idempotency_key,
-        "created_at": datetime.now(UTC),
-        "last_event": 1,
-    }
     try:
         with store.writing() as connection:
             earlier = _by_key(connection, idempotency_key)
             if earlier is None:
-                connection.execute(sa.insert(jobs).values(values))
-                data = {"state": "queued", "attempt": 0}
-                append_event(connection, str(values["id"]), 1, "state", data=data)
+                return _insert(connection, new, idempotency_key)
     except IntegrityError:  # another server process was faster with the same key
         with store.reading() as connection:
             earlier = _by_key(connection, idempotency_key)
         if earlier is None:
             raise
-    if earlier is not None:
-        return _same_submission(earlier, new)
-    return get_job(store, str(values["id"]))
+    return _same_submission(earlier, new)
 
 
 def get_job(store: Store, job_id: str) -> JobRecord:
@@ -138,7 +126,8 @@ def request_cancel(store: Store, job_id: str) -> JobRecord:
     def cancel(connection: sa.Connection) -> JobRecord:
         job = read_job(connection, job_id, for_update=True)
         if job.state in ("succeeded", "failed"):
-            raise Conflict(f"job {job_id} has already {job.state}: it cannot be cancelled")
+            rule = f"is final: job {job.number} has ended and cannot be cancelled"
+            raise WrongState("state", job.state, rule, ("queued", "running"))
         if job.state in ("queued", "running"):
             _cancel(connection, job)
         return read_job(connection, job_id)
@@ -167,6 +156,45 @@ def job_from_row(row: Mapping[Any, Any]) -> JobRecord:
     if fields["state"] == "running" and fields["cancel_requested"]:
         fields["state"] = "cancelling"
     return JobRecord(**fields)
+
+
+def _insert(connection: sa.Connection, new: NewJob, key: str | None) -> JobRecord:
+    """Insert a queued job with its first event.
+
+    Raises:
+        WrongState: An equal repetition of its parent has not ended.
+    """
+    if new.parent is not None:
+        _check_single(connection, new)
+    values = {
+        **asdict(new),
+        "id": str(uuid.uuid4()),
+        "overrides": dict(new.overrides or {}),
+        "spec": dict(new.spec),
+        "state": "queued",
+        "idempotency_key": key,
+        "created_at": datetime.now(UTC),
+        "last_event": 1,
+    }
+    connection.execute(sa.insert(jobs).values(values))
+    data = {"state": "queued", "attempt": 0}
+    append_event(connection, str(values["id"]), 1, "state", data=data)
+    return read_job(connection, str(values["id"]))
+
+
+def _check_single(connection: sa.Connection, new: NewJob) -> None:
+    """Refuse a second repetition of a job while an equal one waits or runs."""
+    read_job(connection, str(new.parent), for_update=True)  # one at a time
+    active = jobs.c.state.in_(("queued", "running"))
+    query = sa.select(jobs).where(jobs.c.parent == new.parent, active)
+    for row in connection.execute(query).mappings():
+        equal = job_from_row(row)
+        if dict(equal.spec) == dict(new.spec):
+            rule = (
+                f"of job {equal.number}, which repeats the same job with the same values: wait "
+                "for it, or cancel it first"
+            )
+            raise WrongState("state", equal.state, rule, FINAL_STATES)
 
 
 def _cancel(connection: sa.Connection, job: JobRecord) -> None:

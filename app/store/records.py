@@ -43,6 +43,14 @@ class NewJob:
     """Changes to the preset's fields."""
     total_steps: int | None = None
     """Steps of the job, where known beforehand."""
+    name: str | None = None
+    """A name for people."""
+    notes: str | None = None
+    """Text for people."""
+    priority: int = 0
+    """Queued jobs of a higher priority start first."""
+    parent: str | None = None
+    """Id of the job that this one repeats or changes."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -62,7 +70,15 @@ class JobRecord:
     overrides: Mapping[str, Any]
     """Changes to the preset's fields."""
     spec: Mapping[str, Any]
-    """The posted body."""
+    """The posted body, without name, notes and priority."""
+    name: str | None
+    """A name for people."""
+    notes: str | None
+    """Text for people."""
+    parent: str | None
+    """Id of the job that this one repeats or changes; it may be deleted."""
+    priority: int
+    """Queued jobs of a higher priority start first."""
     state: JobState
     """Its state."""
     attempt: int

@@ -83,6 +83,10 @@ jobs = Table(
     Column("seed", BigInteger, nullable=False),
     Column("overrides", JSON, nullable=False),
     Column("spec", JSON, nullable=False),
+    Column("name", String(80)),
+    Column("notes", Text),
+    Column("parent", String(36)),  # no foreign key: it may be deleted
+    Column("priority", Integer, nullable=False, default=0, server_default="0"),
     Column("state", String(16), nullable=False, index=True),
     Column("attempt", Integer, nullable=False, default=0),
     Column("failures", Integer, nullable=False, default=0),

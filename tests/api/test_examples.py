@@ -41,7 +41,10 @@ WRONG: dict[type, list[Any]] = {
 def names(client: TestClient) -> Iterator[dict[str, str]]:
     """Names that exist, by the name of the parameter of a path."""
     tracker = client.post("/v1/trackers", json={"cell": "pick-and-place"}).json()["id"]
-    yield {"tracker_id": tracker, "world_id": "main"}
+    training = {"kind": "train", "preset": "pick-td3", "priority": -100}
+    job = client.post("/v1/jobs", json=training).json()["id"]
+    client.post(f"/v1/jobs/{job}/cancel")
+    yield {"tracker_id": tracker, "world_id": "main", "job_id": job}
     client.delete(f"/v1/trackers/{tracker}")
 
 

@@ -1,6 +1,7 @@
 """A visitor starts a training job on the page and watches it learn."""
 
 from collections.abc import Callable
+from typing import Any
 
 import pytest
 from playwright.sync_api import Page, expect
@@ -55,6 +56,7 @@ def test_posted_job_appears_and_its_curve_grows(
     expect(page.locator('[data-role="point"]')).to_contain_text("episodes")
     expect(page.locator(".job-detail .legend").first).to_contain_text(" to ")
     cancel(page)
+    resume(page, job_id)
     assert page.problems == []  # type: ignore[attr-defined]
     page.close()
     newest_acts_though_the_stream_is_behind(open_page, server, job_id)
@@ -81,6 +83,84 @@ def newest_acts_though_the_stream_is_behind(
     expect(page.locator('[data-role="acts"]')).to_contain_text(f"{newest['step'] / 1e3:.1f} k")
     assert state(server)["checkpoint"] == newest["sha256"]
     tell(server, {"tag": "set-policy", "checkpoint": "pick"})
+
+
+def resume(page: Page, job_id: str | None) -> None:
+    """Resume the open job from its last state, see its curve grow on, and cancel it again."""
+    before = points(page)
+    page.click('.is-open [data-action="resume"]')
+    page.wait_for_function(
+        "n => Number(document.querySelector('[data-points]').dataset.points) > n",
+        arg=before,
+        timeout=GROWTH_MS,
+    )
+    expect(page.locator(".job.is-open")).to_have_attribute("data-job", job_id or "")
+    expect(page.locator(".job.is-open .job-sub")).to_contain_text("attempt 2")
+    cancel(page)
+
+
+@pytest.fixture
+def ended(server: str) -> dict[str, Any]:
+    """A training that was cancelled before its first checkpoint."""
+    overrides = {"learning": {"gamma": 0.97}}
+    body = {"kind": "train", "preset": "pick-td3", "seed": 1, "overrides": overrides}
+    job: dict[str, Any] = patient_http.post(f"{server}/v1/jobs", json=body).json()
+    stop(server, job)
+    return job
+
+
+def stop(server: str, job: dict[str, Any]) -> None:
+    """Cancel a job and wait for its end."""
+    patient_http.post(f"{server}/v1/jobs/{job['id']}/cancel")
+    patient_http.get(f"{server}/v1/jobs/{job['id']}/events")
+
+
+def posted(page: Page, path: str, act: Callable[[], None]) -> dict[str, Any]:
+    """Return the job of the answer to a request that an action sends."""
+    with page.expect_response(f"**/v1/jobs/{path}") as found:
+        act()
+    job: dict[str, Any] = found.value.json()
+    return job
+
+
+def test_ended_job_is_retried_cloned_and_named(
+    open_page: Callable[..., Page], server: str, ended: dict[str, Any]
+) -> None:
+    page = open_page(scene=False)
+    page.click("#tab-training")
+    row = page.locator(f'[data-job="{ended["id"]}"]')
+    if "is-open" not in (row.get_attribute("class") or ""):
+        row.locator(".job-head").click()
+    expect(row.locator('[data-action="resume"]')).to_have_count(0)
+    row.locator("summary").click()
+    row.locator("#label-name").fill("a baseline")
+    row.locator("#label-priority").fill("1000")
+    row.locator('[data-action="save-labels"]').click()
+    expect(row.locator(".field-error")).to_contain_text("100")
+    row.locator("#label-priority").fill("5")
+    row.locator("#label-notes").fill("to compare with")
+    row.locator('[data-action="save-labels"]').click()
+    expect(row.locator(".job-name")).to_contain_text("a baseline")
+    expect(row.locator('[data-role="notes"]')).to_have_text("to compare with")
+    row.locator('[data-action="clone"]').click()
+    expect(page.locator("#train-learning-gamma")).to_have_value("0.97")
+    page.fill("#train-seed", "2")
+    clone = posted(page, f"{ended['id']}/clone", lambda: page.click("form.train [type=submit]"))
+    assert (clone["seed"], clone["overrides"], clone["parent"]) == (
+        2,
+        ended["overrides"],
+        ended["id"],
+    )
+    expect(page.locator(".job.is-open .job-sub")).to_contain_text("from job")
+    row.locator(".job-head").click()
+    retry = row.locator('[data-action="retry"]')
+    again = posted(page, f"{ended['id']}/retry", lambda: retry.click())
+    assert (again["spec"], again["priority"]) == (ended["spec"], 5)
+    row.locator(".job-head").click()
+    retry.click()
+    expect(row.locator(".job-actions .field-error")).to_contain_text("wait for it")
+    for job in (clone, again):
+        stop(server, job)
 
 
 def cancel(page: Page) -> None:

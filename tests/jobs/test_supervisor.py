@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from app.errors import Conflict
-from app.store import attempts, checkpoints, jobs, metrics
+from app.store import attempts, checkpoints, job_actions, jobs, metrics
 from app.store.engine import Store
 from jobs.executor import LocalProcess
 from jobs.supervisor import Supervisor
@@ -83,7 +83,9 @@ def test_unknown_kind_fails_and_names_the_known(store: Store) -> None:
 
 
 @pytest.mark.usefixtures("supervisor")
-def test_cancelled_job_leaves_a_last_checkpoint(store: Store) -> None:
+def test_cancelled_job_leaves_a_last_checkpoint_and_resumes_from_it(
+    store: Store, supervisor: Supervisor
+) -> None:
     job_id = queue(store, steps=100, hold_at=[27])
     wait_for(store, job_id, lambda job: job.step == 25)
     jobs.request_cancel(store, job_id)
@@ -91,7 +93,12 @@ def test_cancelled_job_leaves_a_last_checkpoint(store: Store) -> None:
     newest = checkpoints.list_checkpoints(store, job_id=job_id).items[0]
     assert (job.state, job.attempt, job.error) == ("cancelled", 1, None)
     assert newest.step == 27
-    assert attempts.load_resume(store, job_id) is None
+    job_actions.resume_job(store, job_id)
+    supervisor.wake()
+    job = wait_until_final(store, job_id)
+    assert (job.state, job.attempt, job.failures) == ("succeeded", 2, 0)
+    steps = [row.step for row in metrics.list_metrics(store, job_id)]
+    assert steps == list(range(5, 101, 5))
 
 
 @pytest.mark.usefixtures("supervisor")

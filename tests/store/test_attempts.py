@@ -198,7 +198,7 @@ def test_job_to_be_cancelled_is_not_queued_again(store: Store, claim: Claim, how
     else:
         completion.give_back(store, claim)
     assert jobs.get_job(store, claim.job_id).state == "cancelled"
-    assert attempts.load_resume(store, claim.job_id) is None
+    assert attempts.load_resume(store, claim.job_id) == resume(10)
 
 
 def test_events_follow_the_commits_without_gap_or_repetition(

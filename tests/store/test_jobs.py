@@ -112,5 +112,5 @@ def test_cancelling_twice_changes_nothing(store: Store) -> None:
 
 def test_finished_job_cannot_be_cancelled(store: Store, claim: Claim) -> None:
     completion.finish(store, claim)
-    with pytest.raises(Conflict, match="has already succeeded"):
+    with pytest.raises(Conflict, match="'succeeded' is final: job 1"):
         jobs.request_cancel(store, claim.job_id)

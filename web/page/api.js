@@ -60,6 +60,9 @@ async function send(path, { method = "GET", body, headers, signal, patience = AN
 export const get = (path, options) => request(path, options);
 export const put = (path, body = {}, options = {}) =>
   request(path, { method: "PUT", body, ...options });
+export const patch = (path, body = {}, options = {}) =>
+  request(path, { method: "PATCH", body, ...options });
+export const remove = (path) => request(path, { method: "DELETE" });
 export const post = (path, body = {}, headers = {}, options = {}) =>
   request(path, { method: "POST", body, headers, ...options });
 /** Post a file as it is. */

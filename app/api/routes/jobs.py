@@ -1,35 +1,34 @@
-"""Training and evaluation as jobs: post, list, cancel, follow."""
+"""Training and evaluation as jobs: post, list, follow."""
 
 import asyncio
 from collections.abc import AsyncIterator
 from typing import Annotated
 
-from fastapi import APIRouter, Body, Depends, Header, Query, Response
+from fastapi import APIRouter, Body, Header, Query, Response
 from fastapi.sse import EventSourceResponse, ServerSentEvent
 from starlette.concurrency import run_in_threadpool
 
 from app.api.description import CREATED
+from app.api.job_requests import (
+    IdempotencyKey,
+    JobDep,
+    checked,
+    newest_point,
+    queued,
+    shown,
+)
 from app.api.schemas.examples import JOBS, named
 from app.api.schemas.jobs import JobList, JobPublic, MetricsPublic
-from app.api.services import Services, ServicesDep
-from app.policies.configs import presets
-from app.store import events, jobs, metrics
+from app.api.services import ServicesDep
+from app.store import events, job_actions, jobs, metrics
 from app.store.cursors import MAX_INTEGER
-from app.store.records import JobEvent, JobRecord, JobState, MetricRow
-from jobs.spec import EvaluateSpec, JobSpec
+from app.store.records import JobEvent, JobState
+from jobs.spec import JobSpec
 
 POLL_S = 0.3
 """How often an open stream looks for news [s]."""
 
 router = APIRouter(prefix="/v1/jobs", tags=["jobs"])
-
-
-def job_of_path(job_id: str, services: ServicesDep) -> JobRecord:
-    """Return the job that the path names."""
-    return jobs.get_job(services.store, job_id)
-
-
-JobDep = Annotated[JobRecord, Depends(job_of_path)]
 
 
 @router.post(
@@ -46,23 +45,10 @@ def create_job(
     body: Annotated[JobSpec, Body(openapi_examples=named(JOBS))],
     services: ServicesDep,
     response: Response,
-    idempotency_key: Annotated[
-        str | None, Header(description="the same key never makes a second job")
-    ] = None,
+    idempotency_key: IdempotencyKey = None,
 ) -> JobPublic:
     """Queue a training or an evaluation; ``Location`` says where to follow it."""
-    if isinstance(body, EvaluateSpec) and body.checkpoint is not None:
-        services.checkpoints.read(body.checkpoint)
-    new = body.new_job()
-    if isinstance(body, EvaluateSpec):
-        services.recordings.check(body.recordings)
-    if new.preset is not None:
-        preset = presets.resolve(new.preset, new.overrides or {})
-        services.cells.to_train_in(preset)
-    job = jobs.create_job(services.store, new, idempotency_key=idempotency_key)
-    services.supervisor.wake()
-    response.headers["Location"] = f"/v1/jobs/{job.id}"
-    return JobPublic.from_domain(job)
+    return queued(checked(body, services), services, response, idempotency_key)
 
 
 @router.get("", summary="List the jobs")
@@ -74,8 +60,11 @@ def list_jobs(
 ) -> JobList:
     """Return one page, newest first."""
     page = jobs.list_jobs(services.store, cursor=cursor, limit=limit, state=state)
+    steps = job_actions.resume_steps(services.store, [job.id for job in page.items])
     items = [
-        JobPublic.from_domain(job, None if job.is_final else newest_point(services, job))
+        JobPublic.from_domain(
+            job, None if job.is_final else newest_point(services, job), steps.get(job.id)
+        )
         for job in page.items
     ]
     waiting = services.supervisor.waiting
@@ -85,20 +74,7 @@ def list_jobs(
 @router.get("/{job_id}", summary="One job")
 def get_job(job: JobDep, services: ServicesDep) -> JobPublic:
     """Return one job with the newest point of its curve."""
-    return JobPublic.from_domain(job, newest_point(services, job))
-
-
-@router.post(
-    "/{job_id}/cancel",
-    status_code=202,
-    summary="Cancel a job",
-    responses={409: {"description": "The job has ended"}, 507: {}},
-)
-def cancel_job(job: JobDep, services: ServicesDep) -> JobPublic:
-    """Cancel a queued job at once; a running one stops after its next checkpoint."""
-    cancelled = jobs.request_cancel(services.store, job.id)
-    services.supervisor.wake()
-    return JobPublic.from_domain(cancelled)
+    return shown(job, services)
 
 
 @router.get("/{job_id}/metrics", summary="A job's learning curve")
@@ -144,11 +120,3 @@ def sent(event: JobEvent) -> ServerSentEvent:
     """Write a job's event as one of the stream."""
     data = {**event.data, "at": event.at}
     return ServerSentEvent(event=event.kind, id=str(event.id), data=data)
-
-
-def newest_point(services: Services, job: JobRecord) -> MetricRow | None:
-    """Return the last point of a job's curve, None before the first."""
-    if job.step <= 0:
-        return None
-    rows = metrics.list_metrics(services.store, job.id, after_step=job.step - 1, limit=1)
-    return rows[-1] if rows else None

@@ -72,6 +72,8 @@ JOBS: dict[str, Any] = {
     },
     "evaluate": {"kind": "evaluate", "protocol": "pick-single", "episodes": 100},
 }
+LABELS: dict[str, Any] = {"name": "baseline", "notes": "to compare with", "priority": 5}
+CHANGES: dict[str, Any] = {"seed": 2, "overrides": {"learning": {"gamma": 0.98}}}
 COMMANDS: dict[str, Any] = {
     "pause": {"tag": "pause"},
     "move a person": {"tag": "move-person", "pelvis": [0.2, 1.4, -1.57]},

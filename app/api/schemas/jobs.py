@@ -18,7 +18,13 @@ class JobPublic(Answer):
     preset: str | None
     seed: int
     overrides: dict[str, Any]
-    spec: dict[str, Any] = Field(description="the posted body")
+    spec: dict[str, Any] = Field(description="the posted body, without labels")
+    name: str | None = Field(description="a name for people")
+    notes: str | None = Field(description="text for people")
+    priority: int = Field(description="queued jobs of a higher priority start first")
+    parent: str | None = Field(
+        description="id of the job that this one repeats or changes; it may be deleted"
+    )
     state: str = Field(
         description="queued, running, cancelling, succeeded, failed or cancelled"
     )
@@ -38,14 +44,20 @@ class JobPublic(Answer):
     waiting: str | None = Field(
         description="reason for which its worker waits, such as `disk full`; null if it runs"
     )
+    resume_step: int | None = Field(
+        description="step of its newest state to resume from; null: none is kept"
+    )
     latest: dict[str, float | None] | None = Field(description="newest point of its curve")
 
     @classmethod
-    def from_domain(cls, job: JobRecord, latest: MetricRow | None = None) -> Self:
+    def from_domain(
+        cls, job: JobRecord, latest: MetricRow | None = None, resume_step: int | None = None
+    ) -> Self:
         """Return the schema of a record."""
-        names = (name for name in cls.model_fields if name != "latest")
+        names = cls.model_fields.keys() - {"latest", "resume_step"}
         members = {name: getattr(job, name) for name in names}
-        return cls(**members, latest=dict(latest.values) if latest else None)
+        values = dict(latest.values) if latest else None
+        return cls(**members, latest=values, resume_step=resume_step)
 
 
 class JobList(Answer):

@@ -1,12 +1,12 @@
 // Jobs: the list, and for the open one its learning curves, numbers and what can be done.
 import { html, useCallback, useEffect, useRef, useState } from "../vendor/htm-preact-standalone.module.js";
-import { follow, get, post } from "../api.js";
+import { follow, get } from "../api.js";
 import * as format from "../format.js";
 import { Icon } from "../icons.js";
 import { CurvePlot } from "../plots.js";
+import { JobActions, Labels, isActive } from "./jobactions.js";
 
 const POLL_MS = 2000;
-const FINAL = new Set(["succeeded", "failed", "cancelled"]);
 const TONES = { queued: "quiet", running: "accent", cancelling: "warn", succeeded: "good",
   failed: "bad", cancelled: "quiet" };
 const OUTCOMES = [
@@ -56,11 +56,7 @@ export function QueueWaits({ waiting }) {
     </span></p>`;
 }
 
-export function isActive(job) {
-  return !FINAL.has(job.state);
-}
-
-export function JobList({ jobs, error, open, onOpen, onChanged, onAct, acting, onNew }) {
+export function JobList({ jobs, error, onNew, ...rest }) {
   if (error && !jobs) {
     return html`<p class="notice bad" role="alert"><${Icon} name="alert" />
       The jobs could not be loaded: ${error.message}</p>`;
@@ -73,41 +69,44 @@ export function JobList({ jobs, error, open, onOpen, onChanged, onAct, acting, o
         <${Icon} name="plus" />Start one</button>`}</div>`;
   }
   return html`<ul class="jobs">
-    ${jobs.map((job) => html`<${Job} key=${job.id} job=${job} open=${open === job.id}
-      onOpen=${onOpen} onChanged=${onChanged} onAct=${onAct} acting=${acting} />`)}
+    ${jobs.map((job) => html`<${Job} key=${job.id} job=${job} jobs=${jobs} ...${rest}
+      open=${rest.open === job.id} />`)}
   </ul>`;
 }
 
-function Job({ job, open, onOpen, onChanged, onAct, acting }) {
+function Job({ job, jobs, open, ...rest }) {
   const share = progress(job);
   return html`<li class=${`job ${open ? "is-open" : ""}`} data-job=${job.id}
     data-state=${job.state}>
     <button type="button" class="job-head" aria-expanded=${String(open)}
-      onClick=${() => onOpen(open ? null : job.id)}>
+      onClick=${() => rest.onOpen(open ? null : job.id)}>
       <${Icon} name="chevron" />
       <span class="job-name">${title(job)}</span>
       <span class=${`chip chip-${job.waiting ? "warn" : TONES[job.state] ?? "quiet"}`}>${
         job.waiting ? `waiting: ${job.waiting}` : job.state}</span>
-      <span class="job-sub">${subtitle(job)}</span>
+      <span class="job-sub">${subtitle(job, jobs)}</span>
     </button>
     ${isActive(job) &&
     html`<div class="progress" role="progressbar" aria-label=${`Progress of ${title(job)}`}
       aria-valuemin="0" aria-valuemax="100" aria-valuenow=${Math.round(share * 100)}>
       <i style=${{ transform: `scaleX(${share})` }}></i></div>`}
     ${open && (job.kind === "evaluate"
-      ? html`<${Evaluation} job=${job} onChanged=${onChanged} />`
-      : html`<${JobDetail} job=${job} onChanged=${onChanged} onAct=${onAct}
-          acting=${acting} />`)}
+      ? html`<${Evaluation} job=${job} ...${rest} />`
+      : html`<${JobDetail} job=${job} ...${rest} />`)}
   </li>`;
 }
 
 function title(job) {
-  const name = job.preset ?? job.spec?.protocol ?? job.kind;
+  const name = job.name ?? job.preset ?? job.spec?.protocol ?? job.kind;
   return `${job.number === undefined ? format.short(job.id) : `Job ${job.number}`} · ${name}`;
 }
 
-function subtitle(job) {
+function subtitle(job, jobs) {
   const parts = [`seed ${job.seed}`];
+  if (job.name) parts.unshift(job.preset ?? job.spec?.protocol ?? job.kind);
+  const parent = job.parent && jobs.find(({ id }) => id === job.parent);
+  if (parent) parts.push(`from job ${parent.number}`);
+  if (job.state === "queued" && job.priority) parts.push(`priority ${format.number(job.priority)}`);
   const unit = job.kind === "evaluate" ? "rows" : "steps";
   if (isActive(job) && job.total_steps) {
     parts.push(`${format.steps(job.step)} of ${format.steps(job.total_steps)} ${unit}`);
@@ -128,7 +127,7 @@ function progress(job) {
   return job.total_steps ? Math.min(1, (job.step ?? 0) / job.total_steps) : 0;
 }
 
-function JobDetail({ job, onChanged, onAct, acting }) {
+function JobDetail({ job, onChanged, onOpen, onClone, onAct, acting }) {
   const { rows, checkpoint, lost } = useCurve(job, onChanged);
   const [at, setAt] = useState(null);
   const row = rows?.[at ?? rows.length - 1] ?? null;
@@ -155,11 +154,13 @@ function JobDetail({ job, onChanged, onAct, acting }) {
     ${lost && html`<p class="notice warn" role="status"><${Icon} name="alert" />
       Lost the stream of this job; trying again.</p>`}
     <${Speed} job=${job} row=${rows?.at(-1)} />
+    <${Notes} job=${job} />
     <div class="job-actions">
       ${checkpoint && html`<${Act} job=${job} newest=${checkpoint} acting=${acting}
         onAct=${onAct} />`}
-      ${isActive(job) && html`<${Cancel} job=${job} onChanged=${onChanged} />`}
+      <${JobActions} ...${{ job, onChanged, onOpen, onClone }} />
     </div>
+    <${Labels} job=${job} onChanged=${onChanged} />
   </div>`;
 }
 
@@ -197,7 +198,7 @@ function episodes({ episodes: n }) {
 }
 
 /** An evaluation has no curve: its rows, once all are known. */
-function Evaluation({ job, onChanged }) {
+function Evaluation({ job, onChanged, onOpen, onClone }) {
   const rows = job.result?.results ?? [];
   const rates = (row) => OUTCOMES.filter(({ key }) => row[key]);
   return html`<div class="job-detail">
@@ -215,9 +216,14 @@ function Evaluation({ job, onChanged }) {
           <b>${format.steps(row.contacts)}</b></dd>`}
       </div>`)}</dl>
       <p class="plot-foot"><span>Rates with their 95 % intervals</span></p>`}
-    ${isActive(job) && html`<div class="job-actions">
-      <${Cancel} job=${job} onChanged=${onChanged} /></div>`}
+    <${Notes} job=${job} />
+    <div class="job-actions"><${JobActions} ...${{ job, onChanged, onOpen, onClone }} /></div>
+    <${Labels} job=${job} onChanged=${onChanged} />
   </div>`;
+}
+
+function Notes({ job }) {
+  return job.notes && html`<p class="notes" data-role="notes">${job.notes}</p>`;
 }
 
 function Legend({ lines, row, show }) {
@@ -247,12 +253,16 @@ function useCurve(job, onChanged) {
   const [state, setState] = useState({ rows: null, checkpoint: null, lost: false });
   const changed = useRef(onChanged);
   changed.current = onChanged;
+  const known = useRef(null);
   useEffect(() => {
-    let points = new Map();
-    let checkpoint = null;
+    if (known.current?.job !== job.id) {
+      known.current = { job: job.id, points: new Map(), checkpoint: null, lastId: "" };
+      setState({ rows: null, checkpoint: null, lost: false });
+    }
+    let { points, checkpoint } = known.current;
     const show = (lost = false) => setState({ checkpoint, lost,
       rows: [...points.values()].sort((a, b) => a.step - b.step) });
-    const onEvent = (name, data) => {
+    const onEvent = (name, data, id) => {
       if (name === "progress") points.set(data.step, data);
       else if (name === "checkpoint") checkpoint = data.sha256 ?? checkpoint;
       else if (name === "state") {
@@ -261,6 +271,7 @@ function useCurve(job, onChanged) {
         }
         changed.current();
       }
+      Object.assign(known.current, { points, checkpoint, lastId: id || known.current.lastId });
       schedule();
     };
     let frame = 0;
@@ -270,40 +281,16 @@ function useCurve(job, onChanged) {
         show();
       });
     };
-    show();
-    setState((now) => ({ ...now, rows: null }));
     const stop = follow(`v1/jobs/${job.id}/events`, {
       onEvent,
       onUp: schedule,
       onDown: () => show(true),
+      lastId: known.current.lastId,
     });
     return () => {
       stop();
       cancelAnimationFrame(frame);
     };
-  }, [job.id]);
+  }, [job.id, job.attempt]); // the stream ends with the job; a resumed one has another attempt
   return state;
-}
-
-function Cancel({ job, onChanged }) {
-  const [asking, setAsking] = useState(false);
-  const [error, setError] = useState(null);
-  if (job.state === "cancelling") return html`<span class="faint">Stopping …</span>`;
-  const cancel = async () => {
-    try {
-      await post(`v1/jobs/${job.id}/cancel`);
-      setAsking(false);
-      onChanged();
-    } catch (problem) {
-      setError(problem);
-    }
-  };
-  return html`<div class="confirm">
-    ${asking
-      ? html`<span>Cancel it? Its checkpoints stay.</span>
-          <button type="button" class="danger" onClick=${cancel}>Cancel the job</button>
-          <button type="button" class="tool" onClick=${() => setAsking(false)}>Keep going</button>`
-      : html`<button type="button" class="tool" onClick=${() => setAsking(true)}>Cancel …</button>`}
-    ${error && html`<span class="field-error" role="alert">${error.message}</span>`}
-  </div>`;
 }

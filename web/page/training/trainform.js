@@ -1,6 +1,6 @@
 // The form that starts a training job; every field comes from GET /v1/presets.
 import { html, useEffect, useRef, useState } from "../vendor/htm-preact-standalone.module.js";
-import { get, post } from "../api.js";
+import { get, post, Unreachable } from "../api.js";
 import { Icon } from "../icons.js";
 
 const FIRST_FIELDS = ["cell", "learning.total_steps", "learning.n_envs", "learning.lr_start"];
@@ -16,33 +16,41 @@ export function usePresets(link) {
   return state;
 }
 
-/** The form; `cell` is the name of the cell that is shown: what is trained is for it. */
-export function TrainForm({ presets, error, cell, onStarted, onClose }) {
-  const [name, setName] = useState(null);
-  const [typed, setTyped] = useState({});
-  const [seed, setSeed] = useState("1");
+/**
+ * The form; `cell` is the name of the cell that is shown: what is trained is for it. With
+ * `from`, a job, it starts a job like that one with the changes that are made here.
+ */
+export function TrainForm({ presets, error, cell, from, onStarted, onClose }) {
+  const [name, setName] = useState(from?.preset ?? null);
+  const [typed, setTyped] = useState(() => texts(from?.overrides));
+  const [seed, setSeed] = useState(String(from?.seed ?? 1));
+  const [label, setLabel] = useState("");
   const [problem, setProblem] = useState(null);
   const [busy, setBusy] = useState(false);
   const form = useRef(null);
-  const first = useRef(null);
-  useEffect(() => first.current?.focus(), [presets !== null]);
+  const attempt = useRef(key()); // one submission, however often it is sent
+  useEffect(() => form.current?.querySelector("select:enabled, input")?.focus(), [presets !== null]);
   const preset = presets?.find((p) => p.name === name)
     ?? presets?.find((p) => p.cell === cell) ?? presets?.[0] ?? null;
-  const texts = { ...shownCell(preset, cell), ...typed };
+  const values = from ? typed : { ...shownCell(preset, cell), ...typed };
 
   const submit = async (event) => {
     event.preventDefault();
     setBusy(true);
     setProblem(null);
     try {
-      const job = await post("v1/jobs", {
-        kind: "train",
-        preset: preset.name,
-        seed: parsed(seed),
-        overrides: overrides(preset, texts),
-      }, { "Idempotency-Key": key() });
+      const own = overrides(preset, values);
+      const labels = { seed: parsed(seed), name: label || null };
+      const job = from
+        ? await post(`v1/jobs/${from.id}/clone`, {
+          ...labels, overrides: patchOf(from.overrides, own),
+        }, { "Idempotency-Key": attempt.current })
+        : await post("v1/jobs", {
+          kind: "train", preset: preset.name, ...labels, overrides: own,
+        }, { "Idempotency-Key": attempt.current });
       onStarted(job);
     } catch (refused) {
+      attempt.current = refused instanceof Unreachable ? attempt.current : key();
       setProblem(refused);
       requestAnimationFrame(() => form.current?.querySelector("[aria-invalid=true]")?.focus());
     }
@@ -53,27 +61,33 @@ export function TrainForm({ presets, error, cell, onStarted, onClose }) {
     return html`<p class="notice bad" role="alert"><${Icon} name="alert" />
       The presets could not be loaded: ${error.message}</p>`;
   }
+  if (from && presets && preset?.name !== from.preset) {
+    return html`<p class="notice bad" role="alert"><${Icon} name="alert" />
+      Job ${from.number} was trained with the preset ${from.preset}, which does not exist any more.</p>`;
+  }
   if (!preset) return html`<div class="skeleton tall" aria-busy="true"></div>`;
   const faults = faultsByField(problem, preset);
   const fields = preset.fields ?? [];
   const rest = fields.filter((f) => !FIRST_FIELDS.includes(f.name));
-  const inRest = rest.some((f) => faults[f.name] || changed(f, texts));
+  const inRest = rest.some((f) => faults[f.name] || changed(f, values));
   const type = (name, text) => {
     setTyped((now) => ({ ...now, [name]: text }));
     setProblem((now) => without(now, name, preset));
   };
-  const row = (f) => html`<${Field} key=${f.name} field=${f} text=${texts[f.name]}
+  const row = (f) => html`<${Field} key=${f.name} field=${f} text=${values[f.name]}
     fault=${faults[f.name]} onText=${(text) => type(f.name, text)} />`;
+  const title = from ? `Clone of job ${from.number}` : "New training job";
   return html`<form class="train" ref=${form} onSubmit=${submit} noValidate
-    aria-label="New training job">
-    <div class="train-head"><h3>New training job</h3>
+    aria-label=${title}>
+    <div class="train-head"><h3>${title}</h3>
       <button type="button" class="quiet-button" aria-label="Close the form" onClick=${onClose}>
         <${Icon} name="close" /></button></div>
     ${faults[""] && html`<p class="notice bad" role="alert"><${Icon} name="alert" />
       <span>${faults[""]}</span></p>`}
     <div class="field">
       <label for="train-preset">Preset</label>
-      <select id="train-preset" ref=${first} value=${preset.name} aria-describedby="preset-help"
+      <select id="train-preset" value=${preset.name} aria-describedby="preset-help"
+        disabled=${Boolean(from)}
         aria-invalid=${String(Boolean(faults.preset))}
         onChange=${(e) => { setName(e.target.value); setTyped({}); setProblem(null); }}>
         ${presets.map((p) => html`<option key=${p.name} value=${p.name}>${p.name}</option>`)}
@@ -85,6 +99,11 @@ export function TrainForm({ presets, error, cell, onStarted, onClose }) {
       text=${seed} fault=${faults.seed} onText=${(text) => {
         setSeed(text);
         setProblem((now) => without(now, "seed", preset));
+      }} />
+    <${Field} field=${{ name: "name", default: "", help: "For the list of jobs; may be empty." }}
+      text=${label} fault=${faults.name} onText=${(text) => {
+        setLabel(text);
+        setProblem((now) => without(now, "name", preset));
       }} />
     ${fields.filter((f) => FIRST_FIELDS.includes(f.name)).map(row)}
     ${rest.length > 0 && html`<details class="more" open=${inRest || undefined}>
@@ -185,6 +204,26 @@ function overrides(preset, texts) {
   return found;
 }
 
+/** A job's overrides as the texts of the form's fields, by dotted name. */
+function texts(overrides) {
+  return Object.fromEntries(Object.entries(overrides ?? {}).flatMap(([group, value]) =>
+    value && typeof value === "object" && !Array.isArray(value)
+      ? Object.entries(value).map(([name, v]) => [`${group}.${name}`, show(v)])
+      : [[group, show(value)]]));
+}
+
+/** The merge patch that makes `wanted` of the overrides `now`: null removes a member. */
+function patchOf(now, wanted) {
+  const patch = { ...wanted };
+  for (const [name, value] of Object.entries(now ?? {})) {
+    if (!(name in wanted)) patch[name] = null;
+    else if (value && typeof value === "object" && !Array.isArray(value)) {
+      patch[name] = patchOf(value, wanted[name]);
+    }
+  }
+  return patch;
+}
+
 /** The single faults that a problem lists. */
 function faultsOf(problem) {
   return problem?.errors?.length ? problem.errors : problem?.field ? [problem] : [];
@@ -192,7 +231,7 @@ function faultsOf(problem) {
 
 /** Name of the form's field that a fault is about; "" where it is none of them. */
 function fieldOf(fault, preset) {
-  const names = new Set(["seed", "preset", ...(preset.fields ?? []).map((f) => f.name)]);
+  const names = new Set(["seed", "name", "preset", ...(preset.fields ?? []).map((f) => f.name)]);
   const path = String(fault.field ?? "");
   const name = path.replace(/^overrides\./, "");
   return names.has(name) ? name : "";

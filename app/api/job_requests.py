@@ -1,0 +1,62 @@
+"""Jobs of requests: the one a path names, checks before one is queued, its answer."""
+
+from typing import Annotated
+
+from fastapi import Depends, Header, Response
+
+from app.api.schemas.jobs import JobPublic
+from app.api.services import Services, ServicesDep
+from app.policies.configs import presets
+from app.store import job_actions, jobs, metrics
+from app.store.records import JobRecord, MetricRow, NewJob
+from jobs.spec import EvaluateSpec, TrainSpec
+
+
+def job_of_path(job_id: str, services: ServicesDep) -> JobRecord:
+    """Return the job that the path names."""
+    return jobs.get_job(services.store, job_id)
+
+
+JobDep = Annotated[JobRecord, Depends(job_of_path)]
+IdempotencyKey = Annotated[
+    str | None, Header(description="the same key never makes a second job")
+]
+
+
+def checked(body: TrainSpec | EvaluateSpec, services: Services) -> NewJob:
+    """Return the job to queue; everything that it names exists.
+
+    Raises:
+        InvalidInput: A preset, protocol, checkpoint, cell or recording is unknown or unfit.
+    """
+    if isinstance(body, EvaluateSpec) and body.checkpoint is not None:
+        services.checkpoints.read(body.checkpoint)
+    new = body.new_job()
+    if isinstance(body, EvaluateSpec):
+        services.recordings.check(body.recordings)
+    if new.preset is not None:
+        preset = presets.resolve(new.preset, new.overrides or {})
+        services.cells.to_train_in(preset)
+    return new
+
+
+def queued(new: NewJob, services: Services, response: Response, key: str | None) -> JobPublic:
+    """Queue a job; ``Location`` says where to follow it."""
+    job = jobs.create_job(services.store, new, idempotency_key=key)
+    services.supervisor.wake()
+    response.headers["Location"] = f"/v1/jobs/{job.id}"
+    return JobPublic.from_domain(job)
+
+
+def shown(job: JobRecord, services: Services) -> JobPublic:
+    """Return a job with the newest point of its curve and the step it would resume from."""
+    steps = job_actions.resume_steps(services.store, [job.id])
+    return JobPublic.from_domain(job, newest_point(services, job), steps.get(job.id))
+
+
+def newest_point(services: Services, job: JobRecord) -> MetricRow | None:
+    """Return the last point of a job's curve, None before the first."""
+    if job.step <= 0:
+        return None
+    rows = metrics.list_metrics(services.store, job.id, after_step=job.step - 1, limit=1)
+    return rows[-1] if rows else None

@@ -1,0 +1,109 @@
+"""Actions on jobs: cancel, resume, retry, clone, label."""
+
+from dataclasses import replace
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Body, Response
+
+from app.api.description import CREATED
+from app.api.job_requests import IdempotencyKey, JobDep, checked, queued, shown
+from app.api.schemas import examples
+from app.api.schemas.examples import named
+from app.api.schemas.jobs import JobPublic
+from app.api.services import ServicesDep
+from app.api.validation import validated
+from app.store import job_actions, jobs
+from jobs.spec import JobLabels, merge, spec_type
+
+CHANGES = Body(
+    description="fields that differ from the job's spec, as a JSON merge patch (RFC 7396): "
+    "objects are merged, null removes a member; also name, notes and priority",
+    openapi_examples=named({"change": examples.CHANGES}),
+)
+
+LABELS = Body(openapi_examples=named({"label": examples.LABELS}))
+ENDED: dict[int | str, dict[str, Any]] = {
+    409: {"description": "The job is in another state"},
+    507: {},
+}
+REPEATED: dict[int | str, dict[str, Any]] = {
+    202: CREATED,
+    409: {
+        "description": "The job is in another state, an equal repetition has not ended, or the "
+        "idempotency key belongs to another body"
+    },
+    507: {},
+}
+
+router = APIRouter(prefix="/v1/jobs/{job_id}", tags=["jobs"])
+
+
+@router.post("/cancel", status_code=202, summary="Cancel a job", responses=ENDED)
+def cancel_job(job: JobDep, services: ServicesDep) -> JobPublic:
+    """Cancel a queued job at once; a running one stops after its next checkpoint."""
+    cancelled = jobs.request_cancel(services.store, job.id)
+    services.supervisor.wake()
+    return shown(cancelled, services)
+
+
+@router.post(
+    "/resume", status_code=202, summary="Resume a cancelled or failed job", responses=ENDED
+)
+def resume_job(job: JobDep, services: ServicesDep) -> JobPublic:
+    """Queue the same job again; it continues from its newest state, at ``resume_step``."""
+    resumed = job_actions.resume_job(services.store, job.id)
+    services.supervisor.wake()
+    return shown(resumed, services)
+
+
+@router.post(
+    "/retry",
+    status_code=202,
+    summary="Run a cancelled or failed job again",
+    responses=REPEATED,
+)
+def retry_job(
+    job: JobDep,
+    services: ServicesDep,
+    response: Response,
+    idempotency_key: IdempotencyKey = None,
+) -> JobPublic:
+    """Queue a new job with the same spec, which starts at step 0; the first one stays."""
+    job_actions.require_repeatable(job, "retry")
+    labels = {"name": job.name, "priority": job.priority}
+    body = validated(spec_type(job.kind), {**job.spec, **labels})
+    new = replace(checked(body, services), parent=job.id)
+    return queued(new, services, response, idempotency_key)
+
+
+@router.post(
+    "/clone",
+    status_code=202,
+    summary="Start a job like another, with changes",
+    responses=REPEATED,
+)
+def clone_job(
+    job: JobDep,
+    services: ServicesDep,
+    response: Response,
+    changes: Annotated[dict[str, Any], CHANGES],
+    idempotency_key: IdempotencyKey = None,
+) -> JobPublic:
+    """Queue a new job with the spec of this one and the given changes."""
+    body = validated(spec_type(job.kind), merge(job.spec, changes))
+    new = replace(checked(body, services), parent=job.id)
+    return queued(new, services, response, idempotency_key)
+
+
+@router.patch("", summary="Change name, notes or priority of a job", responses={507: {}})
+def update_job(
+    job: JobDep, services: ServicesDep, body: Annotated[JobLabels, LABELS]
+) -> JobPublic:
+    """Change the given members; null removes name or notes.
+
+    A priority counts while the job is queued.
+    """
+    given = body.labels().items()
+    changes = {name: value for name, value in given if name in body.model_fields_set}
+    changed = job_actions.change_labels(services.store, job.id, changes)
+    return shown(changed, services)

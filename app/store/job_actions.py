@@ -1,0 +1,84 @@
+"""Actions on jobs beside cancel: resume, name, notes, priority."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import sqlalchemy as sa
+
+from app.errors import WrongState
+from app.store.engine import Store
+from app.store.fencing import change_state
+from app.store.jobs import read_job
+from app.store.records import JobRecord
+from app.store.tables import jobs, resume_states
+
+REPEATABLE = ("cancelled", "failed")
+"""States from which a job is resumed or retried."""
+
+
+def resume_steps(store: Store, job_ids: Sequence[str]) -> dict[str, int]:
+    """Return the step of the newest state to resume from, for the jobs that have one."""
+    query = (
+        sa.select(resume_states.c.job_id, sa.func.max(resume_states.c.step).label("step"))
+        .where(resume_states.c.job_id.in_(job_ids))
+        .group_by(resume_states.c.job_id)
+    )
+    with store.reading() as connection:
+        return {row.job_id: row.step for row in connection.execute(query)}
+
+
+def resume_job(store: Store, job_id: str) -> JobRecord:
+    """Queue a cancelled or failed job again; its next attempt resumes from its newest state.
+
+    Crashes before count no longer.
+
+    Raises:
+        NotFound: There is no such job.
+        WrongState: It is neither cancelled nor failed, or it has no state to resume from.
+    """
+    with store.writing() as connection:
+        job = read_job(connection, job_id, for_update=True)
+        require_repeatable(job, "resume")
+        newest = sa.select(sa.func.max(resume_states.c.step))
+        step = connection.execute(newest.where(resume_states.c.job_id == job_id)).scalar()
+        if step is None:
+            rule = (
+                f"for job {job.number}: it ended before its first checkpoint, or its state is "
+                "not kept any more; retry it, which starts at step 0"
+            )
+            raise WrongState("resume_step", None, rule)
+        changes = {
+            "failures": 0,
+            "cancel_requested": False,
+            "error": None,
+            "result": None,
+            "finished_at": None,
+        }
+        change_state(connection, job_id, "queued", changes, {"attempt": job.attempt})
+        return read_job(connection, job_id)
+
+
+def require_repeatable(job: JobRecord, action: str) -> None:
+    """Check that a job has ended without a result.
+
+    Raises:
+        WrongState: It has not ended, or has succeeded.
+    """
+    if job.state in REPEATABLE:
+        return
+    remedy = "clone it with changes" if job.state == "succeeded" else "cancel it first"
+    rule = f"must be {' or '.join(REPEATABLE)} to {action} job {job.number}: {remedy}"
+    raise WrongState("state", job.state, rule, REPEATABLE)
+
+
+def change_labels(store: Store, job_id: str, changes: Mapping[str, Any]) -> JobRecord:
+    """Change name, notes or priority of a job; a priority counts while the job is queued.
+
+    Raises:
+        NotFound: There is no such job.
+    """
+    with store.writing() as connection:
+        read_job(connection, job_id, for_update=True)
+        if changes:
+            connection.execute(sa.update(jobs).where(jobs.c.id == job_id).values(**changes))
+        return read_job(connection, job_id)

@@ -1,0 +1,118 @@
+from typing import Any
+
+import pytest
+from fastapi.testclient import TestClient
+
+TRAIN = {"kind": "train", "preset": "pick-td3", "seed": 1, "priority": -100}
+
+
+@pytest.fixture
+def ended(client: TestClient) -> dict[str, Any]:
+    """A training that was cancelled before it could start or learn."""
+    overrides = {"learning": {"gamma": 0.97, "total_steps": 40960}}
+    body = {**TRAIN, "overrides": overrides, "name": "first"}
+    job = client.post("/v1/jobs", json=body).json()
+    return cancelled(client, job)
+
+
+def cancelled(client: TestClient, job: dict[str, Any]) -> dict[str, Any]:
+    client.post(f"/v1/jobs/{job['id']}/cancel").raise_for_status()
+    client.get(f"/v1/jobs/{job['id']}/events").raise_for_status()  # ends with the job
+    found: dict[str, Any] = client.get(f"/v1/jobs/{job['id']}").json()
+    assert found["state"] == "cancelled"
+    return found
+
+
+def test_labels_of_a_posted_job_are_not_part_of_its_spec(ended: dict[str, Any]) -> None:
+    assert (ended["name"], ended["priority"]) == ("first", -100)
+    assert ended["spec"].keys() == {"kind", "preset", "seed", "overrides"}
+
+
+def test_retry_queues_a_new_job_with_the_same_spec(
+    client: TestClient, ended: dict[str, Any]
+) -> None:
+    answer = client.post(f"/v1/jobs/{ended['id']}/retry")
+    job = answer.json()
+    assert answer.status_code == 202
+    assert answer.headers["location"] == f"/v1/jobs/{job['id']}"
+    assert (job["parent"], job["spec"], job["name"]) == (ended["id"], ended["spec"], "first")
+    again = client.post(f"/v1/jobs/{ended['id']}/retry")
+    assert again.status_code == 409
+    assert again.json()["field"] == "state" and f"of job {job['number']}" in again.text
+    cancelled(client, job)
+
+
+@pytest.mark.parametrize("action", ["retry", "resume"])
+def test_job_that_has_not_ended_is_not_repeated(client: TestClient, action: str) -> None:
+    job = client.post("/v1/jobs", json=TRAIN).json()
+    answer = client.post(f"/v1/jobs/{job['id']}/{action}")
+    assert answer.status_code == 409
+    problem = answer.json()
+    assert (problem["field"], problem["choices"]) == ("state", ["cancelled", "failed"])
+    assert problem["value"] in ("'queued'", "'running'")
+    cancelled(client, job)
+
+
+def test_job_without_a_state_says_what_to_do(client: TestClient, ended: dict[str, Any]) -> None:
+    assert ended["resume_step"] is None
+    answer = client.post(f"/v1/jobs/{ended['id']}/resume")
+    assert answer.status_code == 409
+    assert answer.json()["field"] == "resume_step"
+    assert "retry it" in answer.json()["detail"]
+
+
+def test_clone_merges_changes_into_the_spec(client: TestClient, ended: dict[str, Any]) -> None:
+    changes = {
+        "seed": 2,
+        "name": "second",
+        "overrides": {"learning": {"gamma": None, "n_envs": 64}},
+    }
+    answer = client.post(f"/v1/jobs/{ended['id']}/clone", json={**changes, "priority": -100})
+    job = answer.json()
+    assert answer.status_code == 202
+    assert job["overrides"] == {"learning": {"total_steps": 40960, "n_envs": 64}}
+    assert (job["seed"], job["name"], job["parent"]) == (2, "second", ended["id"])
+    assert job["preset"] == ended["preset"]
+    cancelled(client, job)
+
+
+@pytest.mark.parametrize(
+    ("changes", "field", "text"),
+    [
+        ({"seed": -1}, "seed", "greater"),
+        ({"kind": "evaluate"}, "kind", "train"),
+        ({"preset": None}, "preset", "required"),
+        ({"colour": "red"}, "colour", "priority"),
+        ({"priority": 101}, "priority", "100"),
+        ({"name": "two\nlines"}, "name", "match"),
+        ({"overrides": {"learning": {"gamma": 2.0}}}, "overrides.learning.gamma", "1"),
+    ],
+)
+def test_bad_change_is_refused_by_field(
+    client: TestClient, ended: dict[str, Any], changes: dict[str, Any], field: str, text: str
+) -> None:
+    answer = client.post(f"/v1/jobs/{ended['id']}/clone", json=changes)
+    assert answer.status_code == 422, answer.text
+    assert answer.json()["field"] == field
+    assert text in answer.text
+
+
+def test_labels_are_changed_and_removed(client: TestClient, ended: dict[str, Any]) -> None:
+    path = f"/v1/jobs/{ended['id']}"
+    changed = client.patch(path, json={"notes": " a baseline ", "priority": 7}).json()
+    assert (changed["name"], changed["notes"], changed["priority"]) == (
+        "first",
+        "a baseline",
+        7,
+    )
+    removed = client.patch(path, json={"name": None, "notes": ""}).json()
+    assert (removed["name"], removed["notes"], removed["priority"]) == (None, None, 7)
+    assert client.get(path).json() == removed
+    refused = client.patch(path, json={"priority": 1.5})
+    assert refused.status_code == 422 and refused.json()["field"] == "priority"
+
+
+def test_actions_on_an_unknown_job_are_not_found(client: TestClient) -> None:
+    for action in ("cancel", "resume", "retry", "clone"):
+        assert client.post(f"/v1/jobs/nothing/{action}", json={}).status_code == 404
+    assert client.patch("/v1/jobs/nothing", json={}).status_code == 404

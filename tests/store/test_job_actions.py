@@ -1,0 +1,109 @@
+from dataclasses import replace
+
+import pytest
+
+from app.errors import NotFound, StaleAttempt, WrongState
+from app.store import attempts, completion, job_actions, jobs
+from app.store.engine import Store
+from app.store.records import Claim, JobRecord, NewCheckpoint, NewJob, ResumeState
+from tests.store.test_checkpoints import policy
+
+COUNT = NewJob(kind="count", spec={"kind": "count"})
+
+
+def save(store: Store, claim: Claim, step: int, made: NewCheckpoint) -> None:
+    state = ResumeState(step=step, manifest={}, tensors=b"state")
+    attempts.record_checkpoint(store, claim, step, made, state)
+
+
+def end(store: Store, claim: Claim, state: str) -> JobRecord:
+    if state == "failed":
+        completion.fail(store, claim, "out of luck")
+    elif state == "cancelled":
+        completion.finish(store, claim, state="cancelled")
+    elif state == "succeeded":
+        completion.finish(store, claim)
+    return jobs.get_job(store, claim.job_id)
+
+
+@pytest.mark.parametrize("state", ["failed", "cancelled"])
+def test_resumed_job_continues_from_its_newest_state(
+    store: Store, claim: Claim, state: str
+) -> None:
+    save(store, claim, 10, policy(b"10"))
+    attempts.record_progress(store, claim, 15, {"value": 1.0})
+    end(store, claim, state)
+    assert job_actions.resume_steps(store, [claim.job_id]) == {claim.job_id: 10}
+    job = job_actions.resume_job(store, claim.job_id)
+    assert (job.state, job.error, job.finished_at, job.failures) == ("queued", None, None, 0)
+    found = attempts.claim_next(store)
+    assert found is not None and found[1].step == 10 and found[0].attempt == 2
+    resumed = attempts.load_resume(store, claim.job_id)
+    assert resumed is not None and resumed.step == 10
+
+
+def test_second_click_on_resume_is_refused_with_the_state(store: Store, claim: Claim) -> None:
+    save(store, claim, 10, policy(b"10"))
+    end(store, claim, "failed")
+    job_actions.resume_job(store, claim.job_id)
+    with pytest.raises(WrongState, match="'queued' must be cancelled or failed to resume") as e:
+        job_actions.resume_job(store, claim.job_id)
+    assert e.value.problem()["choices"] == ["cancelled", "failed"]
+
+
+def test_succeeded_job_keeps_no_state_and_is_not_resumed(store: Store, claim: Claim) -> None:
+    save(store, claim, 10, policy(b"10"))
+    end(store, claim, "succeeded")
+    assert job_actions.resume_steps(store, [claim.job_id]) == {}
+    with pytest.raises(WrongState, match="clone it with changes"):
+        job_actions.resume_job(store, claim.job_id)
+
+
+def test_job_without_a_state_is_retried_instead_of_resumed(store: Store, claim: Claim) -> None:
+    end(store, claim, "failed")
+    with pytest.raises(WrongState, match="before its first checkpoint.*retry it"):
+        job_actions.resume_job(store, claim.job_id)
+
+
+def test_late_worker_of_a_resumed_job_is_fenced_off(store: Store, claim: Claim) -> None:
+    save(store, claim, 10, policy(b"10"))
+    end(store, claim, "cancelled")
+    job_actions.resume_job(store, claim.job_id)
+    with pytest.raises(StaleAttempt, match="no longer holds"):
+        attempts.heartbeat(store, claim)
+
+
+def test_equal_repetition_waits_for_the_first(store: Store, claim: Claim) -> None:
+    end(store, claim, "failed")
+    again = replace(COUNT, parent=claim.job_id)
+    first = jobs.create_job(store, again)
+    with pytest.raises(WrongState, match=f"of job {first.number}, which repeats"):
+        jobs.create_job(store, again)
+    jobs.create_job(store, replace(again, spec={"kind": "count", "seed": 2}))
+    jobs.request_cancel(store, first.id)
+    assert jobs.create_job(store, again).parent == claim.job_id
+
+
+def test_repetition_of_an_unknown_job_is_refused(store: Store) -> None:
+    with pytest.raises(NotFound):
+        jobs.create_job(store, replace(COUNT, parent="gone"))
+
+
+def test_jobs_of_higher_priority_start_first_the_older_of_equals(store: Store) -> None:
+    low, old, new, late = (
+        jobs.create_job(store, replace(COUNT, priority=p)).id for p in (0, 5, 5, -1)
+    )
+    job_actions.change_labels(store, late, {"priority": 9})
+    order = []
+    while (found := attempts.claim_next(store)) is not None:
+        order.append(found[1].id)
+    assert order == [late, old, new, low]
+
+
+def test_labels_change_only_what_is_given(store: Store) -> None:
+    job = jobs.create_job(store, replace(COUNT, name="first", notes="slow", priority=3))
+    changed = job_actions.change_labels(store, job.id, {"notes": None})
+    assert (changed.name, changed.notes, changed.priority) == ("first", None, 3)
+    assert job_actions.change_labels(store, job.id, {}) == changed
+    with pytest.raises(NotFound):
+        job_actions.change_labels(store, "gone", {"name": "x"})
