@@ -19,6 +19,8 @@ tracker_sessions  Sessions of trackers: the estimators of people, kept between f
 validation        Conversion of pydantic's validation errors to field, value, rule and
                   choices
 world_policies    Policies and recordings that commands to a live world name
+motion/           Motion decisions: answers of the route, and sockets for loops with a
+                  deadline
 routes/           One router per resource
 schemas/          What goes over the wire: one pydantic model per direction, units in the
                   descriptions

@@ -20,7 +20,8 @@ from prometheus_client import (
 from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, HistogramMetricFamily
 from prometheus_client.registry import Collector
 
-from app.api.services import MAX_STREAMS, MAX_VIEWERS, Services
+from app.api.motion.load import MAX_SOCKETS
+from app.api.services import MAX_VIEWERS, Services
 from app.errors import StorageFull, StorageUnavailable
 from app.live.snapshot import WorldSnapshot
 from app.provenance import describe
@@ -186,12 +187,12 @@ def _tracker_ages(services: Services) -> Labelled:
 
 
 def _sockets(services: Services) -> Labelled:
-    yield ("motion",), MAX_STREAMS - services.motion_streams._value
+    yield ("motion",), services.motion_load.n_open
     yield ("viewer",), MAX_VIEWERS - services.viewers._value
 
 
 def _limits(_services: Services) -> Labelled:
-    yield ("motion",), MAX_STREAMS
+    yield ("motion",), MAX_SOCKETS
     yield ("viewer",), MAX_VIEWERS
 
 

@@ -11,13 +11,15 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from fastapi import FastAPI, Request
-from fastapi.exceptions import RequestValidationError
+from fastapi.exceptions import RequestValidationError, WebSocketRequestValidationError
 from fastapi.responses import JSONResponse
 from pydantic import BaseModel, ConfigDict, Field
 from starlette.exceptions import HTTPException
 from starlette.requests import ClientDisconnect
 from starlette.routing import Match
+from starlette.websockets import WebSocket
 
+from app.api.sockets import POLICY, refuse
 from app.api.validation import (
     NOTHING,
     BodyFault,
@@ -257,8 +259,17 @@ async def on_disconnect(request: Request, _error: Exception) -> ProblemResponse:
     return problem(400, "the body of the request is incomplete", instance=request.url.path)
 
 
+async def on_socket_error(client: WebSocket, error: Exception) -> None:
+    """Refuse a socket whose parameters do not match their schema."""
+    assert isinstance(error, WebSocketRequestValidationError)
+    fault = validation_member(error.errors()[0], None)
+    reason = f"{fault['field']} = {fault['value']} {fault['rule']}: {fault['choices'] or ''}"
+    await refuse(client, reason.removesuffix(": "), POLICY)
+
+
 def install(app: FastAPI) -> None:
     """Register the handlers; unexpected errors are answered by ``answers.py``."""
+    app.add_exception_handler(WebSocketRequestValidationError, on_socket_error)
     app.add_exception_handler(ServiceError, on_service_error)
     app.add_exception_handler(RequestValidationError, on_validation_error)
     app.add_exception_handler(HTTPException, on_http_error)

@@ -10,6 +10,7 @@ from fastapi import Depends
 from starlette.concurrency import run_in_threadpool
 from starlette.requests import HTTPConnection
 
+from app.api.motion.load import MotionLoad
 from app.api.registry import CheckpointNames, PolicyRegistry
 from app.api.tracker_sessions import TrackerSessions
 from app.errors import InvalidInput, NotFound, NotReady
@@ -27,8 +28,6 @@ from jobs.supervisor import Supervisor
 
 MAX_UPLOADS = 4
 """Largest number of uploads at once; each file is held in memory."""
-MAX_STREAMS = 16
-"""Largest number of open motion sockets."""
 MAX_VIEWERS = 16
 """Largest number of open 3D viewers."""
 
@@ -120,10 +119,8 @@ class Services:
         default_factory=lambda: threading.BoundedSemaphore(MAX_UPLOADS)
     )
     """Held during an upload."""
-    motion_streams: threading.BoundedSemaphore = field(
-        default_factory=lambda: threading.BoundedSemaphore(MAX_STREAMS)
-    )
-    """Held by every open motion socket."""
+    motion_load: MotionLoad = field(default_factory=MotionLoad)
+    """Load by motion sockets."""
     viewers: threading.BoundedSemaphore = field(
         default_factory=lambda: threading.BoundedSemaphore(MAX_VIEWERS)
     )

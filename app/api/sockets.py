@@ -2,17 +2,21 @@
 
 from starlette.websockets import WebSocket
 
-TRY_AGAIN = 1013
-"""Close code: try again later."""
+TRY_AGAIN, POLICY = 1013, 1008
+"""Close codes: try again later; the request breaks a rule."""
+
+MAX_REASON = 123
+"""Longest reason [bytes]."""
 
 
-async def refuse(client: WebSocket, reason: str) -> None:
+async def refuse(client: WebSocket, reason: str, code: int = TRY_AGAIN) -> None:
     """Open and close a socket; a browser sees the reason of no other refusal.
 
     Args:
         client: Socket that is not open yet.
-        reason: One sentence of at most 123 bytes.
+        reason: One sentence, of which 123 bytes are sent.
+        code: Close code.
     """
     offered: list[str] = client.scope.get("subprotocols", [])
     await client.accept(offered[0] if offered else None)
-    await client.close(TRY_AGAIN, reason)
+    await client.close(code, reason.encode()[:MAX_REASON].decode(errors="ignore"))

@@ -70,6 +70,25 @@ def questions(one: MotionDecider, seed: int) -> list[MotionQuestion]:
     ]
 
 
+def requests(seed: int) -> list[dict[str, object]]:
+    """Return the same states as requests of ``/v1/motion``, beside a person each."""
+    found = []
+    for one in questions(decider()[0], seed):
+        (person,) = one.people
+        assert person.cylinder is not None
+        (x, y, r), (vx, vy) = person.cylinder.tolist(), person.qd[:2].tolist()
+        found.append(
+            {
+                "cell": "shared-workspace",
+                "robot": {"q": one.q.tolist(), "qd": one.qd.tolist()},
+                "people": [{"x": x, "y": y, "vx": vx, "vy": vy, "r": r}],
+                "goal": np.asarray(one.goal).tolist(),
+                "time_left_s": one.time_left_s,
+            }
+        )
+    return found
+
+
 def predicting(one: MotionDecider, seed: int) -> Callable[[], None]:
     """Return eight calls of ``TD3.predict`` on a network of the same size."""
     n_obs = VIEWS[one.actor.view][1]

@@ -1,7 +1,7 @@
 """``POST /v1/motion``: state, people and goal in, the next trajectory segment out."""
 
 from collections.abc import Sequence
-from typing import Annotated, Self
+from typing import Annotated, Literal, Self
 
 import numpy as np
 from pydantic import Field
@@ -200,6 +200,24 @@ class PersonMet(PersonUse):
         return cls(**dict(use), separation=separation, weight=weight)
 
 
+LeftOut = Literal["search", "rollout"]
+"""Parts of a decision that a late request on a socket is answered without."""
+
+
+class StreamUse(Answer):
+    """How a request on a socket was served."""
+
+    waited_ms: float = Field(description="time from its arrival to its decision [ms]")
+    missed_deadline: bool = Field(description="whether it is answered after its deadline")
+    superseded: int = Field(
+        description="number of earlier requests that are not answered, since the last answer"
+    )
+    left_out: list[LeftOut] = Field(
+        description="parts left out because it had waited for long: the `search` for "
+        "alternatives where the policy waits, then the whole `rollout`"
+    )
+
+
 class MotionAnswer(Answer):
     """The next trajectory segment with its explanation."""
 
@@ -239,6 +257,7 @@ class MotionAnswer(Answer):
     checkpoint: str = Field(description="SHA-256 of the checkpoint")
     elapsed_ms: float = Field(description="time of the decision [ms]")
     stamp: Stamp = None
+    stream: StreamUse | None = Field(default=None, description="null but on a socket")
 
     @classmethod
     def from_domain(

@@ -1,0 +1,93 @@
+"""Answers to motion requests, for the route and for sockets.
+
+Source: docs/method.md 2.
+"""
+
+from dataclasses import replace
+from functools import partial
+
+from starlette.concurrency import run_in_threadpool
+
+from app.api.known_people import known_people, nearest_places, renumbered, take_time
+from app.api.schemas.motion import MotionAnswer, MotionRequest, PersonMet
+from app.api.services import Services
+from app.api.tracker_sessions import TrackerSessions
+from app.policies.inference.motion_decision import MotionDecider
+from app.sim.cells.cell import Cell, require_cell
+from app.sim.safety.layer import safety_settings
+
+PATH = "/v1/motion"
+
+
+async def answer(request: MotionRequest, services: Services) -> MotionAnswer:
+    """Return the answer to one request.
+
+    Raises:
+        ServiceError: The request cannot be answered.
+    """
+    services.readiness.require()
+    cell = await services.known_cell(request.cell)
+    decider = await _decider(request.checkpoint, services)
+    require_cell(cell, decider.actor.cell, decider.actor.cell_sha256)
+    decided = partial(decide, request, cell, decider, services.trackers)
+    # A decision takes less time than a change of thread usually does, on the event loop.
+    found = await run_in_threadpool(decided) if take_time(request.people) else decided()
+    services.count_outside(PATH, found.outside, found.state_outside)
+    return found
+
+
+async def _decider(name: str | None, services: Services) -> MotionDecider:
+    """Return a reach policy by name, by default the shipped one.
+
+    Raises:
+        InvalidInput: No checkpoint has that name.
+        CheckpointMismatch: It is no reach policy.
+    """
+    found = services.reach_policies.loaded(name)
+    if found is None:
+        found = await run_in_threadpool(services.reach_policies.load, name)
+    return found
+
+
+def decide(
+    request: MotionRequest, cell: Cell, decider: MotionDecider, trackers: TrackerSessions
+) -> MotionAnswer:
+    """Return the answer to one request.
+
+    Args:
+        request: State, people and goal.
+        cell: Its work cell.
+        decider: The policy, trained in that cell.
+        trackers: The open trackers.
+
+    Raises:
+        ServiceError: The request cannot be answered.
+    """
+    people = known_people(request.people, cell, trackers)
+    as_seen = all(one.observed is one.person for one in people)
+    present = {i: one.person for i, one in enumerate(people) if one.person is not None}
+    last = {i: one.observed for i, one in enumerate(people) if one.observed is not None}
+    q = request.robot.joints(request.robot.q)
+    seen, monitored = (nearest_places(some, cell, q) for some in (present, last))
+    question = request.to_domain(
+        [present[i] for i in seen],
+        None if as_seen else [last[i] for i in monitored],
+        safety_settings(cell),
+        max((one.age_s for one in people), default=0.0),
+    )
+    with request.robot.faults_in_place():
+        decision = decider.decide(question)
+    decision = replace(
+        decision,
+        seen=None if decision.seen is None else seen[decision.seen],
+        terms_of=None if decision.terms_of is None else monitored[decision.terms_of],
+        outside=renumbered(decision.outside, seen),
+    )
+    met = dict(zip(seen, decision.met, strict=True))
+    uses = [
+        PersonMet.from_use(
+            one.use(i == decision.seen, i in last and i not in monitored), met.get(i)
+        )
+        for i, one in enumerate(people)
+    ]
+    return MotionAnswer.from_domain(decision, question, uses, cell.robot.dt, request.stamp)

@@ -1,0 +1,231 @@
+"""One motion socket: requests with a deadline, of which the newest is answered.
+
+Three tasks: one receives messages and notes their times, one answers, one closes the socket
+when it is idle or the server stops. Decisions of all sockets take turns, in order of arrival at
+the turn; the event loop reads messages between any two of them, so that the request that is
+answered is the newest one and its waiting time is known.
+"""
+
+import asyncio
+import json
+import logging
+import time
+from collections import deque
+from collections.abc import Awaitable, Callable
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import anyio
+from pydantic import ValidationError
+from starlette.websockets import WebSocket, WebSocketDisconnect
+
+from app.api.motion.decision import answer
+from app.api.motion.load import SocketRate
+from app.api.problems import (
+    ProblemResponse,
+    member_problem,
+    problem,
+    service_problem,
+    validation_problem,
+)
+from app.api.schemas.motion import LeftOut, MotionRequest, StreamUse
+from app.api.services import Services
+from app.api.sockets import POLICY
+from app.api.texts import fault_in_json
+from app.errors import ServiceError
+
+logger = logging.getLogger(__name__)
+
+PATH = "/v1/motion/stream"
+MAX_MESSAGE = 1 << 16
+"""Longest message [characters]."""
+MAX_WAITING = 64
+"""Largest number of requests that wait where each is answered; then none is received."""
+MAX_STAMP, MAX_TIME = 64, 1e18
+"""Longest text and greatest number of a stamp in a problem."""
+CHECK_S = 0.2
+"""Period at which a socket checks whether it is idle or the server stops [s]."""
+SHARES: tuple[tuple[LeftOut, float], ...] = (("search", 0.25), ("rollout", 0.5))
+"""What is left out once a request has waited for more than this share of its deadline."""
+GOING_AWAY = 1001
+
+Which = Literal["newest", "each"]
+
+
+@dataclass(frozen=True, slots=True)
+class Waiting:
+    """A message that waits for its answer."""
+
+    text: str | None
+    """The message; None: it is no text."""
+    at: float
+    """Time of its arrival on the clock ``time.perf_counter`` [s]."""
+
+
+class MotionSocket:
+    """An open socket.
+
+    Args:
+        client: The socket, not accepted yet.
+        services: Parts of the service.
+        which: Whether each request is answered or the newest.
+        deadline_s: Time from the arrival of a request to its answer [s].
+    """
+
+    def __init__(
+        self, client: WebSocket, services: Services, which: Which, deadline_s: float
+    ) -> None:
+        self._client, self._services, self._deadline_s = client, services, deadline_s
+        self._which, self._superseded = which, 0
+        self._load, self._rate = services.motion_load, SocketRate()
+        self._waiting: deque[Waiting] = deque()
+        self._arrived, self._taken = asyncio.Event(), asyncio.Event()
+        self._last_s = time.monotonic()
+        self._close: tuple[int, str] | None = None
+
+    async def serve(self) -> None:
+        """Answer requests until the client leaves, the socket is idle or the server stops."""
+        self._load.add(self._rate)
+        try:
+            await self._serve()
+        finally:
+            self._load.remove(self._rate)
+        if self._close is not None:
+            await self._client.close(*self._close)
+
+    async def _serve(self) -> None:
+        async with anyio.create_task_group() as tasks:
+
+            async def until_end(part: Callable[[], Awaitable[None]]) -> None:
+                try:
+                    await part()
+                except WebSocketDisconnect:
+                    logger.debug("a motion socket was closed by its client")
+                tasks.cancel_scope.cancel()
+
+            for part in (self._receive, self._answer, self._until_idle_or_stopped):
+                tasks.start_soon(until_end, part)
+
+    async def _receive(self) -> None:
+        await self._client.accept()
+        while True:
+            message = await self._client.receive()
+            if message["type"] == "websocket.disconnect":
+                return
+            self._last_s = time.monotonic()
+            if self._which == "newest" and self._waiting:
+                self._waiting.clear()
+                self._superseded += 1
+            self._waiting.append(Waiting(message.get("text"), time.perf_counter()))
+            self._arrived.set()
+            while len(self._waiting) >= MAX_WAITING:
+                self._taken.clear()
+                await self._taken.wait()
+
+    async def _until_idle_or_stopped(self) -> None:
+        """Wait until the socket is to be closed."""
+        idle_s = self._load.idle_s
+        while not self._services.stopping.is_set():
+            if time.monotonic() - self._last_s > idle_s:
+                self._close = POLICY, f"no request for {idle_s:g} s"
+                return
+            await asyncio.sleep(CHECK_S)
+        self._close = GOING_AWAY, "the server stops"
+
+    async def _answer(self) -> None:
+        while True:
+            await self._arrived.wait()
+            async with self._load.turn:
+                await asyncio.sleep(0)  # messages are received between two decisions
+                request = self._waiting.popleft()
+                if not self._waiting:
+                    self._arrived.clear()
+                self._taken.set()
+                begin = time.perf_counter()
+                text = await self._reply(request, begin)
+                self._load.note(self._rate, time.perf_counter() - begin)
+            await self._client.send_text(text)
+
+    async def _reply(self, request: Waiting, begin: float) -> str:
+        """Return the answer to a message as JSON: a :class:`MotionAnswer` or a problem."""
+        waited_s, superseded = begin - request.at, self._superseded
+        self._superseded = 0
+        left_out = [name for name, share in SHARES if waited_s > share * self._deadline_s]
+
+        def use(left_out: list[LeftOut]) -> StreamUse:
+            spent_s = time.perf_counter() - request.at
+            return StreamUse(
+                waited_ms=1e3 * waited_s,
+                missed_deadline=spent_s > self._deadline_s,
+                superseded=superseded,
+                left_out=left_out,
+            )
+
+        body: object = None
+        try:
+            refused, body = _malformed(request.text)
+            if refused is None:
+                asked, left_out = _reduced(MotionRequest.model_validate(body), left_out)
+                found = await answer(asked, self._services)
+                return found.model_copy(update={"stream": use(left_out)}).model_dump_json()
+        except Exception as error:
+            refused = _problem(error)
+        content: dict[str, object] = json.loads(bytes(refused.body))
+        return json.dumps({**content, "stream": use([]).model_dump(), **_stamp_of(body)})
+
+
+def _reduced(
+    request: MotionRequest, left_out: list[LeftOut]
+) -> tuple[MotionRequest, list[LeftOut]]:
+    """Return a request without what is left out of it, and the names of that.
+
+    A request that asks for a rollout has one; one without has nothing to leave out.
+    """
+    if request.rollout is not None or not left_out:
+        return request, []
+    changes: dict[str, Any] = {"elapsed_s": 0.0}
+    if "rollout" in left_out:
+        changes["rollout"] = False
+    return request.model_copy(update=changes), left_out
+
+
+def _malformed(text: str | None) -> tuple[ProblemResponse | None, object]:
+    """Return the problem of a message that is no JSON, or None, and its data.
+
+    Raises:
+        ValueError: It is no JSON.
+        RecursionError: It is nested too deeply.
+    """
+    if text is None or len(text) > MAX_MESSAGE:
+        rule = f"a message must be JSON text of at most {MAX_MESSAGE} characters"
+        return problem(413 if text else 400, rule, instance=PATH), None
+    body = json.loads(text)
+    fault = fault_in_json(text.encode())
+    if fault is None:
+        return None, body
+    return member_problem(422, "invalid-input", fault, PATH), body
+
+
+def _problem(error: Exception) -> ProblemResponse:
+    """Return the problem of a request that cannot be answered."""
+    if isinstance(error, ServiceError):
+        return service_problem(error, PATH)
+    if isinstance(error, ValidationError):
+        wrong = [
+            {**dict(one), "loc": ("body", *one["loc"])}
+            for one in error.errors(include_url=False)
+        ]
+        return validation_problem(wrong, [MotionRequest], PATH)
+    if isinstance(error, ValueError | RecursionError):
+        detail = f"a message must be JSON: {error}"
+        return problem(400, detail, kind="malformed-json", instance=PATH)
+    logger.error("a message on %s could not be answered", PATH, exc_info=error)
+    return problem(500, "an unexpected error; the server's log has the trace", instance=PATH)
+
+
+def _stamp_of(body: object) -> dict[str, object]:
+    """Return the stamp of a request, which identifies a problem on a socket."""
+    stamp = body.get("stamp") if isinstance(body, dict) else None
+    is_text = isinstance(stamp, str) and len(stamp) <= MAX_STAMP
+    is_time = isinstance(stamp, int | float) and -MAX_TIME < stamp < MAX_TIME
+    return {"stamp": stamp} if is_text or is_time else {}

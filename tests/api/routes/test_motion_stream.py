@@ -1,0 +1,197 @@
+"""Motion sockets over a real connection: deadlines, admission, and what a late request gets."""
+
+import json
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import pytest
+from websockets.exceptions import ConnectionClosed
+from websockets.sync.client import ClientConnection, connect
+
+from app.api.motion.load import LOOP_HZ, MAX_SHARE, MAX_SOCKETS, MotionLoad, SocketRate
+from app.api.schemas.examples import MOTION
+from app.api.services import Services
+from app.main import create_app
+from app.settings import Settings
+from tests.api.live_server import running, wait_until_ready
+
+PATIENCE_S = 120.0
+NEVER_MS = 10_000
+
+
+@pytest.fixture(scope="module")
+def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Services, str]]:
+    app = create_app(Settings(data=tmp_path_factory.mktemp("motion")))
+    with running(app) as (_, address):
+        wait_until_ready(address)
+        yield app.state.services, address.replace("http", "ws") + "/v1/motion/stream"
+
+
+@pytest.fixture
+def services(server: tuple[Services, str]) -> Iterator[Services]:
+    """The parts of the running service, with the load of one that has just started."""
+    found = server[0]
+    end = time.monotonic() + PATIENCE_S
+    while found.motion_load.share() > 0.0:
+        assert time.monotonic() < end, "a socket is still counted"
+        time.sleep(0.02)
+    found.motion_load = MotionLoad()
+    yield found
+
+
+@pytest.fixture
+def url(server: tuple[Services, str]) -> str:
+    return server[1]
+
+
+@contextmanager
+def decisions_held(services: Services) -> Iterator[None]:
+    """Let no decision be made in this block, as on a server that is too slow."""
+    with services.reach_policies.load(None)._busy:
+        yield
+
+
+def send(socket: ClientConnection, **changes: object) -> None:
+    socket.send(json.dumps({**MOTION, **changes}))
+
+
+def received(socket: ClientConnection) -> dict[str, Any]:
+    answer: dict[str, Any] = json.loads(socket.recv(timeout=PATIENCE_S))
+    return answer
+
+
+def wait_until_deciding(services: Services) -> None:
+    """Wait until a request is in the decision that is held."""
+    end = time.monotonic() + PATIENCE_S
+    while not services.motion_load.turn.locked():
+        assert time.monotonic() < end, "no request has arrived"
+        time.sleep(0.01)
+
+
+def close_of(socket: ClientConnection) -> tuple[int, str]:
+    with pytest.raises(ConnectionClosed):
+        socket.recv(timeout=PATIENCE_S)
+    assert socket.close_code is not None
+    return socket.close_code, socket.close_reason or ""
+
+
+@pytest.mark.usefixtures("services")
+def test_answer_says_how_its_request_was_served(url: str) -> None:
+    with connect(f"{url}?deadline_ms={NEVER_MS}") as socket:
+        send(socket, stamp=1)
+        stream = received(socket)["stream"]
+    assert stream.pop("waited_ms") >= 0.0
+    assert stream == {"missed_deadline": False, "superseded": 0, "left_out": []}
+
+
+def test_only_the_newest_request_of_a_client_is_answered(services: Services, url: str) -> None:
+    with connect(url) as socket, connect(url) as other:
+        with decisions_held(services):
+            send(socket, stamp=0)
+            wait_until_deciding(services)
+            for k in range(1, 10):
+                send(socket, stamp=k)
+            send(other, stamp="other")
+        first, second = received(socket), received(socket)
+        assert (first["stamp"], first["stream"]["superseded"]) == (0, 0)
+        assert (second["stamp"], second["stream"]["superseded"]) == (9, 8)
+        assert received(other)["stream"]["superseded"] == 0
+
+
+def test_each_request_is_answered_in_order_where_the_client_asks_so(
+    services: Services, url: str
+) -> None:
+    with connect(f"{url}?answer=each") as socket:
+        with decisions_held(services):
+            for k in range(100):
+                send(socket, stamp=k)
+        found = [received(socket) for _ in range(100)]
+    assert [one["stamp"] for one in found] == list(range(100))
+    assert {one["stream"]["superseded"] for one in found} == {0}
+
+
+def test_a_late_request_is_answered_without_search_and_rollout(url: str) -> None:
+    with connect(f"{url}?deadline_ms=0.0001") as socket:
+        send(socket, elapsed_s=2.0)
+        late = received(socket)
+        assert late["stream"]["missed_deadline"]
+        assert late["stream"]["left_out"] == ["search", "rollout"]
+        assert not late["rollout"] and late["safety"] is not None
+        send(socket, rollout=True)
+        asked = received(socket)
+        assert asked["rollout"] and asked["stream"]["left_out"] == []
+
+
+def test_problem_says_how_its_request_was_served(url: str) -> None:
+    with connect(url) as socket:
+        socket.send("{")
+        assert received(socket)["stream"]["superseded"] == 0
+
+
+def test_socket_beyond_the_measured_capacity_is_refused_with_the_reason(
+    services: Services, url: str
+) -> None:
+    load = services.motion_load
+    load.decision_s = 0.6 * MAX_SHARE / LOOP_HZ
+    with connect(url) as first:
+        send(first)
+        assert received(first)["stamp"] is None
+        load.decision_s = 0.6 * MAX_SHARE / LOOP_HZ
+        with connect(url) as second:
+            code, reason = close_of(second)
+        assert code == 1013
+        assert reason == (
+            "motion sockets use 42 % of the time for decisions (1 are open); one more would "
+            "exceed 70 %"
+        )
+        load.decision_s = 0.4 * MAX_SHARE / LOOP_HZ
+        with connect(url) as second:
+            send(second, stamp="admitted")
+            assert received(second)["stamp"] == "admitted"
+
+
+def test_idle_socket_does_not_count_but_their_number_is_limited() -> None:
+    load = MotionLoad()
+    for _ in range(MAX_SOCKETS):
+        assert load.refusal() is None
+        load.add(SocketRate(opened=0.0))
+    assert load.share() == 0.0
+    assert load.refusal() == "64 motion sockets are open already: close one of them"
+
+
+def test_idle_socket_is_closed(services: Services, url: str) -> None:
+    services.motion_load.idle_s = 0.3
+    with connect(url) as socket:
+        assert close_of(socket) == (1008, "no request for 0.3 s")
+
+
+@pytest.mark.parametrize(
+    ("query", "reason"),
+    [
+        ("answer=all", "answer = 'all' must be one of the choices: ['newest', 'each']"),
+        ("deadline_ms=0", "deadline_ms = '0' must be greater than 0"),
+        ("deadline_ms=nan", "deadline_ms = 'nan' must be a finite number"),
+        ("deadline_ms=soon", "deadline_ms = 'soon' must be a valid number"),
+    ],
+)
+def test_bad_parameter_of_a_socket_is_named(url: str, query: str, reason: str) -> None:
+    with connect(f"{url}?{query}") as socket:
+        code, text = close_of(socket)
+    assert code == 1008 and text.startswith(reason)
+
+
+def test_client_that_leaves_while_its_request_is_decided_is_forgotten(
+    services: Services, url: str
+) -> None:
+    with decisions_held(services):
+        socket = connect(url)
+        send(socket)
+        wait_until_deciding(services)
+        threading.Thread(target=socket.close).start()
+    end = time.monotonic() + PATIENCE_S
+    while services.motion_load.n_open:
+        assert time.monotonic() < end, "the socket is still counted"
+        time.sleep(0.02)
