@@ -75,7 +75,11 @@ def create_app(settings: Settings) -> FastAPI:
 
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
-        service = await run_in_threadpool(Service, settings, counts)
+        try:
+            service = await run_in_threadpool(Service, settings, counts)
+        except ServiceError as error:
+            app.state.failure = error.message
+            raise
         app.state.services = service.parts
         try:
             yield

@@ -3,11 +3,13 @@
 * ``entry``: the Typer application and ``main``
 * ``serve``: ``serve`` and ``setup``; ``preflight`` checks port and database beforehand,
   ``uvicorn_server`` runs the application
-* ``train``, ``evaluate`` (and ``bench``), ``cells``, ``recordings``: the other commands
+* ``backup`` (and ``restore``), ``train``, ``evaluate`` (and ``bench``), ``cells``,
+  ``recordings``: the other commands
 * ``options``, ``output``, ``database``: shared options, printing, access to the database
 
 A command imports the modules it needs when it runs, so that ``--help`` is quick.
 
+backup          The commands ``backup`` and ``restore``
 cells           The command group ``cells``: list, show, check, add and remove work cells
 database        The database as commands open it, beside a running server or without one
 entry           The Typer application and its entry point

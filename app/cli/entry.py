@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import typer
 
 from app import logs
-from app.cli import cells, evaluate, recordings, serve, train
+from app.cli import backup, cells, evaluate, recordings, serve, train
 from app.errors import InvalidInput, NotFound, ServiceError
 
 app = typer.Typer(
@@ -22,6 +22,8 @@ app = typer.Typer(
 )
 app.command()(serve.serve)
 app.command()(serve.setup)
+app.command()(backup.backup)
+app.command()(backup.restore)
 app.command()(train.train)
 app.command()(evaluate.evaluate)
 app.command(

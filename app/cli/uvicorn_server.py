@@ -10,6 +10,7 @@ from types import FrameType
 
 import uvicorn
 from fastapi import FastAPI
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from app.cli.http_limits import LimitedHttp
 from app.cli.preflight import address_of
@@ -47,7 +48,7 @@ def new_server(
         root_path: Path under which a reverse proxy shows the service and which it removes.
     """
     config = uvicorn.Config(
-        app,
+        _with_brief_failure(app),
         http=LimitedHttp,
         root_path=root_path,
         log_config=None,
@@ -60,6 +61,21 @@ def new_server(
         server_header=False,
     )
     return Server(config, app)
+
+
+def _with_brief_failure(app: FastAPI) -> ASGIApp:
+    """Return the application; an expected failure of its start is one line in the log."""
+
+    async def brief(scope: Scope, receive: Receive, send: Send) -> None:
+        async def send_briefly(message: Message) -> None:
+            failure = getattr(app.state, "failure", None)
+            if message["type"] == "lifespan.startup.failed" and failure is not None:
+                message["message"] = failure
+            await send(message)
+
+        await app(scope, receive, send_briefly if scope["type"] == "lifespan" else send)
+
+    return brief
 
 
 def run(settings: Settings, sock: socket.socket, report: Callable[[str], None]) -> None:

@@ -1,6 +1,7 @@
 """The database: jobs, curves, events, checkpoints. The only SQL of the project lives here.
 
 attempts     Writes of a running attempt: its claim, heartbeats, progress, checkpoints
+backup       Backups of a data folder, also while the server runs
 cells        Work cells of the user's own, as JSON under a name; the store never opens them
 checkpoints  Trained policies and their aliases
 completion   Ends of attempts: succeeded, cancelled, failed, crashed, interrupted, orphaned
