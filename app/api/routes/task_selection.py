@@ -9,6 +9,7 @@ from fastapi import APIRouter
 from starlette.concurrency import run_in_threadpool
 
 from app.api.description import MISMATCH
+from app.api.json_route import JsonRoute
 from app.api.known_people import people_for_policy, take_time
 from app.api.schemas.task_selection import TaskSelection, TaskSelectionRequest
 from app.api.services import ServicesDep
@@ -17,7 +18,7 @@ from app.api.world_policies import require_task_policy
 MAX_INLINE_CANDIDATES = 32
 """Larger requests are processed on a thread, so that the event loop is not blocked."""
 
-router = APIRouter(prefix="/v1/task-selection", tags=["deciding"])
+router = APIRouter(prefix="/v1/task-selection", tags=["deciding"], route_class=JsonRoute)
 
 
 @router.post("", summary="Choose what the robot does next", responses=MISMATCH)
