@@ -17,8 +17,8 @@ from app.api.services import services_of
 class JsonRoute(APIRoute):
     """Route of an asynchronous function of a body, ``request``, and the services.
 
-    The body is validated as bytes, without Python objects in between. A body that does not match
-    its schema is passed to FastAPI's own handler, which writes the problem.
+    The body is validated as bytes, without Python objects in between. A body that does not
+    match its schema is passed to FastAPI's own handler, which writes the problem.
     """
 
     def get_route_handler(self) -> Callable[[Request], Coroutine[Any, Any, Response]]:

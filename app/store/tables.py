@@ -87,7 +87,7 @@ jobs = Table(
     Column("notes", Text),
     Column("parent", String(36)),  # no foreign key: it may be deleted
     Column("priority", Integer, nullable=False, default=0, server_default="0"),
-    Column("state", String(16), nullable=False, index=True),
+    Column("state", String(16), nullable=False),
     Column("attempt", Integer, nullable=False, default=0),
     Column("failures", Integer, nullable=False, default=0),
     Column("created_at", UtcDateTime, nullable=False),
@@ -103,6 +103,7 @@ jobs = Table(
     Column("last_event", Integer, nullable=False, default=0),
     Column("kills", Integer, nullable=False, server_default="0"),
     Column("waiting", String(64)),
+    Index("ix_jobs_state_number", "state", "number"),  # pages of jobs in a state
     sqlite_autoincrement=True,
 )
 
