@@ -43,7 +43,7 @@ SAY := @printf '==> %s\n'
 
 export PYTHONUNBUFFERED = 1
 
-.PHONY: help run setup test test-browser test-slow check format bench tables world docs lock clean
+.PHONY: help run setup test test-browser test-postgres test-slow check format bench tables world docs lock clean
 
 help: ## list the targets
 	@grep -E '^[a-z-]+:.*## ' Makefile | sed -E 's/:.*## /\t/' | expand -t 16
@@ -58,6 +58,9 @@ test: $(VENV)/dev.stamp $(VENV)/setup.stamp ## the default tests: no network, no
 
 test-browser: $(VENV)/dev.stamp ## the page in a real Chromium
 	@$(PY) -m pytest -m browser
+
+test-postgres: $(VENV)/dev.stamp ## store and supervisor on a PostgreSQL server of the tests
+	@$(PY) -m pytest -m 'postgres and not slow' tests/store tests/jobs
 
 test-slow: $(VENV)/dev.stamp ## tests that train
 	@$(PY) -m pytest -m slow
@@ -88,8 +91,8 @@ world: $(VENV)/dev.stamp ## measure, draw and write docs/world.md
 
 lock: $(VENV)/dev.stamp ## resolve the lock files (UPGRADE=--upgrade: newest versions)
 	@$(PIP) install --quiet uv==$(UV)
-	@$(RESOLVE) -o requirements.lock
-	@$(RESOLVE) --extra dev --extra docs -c requirements.lock -o requirements-dev.lock
+	@$(RESOLVE) --extra postgres -o requirements.lock
+	@$(RESOLVE) --extra postgres --extra dev --extra docs -c requirements.lock -o requirements-dev.lock
 
 clean: ## remove the virtual environment and the caches
 	rm -rf $(VENV) .mypy_cache .ruff_cache .pytest_cache .import_linter_cache

@@ -9,6 +9,7 @@
     ├── Conflict             the request contradicts the present state
     │   ├── WrongState       an object is in another state: field, value, rule, choices
     │   ├── ClockJump        a frame's stamp does not continue those before
+    │   ├── LeaseLost        a server no longer runs the jobs of its database
     │   └── StaleAttempt     a worker no longer holds its job
     ├── StorageUnavailable   the database does not answer for now
     │   └── StorageDamaged   its file has damaged pages: the remedy is a backup
@@ -323,6 +324,27 @@ class StaleAttempt(Conflict):
     def problem(self) -> dict[str, object]:
         """Return the job and the attempt."""
         return {"job": self.job_id, "attempt": self.attempt}
+
+
+class LeaseLost(Conflict):
+    """The refused write of a server whose lease another server took.
+
+    Args:
+        database: URL of the database without password.
+        owner: The server that holds the lease now.
+        epoch: Epoch of its lease.
+    """
+
+    def __init__(self, database: str, owner: str, epoch: int) -> None:
+        super().__init__(
+            f"this server no longer holds the lease of {database}, which {owner} took (epoch "
+            f"{epoch}): this write is refused"
+        )
+        self.database, self.owner, self.epoch = database, owner, epoch
+
+    def problem(self) -> dict[str, object]:
+        """Return the database, the owner and its epoch."""
+        return {"database": self.database, "owner": self.owner, "epoch": self.epoch}
 
 
 class StorageUnavailable(ServiceError):

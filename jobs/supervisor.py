@@ -1,8 +1,10 @@
 """The supervisor: a thread of the server that starts, monitors and stops workers.
 
-The database has the complete state: after a kill the next server acquires the lock, queues the
-orphaned jobs and continues. While the disk is full or the database takes no writes, the queue
-waits: no job starts, none is counted as failed, and it goes on by itself.
+The database has the complete state: after a kill the next server takes the lease, queues the
+orphaned jobs and continues. Every write checks the lease. A server that lost it stops its
+workers, and takes it again when the other server has ended. While the disk is full or the
+database takes no writes, the queue waits: no job starts, none is counted as failed, and it goes
+on by itself.
 """
 
 import errno
@@ -17,12 +19,21 @@ from dataclasses import asdict, dataclass
 from datetime import datetime
 from pathlib import Path
 
-from app.errors import NotFound, StaleAttempt, StorageFull, StorageUnavailable
+from app.errors import (
+    Conflict,
+    LeaseLost,
+    NotFound,
+    StaleAttempt,
+    StorageFull,
+    StorageUnavailable,
+)
 from app.store import attempts, completion, reserve
 from app.store.engine import Store
+from app.store.lease import LEASE_S, Lease
 from app.store.lock import ServerLock
 from app.store.migrate import migrate
 from app.store.records import Claim
+from app.store.schema import check_schema
 from jobs.executor import Executor, Exit, Handle, LocalProcess
 
 logger = logging.getLogger(__name__)
@@ -38,6 +49,8 @@ class Timeouts:
     """Time from a cancel until the worker is killed [s]."""
     silence_s: float = 300.0
     """Time without a heartbeat until a worker is killed [s]."""
+    lease_s: float = LEASE_S
+    """Time from a renewal of the lease until another server may take it [s]."""
     shutdown_s: float = 8.0
     """Time for the workers' last checkpoints when the server stops [s]."""
     lock_s: float = 30.0
@@ -51,6 +64,7 @@ class Timeouts:
 MIN_FREE_BYTES = 64 * 1024 * 1024
 """Free space of the disk below which no job starts [bytes]."""
 DISK_FULL = "disk full"
+OTHER_SERVER = "another server runs the jobs"
 
 
 @dataclass(slots=True, kw_only=True)
@@ -87,11 +101,13 @@ class Supervisor:
         timeouts: Timeouts | None = None,
         min_free_bytes: int = MIN_FREE_BYTES,
     ) -> None:
-        self._store = store
         self._lock = ServerLock(store, data_dir)
+        self._timeouts = timeouts or Timeouts()
+        self._lease = Lease(store, self._lock, self._timeouts.lease_s)
+        self._database = store
+        self._store = store.fenced(self._lease.require)
         self._max_running = max_running
         self._executor = executor or LocalProcess(store.url, data_dir)
-        self._timeouts = timeouts or Timeouts()
         self._data_dir = data_dir
         self._min_free_bytes = min_free_bytes
         self._workers: dict[Claim, _Worker] = {}
@@ -101,23 +117,24 @@ class Supervisor:
         self._wake = threading.Event()
         self._stopping = threading.Event()
         self._thread: threading.Thread | None = None
+        self._holds_lease = False
 
     def start(self) -> None:
-        """Acquire the lock, upgrade the database, queue orphaned jobs, start the thread.
+        """Take the lease, upgrade the database, queue orphaned jobs, start the thread.
 
         Raises:
             Conflict: Another server uses this folder or database, or a newer version wrote it.
         """
         self._lock.acquire()
         try:
-            migrate(self._store)
+            self._take_lease()
+        except StorageFull as error:  # the thread takes the lease once there is room
+            check_schema(self._database)
+            self._wait_for(error.short, error.message)
         except BaseException:
+            self._guarded(self._lease.release)
             self._lock.release()
             raise
-        self._orphans_queued = False
-        self._guarded(
-            self._queue_orphans
-        )  # where this is impossible now, the thread repeats it
         self._stopping.clear()
         self._thread = threading.Thread(target=self._run, name="job-supervisor", daemon=True)
         self._thread.start()
@@ -129,6 +146,7 @@ class Supervisor:
         if self._thread is not None:
             self._thread.join()
             self._thread = None
+            self._guarded(self._lease.release)
         self._lock.release()
 
     def wake(self) -> None:
@@ -145,12 +163,35 @@ class Supervisor:
         """Whether the thread runs."""
         return self._thread is not None and self._thread.is_alive()
 
+    def _take_lease(self) -> None:
+        migrate(self._database, self._lease)
+        self._holds_lease, self._orphans_queued = True, False
+        self._guarded(self._queue_orphans)  # where it fails, the thread repeats it
+
     def _run(self) -> None:
         while not self._stopping.is_set():
-            self._guarded(self._tick)
+            if self._holds_lease:
+                self._guarded(self._lease.renew)
+            self._guarded(self._tick if self._holds_lease else self._stand_by)
             self._wake.wait(self._timeouts.tick_s)
             self._wake.clear()
         self._shut_down()
+
+    def _stand_by(self) -> None:
+        """Forget the killed workers; take the lease once the other server has ended."""
+        for claim, worker in list(self._workers.items()):
+            if self._executor.poll(worker.handle) is not None:
+                del self._workers[claim]
+        if not self._workers:
+            self._lease.check()
+            self._take_lease()
+
+    def _abandon(self) -> None:
+        """Kill the workers, whose jobs another server has started again."""
+        self._holds_lease = False
+        self._waiting = OTHER_SERVER
+        for worker in self._workers.values():
+            self._executor.stop(worker.handle, force=True)
 
     def _tick(self) -> None:
         if not self._orphans_queued:
@@ -172,6 +213,11 @@ class Supervisor:
         """Log an error of the database once and try again at the next tick."""
         try:
             act()
+        except LeaseLost as error:
+            logger.error("%s; the workers of this server are stopped", error)
+            self._abandon()
+        except Conflict as error:
+            self._wait_for(OTHER_SERVER, error.message)
         except (StorageFull, StorageUnavailable) as error:
             self._wait_for(error.short, error.message)
         except OSError as error:

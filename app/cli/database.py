@@ -6,6 +6,7 @@ from contextlib import contextmanager
 from app.errors import Conflict, NotFound
 from app.settings import Settings
 from app.store.engine import Store
+from app.store.lease import Lease
 from app.store.lock import ServerLock
 from app.store.migrate import migrate
 from app.store.schema import check_schema
@@ -55,6 +56,8 @@ def upgrade(store: Store, settings: Settings) -> None:
     lock = ServerLock(store, settings.data)
     lock.acquire()
     try:
-        migrate(store)
+        lease = Lease(store, lock)
+        migrate(store, lease)
+        lease.release()
     finally:
         lock.release()

@@ -7,6 +7,7 @@ import socket
 from app.errors import Conflict, InvalidInput
 from app.settings import Settings
 from app.store.engine import Store
+from app.store.lease import Lease
 from app.store.lock import ServerLock
 
 BACKLOG = 128
@@ -59,6 +60,7 @@ def check_database_unused(settings: Settings) -> None:
     lock = ServerLock(store, settings.data)
     try:
         lock.acquire()
+        Lease(store, lock).check()
     finally:
         lock.release()
         store.close()

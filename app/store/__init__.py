@@ -11,7 +11,8 @@ events       Events of jobs, the source of event streams
 fencing      Fencing of writes about a running job by its attempt number
 job_actions  Actions on jobs beside cancel: resume, name, notes, priority
 jobs         Jobs: submit, read, cancel
-lock         Lock for one server per data folder and database
+lease        Lease: the right of one server to run the jobs of a database
+lock         Lock for one server per data folder and SQLite file
 metrics      Learning curves of jobs: one row per step
 migrate      Creation and upgrade of the tables
 recordings   Imported human motion, as bytes under a name; the store never opens them

@@ -53,7 +53,7 @@ def fail(store: Store, claim: Claim, error: str) -> None:
         StaleAttempt: The attempt no longer holds the job.
         StorageFull: No room is left.
     """
-    changes = {"error": error[-MAX_ERROR:]}
+    changes = {"error": _shown(error)}
 
     def end(connection: sa.Connection) -> None:
         _end(connection, claim, "failed", changes)
@@ -79,7 +79,7 @@ def crash(store: Store, claim: Claim, error: str, *, max_failures: int) -> JobRe
     if failures >= max_failures:
         fail(store, claim, f"Failed after {failures} attempts. Last error: {error}")
     else:
-        _requeue_held(store, claim, {"failures": failures, "error": error[-MAX_ERROR:]})
+        _requeue_held(store, claim, {"failures": failures, "error": _shown(error)})
     with store.reading() as connection:
         return read_job(connection, claim.job_id)
 
@@ -115,6 +115,11 @@ def requeue_orphans(store: Store) -> tuple[str, ...]:
         return tuple(orphans)
 
     return write_with_reserve(store, requeue)
+
+
+def _shown(error: str) -> str:
+    """Return the end of an error, without the NULs that PostgreSQL cannot store."""
+    return error.replace("\0", "")[-MAX_ERROR:]
 
 
 def _end(

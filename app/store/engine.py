@@ -1,14 +1,17 @@
 """The connection to the database: SQLite by default, PostgreSQL by URL.
 
 SQLite runs with WAL, ``synchronous=FULL`` (a commit that was acknowledged survives a power
-cut), a busy timeout and foreign keys. Writers take the write lock at once (BEGIN IMMEDIATE):
-a transaction that reads first and writes later would otherwise fail under concurrency.
+cut), a busy timeout and foreign keys. A writer takes the database's write lock at its start
+(``BEGIN IMMEDIATE``; an advisory lock on PostgreSQL), so that a transaction that reads first
+and writes later behaves alike on both.
 """
 
+import copy
 import json
 import logging
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -17,7 +20,13 @@ import sqlalchemy as sa
 from sqlalchemy import event
 from sqlalchemy.engine import make_url
 from sqlalchemy.engine.interfaces import DBAPIConnection
-from sqlalchemy.exc import ArgumentError, DatabaseError, NoSuchModuleError, OperationalError
+from sqlalchemy.exc import (
+    ArgumentError,
+    DatabaseError,
+    DataError,
+    NoSuchModuleError,
+    OperationalError,
+)
 from sqlalchemy.pool import ConnectionPoolEntry
 
 from app.errors import (
@@ -38,6 +47,20 @@ workers and the supervisor repeat their writes for as long as it takes."""
 
 WAL_SIZE_LIMIT = 64 * 1024 * 1024
 """Size to which the write-ahead log is cut after a large blob [bytes]."""
+
+_PAUSED_S = 30
+"""Longest silence of a client in a transaction of PostgreSQL, such as a paused server [s]."""
+_WRITE_LOCK = 0x74616E64656D
+"""Number of PostgreSQL's advisory lock: ``tandem`` in ASCII."""
+_POSTGRESQL_ARGUMENTS = {
+    "connect_timeout": 10,
+    "keepalives_idle": 30,
+    "tcp_user_timeout": 1000 * int(BUSY_TIMEOUT_S),
+    "application_name": "tandem",
+    "options": f"-c lock_timeout={BUSY_TIMEOUT_S:.0f}s "
+    f"-c idle_in_transaction_session_timeout={_PAUSED_S}s",
+}
+"""Arguments of libpq; those in the URL take precedence."""
 
 _PRAGMAS = (
     "PRAGMA journal_mode = WAL",
@@ -64,18 +87,23 @@ class Store:
     def __init__(self, database_url: str) -> None:
         self._url = _checked_url(database_url)
         try:
-            self.engine = sa.create_engine(
-                self._url,
-                json_serializer=_to_json,
-                json_deserializer=_from_json,
-                connect_args=self._connect_args(),
-            )
+            self.engine = _create_engine(self._url)
         except (NoSuchModuleError, ModuleNotFoundError) as error:
-            rule = f"needs a database driver that is not installed ({error})"
+            rule = (
+                f"needs a driver that is not installed ({error}): pip install tandem[postgres]"
+            )
             raise InvalidInput("database_url", self.shown_url, rule) from error
-        if self._url.get_backend_name() == "sqlite":
-            event.listen(self.engine, "connect", _prepare_connection)
-            event.listen(self.engine, "begin", _begin)
+        self._fence: Callable[[sa.Connection], object] | None = None
+
+    def fenced(self, fence: Callable[[sa.Connection], object]) -> "Store":
+        """Return this database with a condition on writing.
+
+        Args:
+            fence: Called at the start of each writing transaction; raises to refuse it.
+        """
+        view = copy.copy(self)
+        view._fence = fence
+        return view
 
     @property
     def url(self) -> str:
@@ -92,10 +120,6 @@ class Store:
         """The database file; None for other databases."""
         is_sqlite = self._url.get_backend_name() == "sqlite"
         return Path(self._url.database or "") if is_sqlite else None
-
-    def _connect_args(self) -> dict[str, Any]:
-        waits = self.sqlite_path is None or "timeout" in self._url.query
-        return {} if waits else {"timeout": BUSY_TIMEOUT_S}
 
     @contextmanager
     def reading(self) -> Iterator[sa.Connection]:
@@ -116,6 +140,8 @@ class Store:
             StorageUnavailable: The database does not answer; nothing was written.
         """
         with self._transaction(writes=True) as connection:
+            if self._fence is not None:
+                self._fence(connection)
             yield connection
 
     def check_writable(self) -> None:
@@ -128,6 +154,13 @@ class Store:
         same = sa.text("UPDATE alembic_version SET version_num = version_num")
         with self.writing() as connection:
             connection.execute(same)
+
+    def now(self, connection: sa.Connection) -> datetime:
+        """Return the time of the database's machine, which all servers share."""
+        if self.sqlite_path is not None:
+            return datetime.now(UTC)
+        time: datetime = connection.execute(sa.select(sa.func.clock_timestamp())).scalar_one()
+        return time.astimezone(UTC)
 
     @contextmanager
     def _transaction(self, *, writes: bool) -> Iterator[sa.Connection]:
@@ -144,12 +177,16 @@ class Store:
 
     def _explained(self, error: DatabaseError) -> ServiceError | None:
         """Return the storage error of a driver's error; None for another kind of error."""
-        reason = str(error.orig)
+        reason = str(error.orig).strip()
         if any(text in reason.lower() for text in _FULL):
             return StorageFull(self.shown_url)
         if any(text in reason for text in _DAMAGED):
             return StorageDamaged(self.shown_url, reason)
-        if isinstance(error, OperationalError):
+        if isinstance(error, DataError) and "NUL" in reason:
+            rule = "must not contain the character NUL, which PostgreSQL cannot store"
+            return InvalidInput("text", "\\0", rule)
+        lost = error.connection_invalidated or "idle-in-transaction" in reason
+        if lost or isinstance(error, OperationalError):
             return StorageUnavailable(self.shown_url, reason)
         return None
 
@@ -180,6 +217,21 @@ def _checked_url(database_url: str) -> sa.URL:
     return url
 
 
+def _create_engine(url: sa.URL) -> sa.Engine:
+    as_json = {"json_serializer": _to_json, "json_deserializer": _from_json}
+    if url.get_backend_name() == "sqlite":
+        waits = {} if "timeout" in url.query else {"timeout": BUSY_TIMEOUT_S}
+        engine = sa.create_engine(url, **as_json, connect_args=waits)
+        event.listen(engine, "connect", _prepare_connection)
+        event.listen(engine, "begin", _begin)
+        return engine
+    arguments = {k: v for k, v in _POSTGRESQL_ARGUMENTS.items() if k not in url.query}
+    # Tested before use: a restarted database has ended the pooled connections.
+    engine = sa.create_engine(url, **as_json, connect_args=arguments, pool_pre_ping=True)
+    event.listen(engine, "begin", _begin_postgresql)
+    return engine
+
+
 def _to_json(value: Any) -> str:
     return json.dumps(value, allow_nan=False, ensure_ascii=False)
 
@@ -207,3 +259,10 @@ def _prepare_connection(connection: DBAPIConnection, _entry: ConnectionPoolEntry
 def _begin(connection: sa.Connection) -> None:
     writes = connection.get_execution_options().get("tandem_writes", False)
     connection.exec_driver_sql("BEGIN IMMEDIATE" if writes else "BEGIN")
+
+
+def _begin_postgresql(connection: sa.Connection) -> None:
+    if connection.get_execution_options().get("tandem_writes", False):
+        connection.exec_driver_sql(f"SELECT pg_advisory_xact_lock({_WRITE_LOCK})")
+    else:
+        connection.exec_driver_sql("SET TRANSACTION ISOLATION LEVEL REPEATABLE READ READ ONLY")

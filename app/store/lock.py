@@ -1,24 +1,22 @@
-"""Lock for one server per data folder and database.
+"""Lock for one server per data folder and SQLite file.
 
 The lock is the kernel's (``flock``) and ends with its process, so that it is never stale. The
-process id in the file is for error messages. A PostgreSQL database has an advisory lock, too.
+process id in the file is for error messages. ``app.store.lease`` covers several machines.
 """
 
 import fcntl
 import os
+import socket
 from pathlib import Path
-
-import sqlalchemy as sa
 
 from app.errors import Conflict, InvalidInput
 from app.store.engine import Store
 
-_POSTGRESQL_KEY = 0x74616E64656D
-"""Number of the advisory lock: ``tandem`` in ASCII."""
+_BOOT_ID = Path("/proc/sys/kernel/random/boot_id")
 
 
 class ServerLock:
-    """Exclusive use of a data folder and a database.
+    """Exclusive use of a data folder and a SQLite file.
 
     Args:
         store: The database.
@@ -31,8 +29,7 @@ class ServerLock:
             paths.append(store.sqlite_path.with_name(store.sqlite_path.name + ".lock"))
         self._paths = tuple(paths)
         self._files: list[int] = []
-        self._store = store
-        self._session: sa.Connection | None = None
+        self._is_sqlite = store.sqlite_path is not None
 
     def acquire(self) -> None:
         """Acquire the lock.
@@ -46,29 +43,26 @@ class ServerLock:
         try:
             for path in self._paths:
                 self._files.append(_lock(path))
-            if self._store.sqlite_path is None:
-                self._session = _lock_postgresql(self._store)
         except (Conflict, InvalidInput):
             self.release()
             raise
 
     def release(self) -> None:
         """Release the lock, if it is held."""
-        if self._session is not None:
-            self._session.invalidate()  # ends the session and the lock with it
-            self._session.close()
-            self._session = None
         while self._files:
             os.close(self._files.pop())
 
+    @property
+    def place(self) -> str:
+        """Identifies the locked file: no other server has this place while the lock is held.
 
-def _lock_postgresql(store: Store) -> sa.Connection:
-    session = store.engine.connect().execution_options(isolation_level="AUTOCOMMIT")
-    key = {"key": _POSTGRESQL_KEY}
-    if session.execute(sa.text("SELECT pg_try_advisory_lock(:key)"), key).scalar():
-        return session
-    session.close()
-    raise Conflict(f"another Tandem server already uses {store.shown_url}: stop it first")
+        PostgreSQL: the machine, its start, and the number of the file in the data folder.
+        """
+        if self._is_sqlite:
+            return "sqlite"
+        start = _BOOT_ID.read_text().strip() if _BOOT_ID.exists() else "unknown"
+        file = os.fstat(self._files[0])
+        return f"{socket.gethostname()} {start} {file.st_dev}:{file.st_ino}"
 
 
 def _lock(path: Path) -> int:

@@ -10,21 +10,31 @@ from alembic.script import ScriptDirectory
 
 from app.errors import Conflict
 from app.store.engine import Store
+from app.store.lease import Lease
 
 _SCRIPTS = Path(__file__).parent / "migrations"
 
 
-def migrate(store: Store) -> None:
-    """Create or upgrade the tables; requires the server's lock.
+def migrate(store: Store, lease: Lease | None = None) -> None:
+    """Create or upgrade the tables, and take the lease in the same transaction.
+
+    Args:
+        store: The database.
+        lease: The lease of the server; its lock is held.
 
     Raises:
-        Conflict: A newer version of Tandem wrote the database.
+        Conflict: Another server holds the lease, or a newer version of Tandem wrote the
+            database.
         StorageDamaged: The file is damaged, or no database.
         StorageUnavailable: It does not answer.
         StorageFull: No room is left.
     """
     with store.writing() as connection:
+        if lease is not None:
+            lease.refuse_if_held(connection)
         _upgrade(connection, store.shown_url)
+        if lease is not None:
+            lease.take(connection)
 
 
 def alembic_config() -> Config:

@@ -198,6 +198,18 @@ recordings = Table(
     sqlite_autoincrement=True,
 )
 
+leases = Table(
+    "leases",
+    metadata,
+    Column("name", String(32), primary_key=True),
+    Column("owner", String(255), nullable=False),
+    Column("place", String(255), nullable=False),
+    Column("token", String(36), nullable=False),
+    Column("epoch", BigInteger, nullable=False),
+    Column("expires_at", UtcDateTime, nullable=False),
+)
+"""One row: the server that runs the jobs (``app.store.lease``)."""
+
 reserve = Table(
     "reserve",
     metadata,

@@ -4,19 +4,13 @@ from pathlib import Path
 import pytest
 
 from app.store.engine import Store
-from app.store.migrate import migrate
 from jobs.executor import LocalProcess
 from jobs.supervisor import Supervisor
+from tests.databases import database_url, migrated, postgresql, store
 from tests.jobs.machinery import PATIENCE
 from tests.jobs.supervisor_process import COUNTING
 
-
-@pytest.fixture
-def store(tmp_path: Path) -> Iterator[Store]:
-    opened = Store(f"sqlite:///{tmp_path}/tandem.db")
-    migrate(opened)
-    yield opened
-    opened.close()
+__all__ = ["database_url", "migrated", "postgresql", "store"]
 
 
 @pytest.fixture
@@ -25,7 +19,11 @@ def executor(store: Store, tmp_path: Path) -> LocalProcess:
 
 
 @pytest.fixture
-def supervisor(store: Store, tmp_path: Path, executor: LocalProcess) -> Iterator[Supervisor]:
+def supervisor(
+    store: Store,
+    tmp_path: Path,
+    executor: LocalProcess,
+) -> Iterator[Supervisor]:
     """A supervisor that runs counting jobs."""
     started = Supervisor(store, tmp_path, executor=executor, timeouts=PATIENCE)
     started.start()

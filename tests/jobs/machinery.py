@@ -9,6 +9,7 @@ from pathlib import Path
 
 from app.store import checkpoints, jobs, metrics
 from app.store.engine import Store
+from app.store.lease import LEASE_S
 from app.store.records import JobRecord, NewJob
 from jobs.executor import PROJECT_ROOT
 from jobs.supervisor import Timeouts
@@ -57,22 +58,26 @@ def assert_counted_once(store: Store, job_id: str, *, steps: int, seed: int = 0)
 
 
 def worker_pids(parent: int) -> list[int]:
-    """The children of a process, by /proc."""
+    """The workers that are children of a process, by /proc."""
     found = []
     for stat in Path("/proc").glob("[0-9]*/stat"):
         try:
             fields = stat.read_text().rpartition(")")[2].split()
+            command = stat.with_name("cmdline").read_bytes()
         except OSError:
             continue
-        if int(fields[1]) == parent and fields[0] != "Z":
+        if int(fields[1]) == parent and fields[0] != "Z" and b"--job" in command:
             found.append(int(stat.parent.name))
     return found
 
 
 @contextmanager
-def supervisor_process(data_dir: Path) -> Iterator["subprocess.Popen[bytes]"]:
+def supervisor_process(
+    store: Store, data_dir: Path, lease_s: float = LEASE_S
+) -> Iterator["subprocess.Popen[bytes]"]:
     """Run a supervisor in a process of its own; killed at the end."""
-    command = [sys.executable, "-m", "tests.jobs.supervisor_process", str(data_dir)]
+    arguments = [store.url, str(data_dir), str(lease_s)]
+    command = [sys.executable, "-m", "tests.jobs.supervisor_process", *arguments]
     with subprocess.Popen(command, cwd=PROJECT_ROOT, stdout=subprocess.PIPE) as process:
         try:
             assert process.stdout is not None and process.stdout.readline() == b"ready\n"

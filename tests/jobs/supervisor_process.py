@@ -11,14 +11,15 @@ from jobs.supervisor import Supervisor, Timeouts
 COUNTING = "tests.jobs.counting_worker"
 
 
-def main(data_dir: Path) -> None:
-    store = Store(f"sqlite:///{data_dir}/tandem.db")
+def main(database_url: str, data_dir: Path, lease_s: float) -> None:
+    store = Store(database_url)
     executor = LocalProcess(store.url, data_dir, COUNTING)
-    supervisor = Supervisor(store, data_dir, executor=executor, timeouts=Timeouts(tick_s=0.05))
+    timeouts = Timeouts(tick_s=0.05, lease_s=lease_s)
+    supervisor = Supervisor(store, data_dir, executor=executor, timeouts=timeouts)
     supervisor.start()
     print("ready", flush=True)
     threading.Event().wait()
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]))
+    main(sys.argv[1], Path(sys.argv[2]), float(sys.argv[3]))

@@ -21,6 +21,7 @@ from jobs import worker as jobs_worker
 from jobs.executor import Handle, LocalProcess
 from jobs.supervisor import Supervisor
 from jobs.worker import JobWorker
+from tests.databases import SQLITE_ONLY
 from tests.jobs.counting_worker import count
 from tests.jobs.machinery import (
     PATIENCE,
@@ -30,6 +31,8 @@ from tests.jobs.machinery import (
     wait_for,
     wait_until_final,
 )
+
+pytestmark = SQLITE_ONLY  # its limits and locks are those of a file
 
 UNLIMITED = "1000000"
 

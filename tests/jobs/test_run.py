@@ -18,6 +18,7 @@ from jobs.recording_catalog import RecordingCatalog
 from jobs.spec import parse_spec
 from jobs.supervisor import Supervisor
 from tests import workshop
+from tests.databases import SQLITE_ONLY
 from tests.jobs.machinery import PATIENCE, wait_for, wait_until_final, worker_pids
 from tests.policies.evaluation.sorting_players import untrained
 from tests.sim.recorded_person import csv_text, working
@@ -63,6 +64,7 @@ def test_training_stores_its_curve_and_policies(store: Store) -> None:
 
 
 @pytest.mark.usefixtures("supervisor")
+@SQLITE_ONLY
 def test_training_in_a_cell_of_one_s_own_gives_a_policy_of_that_cell(store: Store) -> None:
     CellCatalog(store).add(workshop.cell())
     job = wait_until_final(
@@ -75,6 +77,7 @@ def test_training_in_a_cell_of_one_s_own_gives_a_policy_of_that_cell(store: Stor
 
 
 @pytest.mark.usefixtures("supervisor")
+@SQLITE_ONLY
 def test_training_in_a_cell_that_is_gone_fails_by_name(store: Store) -> None:
     job = wait_until_final(store, train(store, cell="kitchen"))
     assert job.state == "failed"
@@ -83,6 +86,7 @@ def test_training_in_a_cell_that_is_gone_fails_by_name(store: Store) -> None:
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("supervisor")
+@SQLITE_ONLY
 def test_killed_training_goes_on_and_its_policy_can_be_evaluated(store: Store) -> None:
     job_id = train(store, total_steps=8192)
     wait_for(store, job_id, lambda job: job.step >= 1152)
@@ -105,6 +109,7 @@ def test_killed_training_goes_on_and_its_policy_can_be_evaluated(store: Store) -
 
 
 @pytest.mark.usefixtures("supervisor")
+@SQLITE_ONLY
 def test_evaluation_of_an_unknown_checkpoint_fails_by_name(store: Store) -> None:
     body = {"kind": "evaluate", "protocol": "pick-single", "checkpoint": "nobody"}
     job = wait_until_final(store, jobs.create_job(store, parse_spec(body).new_job()).id)
@@ -112,6 +117,7 @@ def test_evaluation_of_an_unknown_checkpoint_fails_by_name(store: Store) -> None
 
 
 @pytest.mark.usefixtures("supervisor")
+@SQLITE_ONLY
 def test_evaluation_beside_stored_recordings_tells_row_by_row(
     store: Store,
 ) -> None:
@@ -136,6 +142,7 @@ def test_evaluation_beside_stored_recordings_tells_row_by_row(
 
 
 @pytest.mark.usefixtures("supervisor")
+@SQLITE_ONLY
 def test_evaluation_beside_a_recording_that_is_gone_fails_by_name(store: Store) -> None:
     policy = pretrained.load("pick")
     new = NewCheckpoint(sha256=policy.sha256, manifest=policy.manifest, tensors=policy.tensors)
@@ -148,6 +155,7 @@ def test_evaluation_beside_a_recording_that_is_gone_fails_by_name(store: Store) 
 
 
 @pytest.mark.usefixtures("supervisor")
+@SQLITE_ONLY
 def test_evaluation_of_sorting_tells_row_by_row_and_refuses_a_policy_that_picks(
     store: Store,
 ) -> None:

@@ -1,16 +1,18 @@
 import os
 import signal
 import time
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from app.errors import Conflict
-from app.store import attempts, checkpoints, job_actions, jobs, metrics
+from app.errors import Conflict, StorageUnavailable
+from app.store import attempts, checkpoints, events, job_actions, jobs, metrics
 from app.store.engine import Store
 from jobs.executor import LocalProcess
 from jobs.supervisor import Supervisor
+from tests.databases import POSTGRESQL_ONLY, wait_until_lease_expires
 from tests.jobs.machinery import (
     PATIENCE,
     assert_counted_once,
@@ -20,6 +22,8 @@ from tests.jobs.machinery import (
     wait_until_final,
     worker_pids,
 )
+from tests.jobs.supervisor_process import COUNTING
+from tests.postgresql_server import PostgresqlServer
 
 
 def is_running(pid: int) -> bool:
@@ -150,19 +154,80 @@ def test_killed_server_takes_its_worker_along_and_the_next_one_finishes_the_job(
     job_id = queue(store, seed=9, steps=100, hold_at=[27, 90])
     pids = []
     for goal in (25, 90):
-        with supervisor_process(tmp_path) as server:
+        with supervisor_process(store, tmp_path) as server:
             wait_for(store, job_id, lambda job, goal=goal: job.step == goal)
             pids += worker_pids(server.pid)
             server.kill()
-    with supervisor_process(tmp_path):
+    with supervisor_process(store, tmp_path):
         job = wait_until_final(store, job_id)
     assert (job.state, job.attempt, job.failures) == ("succeeded", 3, 0)
     assert_counted_once(store, job_id, steps=100, seed=9)
     assert len(pids) == 2 and not any(map(is_running, pids))
 
 
+@POSTGRESQL_ONLY
+def test_second_server_from_another_folder_is_refused(store: Store, tmp_path: Path) -> None:
+    with supervisor_process(store, tmp_path / "a") as server:
+        rule = rf"process {server.pid} on .* holds the lease of postgresql.* until"
+        with pytest.raises(Conflict, match=rule):
+            Supervisor(store, tmp_path / "b").start()
+        assert wait_until_final(store, queue(store, steps=40)).attempt == 1
+
+
+def start_patiently(supervisor: Supervisor) -> None:
+    """Start once PostgreSQL has ended the transaction in which the other server was paused."""
+    while not supervisor.is_alive:
+        with suppress(StorageUnavailable):
+            supervisor.start()
+
+
+@POSTGRESQL_ONLY
+def test_server_paused_beyond_its_lease_stops_its_worker_and_waits(
+    store: Store, tmp_path: Path
+) -> None:
+    job_id = queue(store, seed=4, steps=100, hold_at=[27, 67], deaf=True)
+    with supervisor_process(store, tmp_path / "a", lease_s=1.0) as paused:
+        wait_for(store, job_id, lambda job: job.step == 25)
+        (pid,) = worker_pids(paused.pid)
+        paused.send_signal(signal.SIGSTOP)
+        wait_until_lease_expires(store)
+        executor = LocalProcess(store.url, tmp_path / "b", COUNTING)
+        timeouts = replace(PATIENCE, lease_s=1000.0, shutdown_s=0.0)
+        second = Supervisor(store, tmp_path / "b", executor=executor, timeouts=timeouts)
+        start_patiently(second)
+        wait_for(store, job_id, lambda job: job.step == 65)
+        paused.send_signal(signal.SIGCONT)
+        while is_running(pid):
+            time.sleep(0.02)
+        job = jobs.get_job(store, job_id)
+        assert (job.state, job.attempt, job.failures) == ("running", 2, 0)
+        second.stop()
+        job = wait_until_final(store, job_id)  # the first server takes the lease again
+    assert (job.state, job.attempt, job.failures) == ("succeeded", 3, 0)
+    assert_counted_once(store, job_id, steps=100, seed=4)
+
+
+@POSTGRESQL_ONLY
+@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGQUIT], ids=["shutdown", "crash"])
+def test_job_ends_once_although_the_database_restarts(
+    store: Store, tmp_path: Path, postgresql: PostgresqlServer, how: signal.Signals
+) -> None:
+    job_id = queue(store, seed=8, steps=1000)
+    with supervisor_process(store, tmp_path / "a", lease_s=1000.0) as server:
+        for goal in (100, 300):
+            wait_for(store, job_id, lambda job, goal=goal: job.step >= goal)
+            postgresql.stop(how)
+            postgresql.start()
+            with pytest.raises(Conflict, match=f"process {server.pid} on"):
+                Supervisor(store, tmp_path / "b").start()
+        assert wait_until_final(store, job_id).state == "succeeded"
+    states = [event.data.get("state") for event in events.list_events(store, job_id)]
+    assert states.count("succeeded") == 1
+    assert_counted_once(store, job_id, steps=1000, seed=8)
+
+
 def test_second_server_on_one_folder_is_refused(store: Store, tmp_path: Path) -> None:
-    with supervisor_process(tmp_path) as server:
+    with supervisor_process(store, tmp_path) as server:
         job_id = queue(store, steps=40)
         with pytest.raises(Conflict, match=rf"process {server.pid}\) already uses"):
             Supervisor(store, tmp_path).start()

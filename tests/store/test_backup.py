@@ -16,7 +16,10 @@ from app.store.backup import restore_backup, write_backup
 from app.store.engine import Store
 from app.store.lock import ServerLock
 from app.store.records import Claim
+from tests.databases import SQLITE_ONLY
 from tests.store.test_attempts import policy, record, resume
+
+pytestmark = SQLITE_ONLY
 
 CONTENT = random.Random(3).randbytes(300_000)
 

@@ -16,6 +16,9 @@ from app.store.engine import Store
 from app.store.migrate import alembic_config, migrate
 from app.store.records import Claim, NewCheckpoint, NewRecording, ResumeState
 from tests.damage import JSON, TENSORS, Change, cut, damage, flip
+from tests.databases import SQLITE_ONLY
+
+pytestmark = SQLITE_ONLY  # PostgreSQL's files are not ours to damage
 
 CONTENT = random.Random(1).randbytes(5000)
 DEFINITION = {"table": {"size": [1.0, 2.0]}, "n": 1}

@@ -1,16 +1,20 @@
+import signal
 import threading
 from pathlib import Path
 
 import pytest
 import sqlalchemy as sa
 from sqlalchemy import event
+from sqlalchemy.exc import DBAPIError
 
-from app.errors import InvalidInput, StorageFull
+from app.errors import InvalidInput, StorageFull, StorageUnavailable
 from app.store import attempts, completion, jobs, metrics
 from app.store.engine import Store
 from app.store.migrate import migrate
 from app.store.records import Claim, NewCheckpoint, NewJob, ResumeState
 from app.store.reserve import fill_reserve
+from tests.databases import POSTGRESQL_ONLY, SQLITE_ONLY
+from tests.postgresql_server import PostgresqlServer
 
 
 def fill_up(store: Store, *, spare_pages: int) -> None:
@@ -30,6 +34,7 @@ def record_until_full(store: Store, claim: Claim) -> int:
     return len(metrics.list_metrics(store, claim.job_id))
 
 
+@SQLITE_ONLY
 def test_sqlite_is_durable_and_checks_references(store: Store) -> None:
     with store.reading() as connection:
         pragmas = {
@@ -102,6 +107,7 @@ def test_one_key_posted_by_many_threads_makes_one_job(store: Store) -> None:
     assert len(found) == 8 and len(set(found)) == 1
 
 
+@SQLITE_ONLY
 def test_full_database_refuses_and_keeps_what_it_has(store: Store, claim: Claim) -> None:
     fill_up(store, spare_pages=10)
     n = record_until_full(store, claim)
@@ -111,6 +117,7 @@ def test_full_database_refuses_and_keeps_what_it_has(store: Store, claim: Claim)
     assert jobs.get_job(store, claim.job_id).step == n
 
 
+@SQLITE_ONLY
 def test_full_database_refuses_new_jobs_with_a_reason(store: Store) -> None:
     fill_up(store, spare_pages=0)
     with pytest.raises(StorageFull, match=r"no room left in sqlite:.* free some space"):
@@ -118,6 +125,7 @@ def test_full_database_refuses_new_jobs_with_a_reason(store: Store) -> None:
             jobs.create_job(store, NewJob(kind="count", spec={"text": "x" * 2000, "i": i}))
 
 
+@SQLITE_ONLY
 def test_job_can_fail_in_a_full_database_with_room_set_aside(
     store: Store, claim: Claim
 ) -> None:
@@ -129,6 +137,7 @@ def test_job_can_fail_in_a_full_database_with_room_set_aside(
     assert (job.state, job.error) == ("failed", "e" * completion.MAX_ERROR)
 
 
+@SQLITE_ONLY
 def test_full_database_keeps_the_earlier_resume_state(store: Store, claim: Claim) -> None:
     content = bytes(range(200)) * 2000
     policy = NewCheckpoint(sha256="0" * 64, manifest={}, tensors=b"p")
@@ -147,3 +156,60 @@ def test_reserve_is_filled_once(store: Store) -> None:
     migrate(store)
     with store.reading() as connection:
         assert connection.execute(sa.text("SELECT count(*) FROM reserve")).scalar() == 1
+
+
+@POSTGRESQL_ONLY
+def test_reader_sees_one_state_and_writes_nothing(store: Store) -> None:
+    count = sa.text("SELECT count(*) FROM jobs")
+    with store.reading() as connection:
+        before = connection.execute(count).scalar()
+        jobs.create_job(store, NewJob(kind="count", spec={}))
+        assert connection.execute(count).scalar() == before
+    with pytest.raises(DBAPIError, match="read-only"), store.reading() as connection:
+        connection.execute(sa.text("DELETE FROM jobs"))
+
+
+@POSTGRESQL_ONLY
+def test_ended_sessions_are_replaced(store: Store, postgresql: PostgresqlServer) -> None:
+    job_id = jobs.create_job(store, NewJob(kind="count", spec={})).id
+    postgresql.stop(signal.SIGQUIT)
+    try:
+        with pytest.raises(StorageUnavailable, match="cannot be used for now: connection"):
+            jobs.get_job(store, job_id)
+    finally:
+        postgresql.start()
+    assert jobs.get_job(store, job_id).id == job_id
+
+
+@POSTGRESQL_ONLY
+def test_session_ended_within_a_transaction_makes_storage_unavailable(
+    store: Store, postgresql: PostgresqlServer
+) -> None:
+    with pytest.raises(StorageUnavailable), store.writing() as connection:
+        pid = connection.execute(sa.text("SELECT pg_backend_pid()")).scalar()
+        postgresql.execute(f"SELECT pg_terminate_backend({pid})")
+        connection.execute(sa.text("DELETE FROM jobs"))
+
+
+@POSTGRESQL_ONLY
+def test_paused_writer_loses_its_transaction_to_the_next(
+    store: Store, database_url: str
+) -> None:
+    options = "-c%20idle_in_transaction_session_timeout=100"
+    paused = Store(f"{database_url}&options={options}")
+    with pytest.raises(StorageUnavailable, match="idle-in-transaction"):
+        with paused.writing() as connection:
+            jobs.create_job(store, NewJob(kind="count", spec={}))
+            connection.execute(sa.text("SELECT 1"))
+    paused.close()
+
+
+@POSTGRESQL_ONLY
+def test_nul_is_refused_by_name(store: Store) -> None:
+    with pytest.raises(InvalidInput, match="must not contain the character NUL"):
+        jobs.get_job(store, "a\0b")
+
+
+def test_error_with_a_nul_is_stored(store: Store, claim: Claim) -> None:
+    completion.fail(store, claim, "output: \0\0.")
+    assert jobs.get_job(store, claim.job_id).error == "output: ."

@@ -8,6 +8,7 @@ import pytest
 from app.errors import Conflict, InvalidInput
 from app.store.engine import Store
 from app.store.lock import ServerLock
+from tests.databases import SQLITE_ONLY
 
 HOLDER = """
 import sys, time
@@ -33,6 +34,7 @@ def test_second_lock_names_the_process_that_holds_the_first(
     second.release()
 
 
+@SQLITE_ONLY
 def test_one_database_has_one_server_even_from_two_folders(
     store: Store, tmp_path: Path
 ) -> None:
