@@ -27,7 +27,7 @@ from app.api.registry import (
     CheckpointNames,
     PolicyRegistry,
 )
-from app.api.services import Services
+from app.api.services import LiveWorld, Services
 from app.errors import Damaged, ServiceError
 from app.live.reach.interfaces import LiveReachPolicy
 from app.policies.checkpoints import pretrained
@@ -48,6 +48,7 @@ from jobs.cell_catalog import CellCatalog
 from jobs.checkpoints import shipped
 from jobs.import_process import ImportProcess
 from jobs.recording_catalog import RecordingCatalog
+from jobs.retention import Retention
 from jobs.supervisor import Supervisor
 from web.viewer.loop import LiveCell
 
@@ -110,7 +111,15 @@ class Service:
     def __init__(self, settings: Settings, counts: Metrics) -> None:
         settings.data.mkdir(parents=True, exist_ok=True)
         store = Store(settings.database)
-        supervisor = Supervisor(store, settings.data)
+        worlds: dict[str, LiveWorld] = {}
+        retention = Retention(
+            store=store,
+            logs=settings.data.absolute() / "logs",
+            keep_jobs=settings.keep_jobs,
+            keep_states=settings.keep_states,
+            acting=lambda: acting_in(worlds),
+        )
+        supervisor = Supervisor(store, settings.data, retention=retention)
         try:
             supervisor.start()
             names = CheckpointNames(store)
@@ -122,6 +131,8 @@ class Service:
         self.parts = Services(
             store=store,
             supervisor=supervisor,
+            retention=retention,
+            worlds=worlds,
             checkpoints=names,
             task_policies=PolicyRegistry(names, build_task_policy, DEFAULT_ALIAS),
             sorting_policies=PolicyRegistry(names, build_sorting_policy, SORTING_ALIASES[0]),
@@ -189,6 +200,18 @@ class Service:
                 return
             if damage is not None:
                 names.mark_damaged(damage)
+
+
+def acting_in(worlds: Mapping[str, LiveWorld]) -> dict[str, str]:
+    """Return the SHA-256 of each checkpoint that acts in a live world, with its place."""
+    found = {}
+    for world in tuple(worlds.values()):
+        snapshot = world.handle.snapshot()
+        sorting = snapshot.sorting.sorting_policy if snapshot.sorting else None
+        for sha256 in (snapshot.checkpoint, sorting):
+            if sha256 is not None:
+                found[sha256] = f"world {snapshot.id}"
+    return found
 
 
 def start_world(

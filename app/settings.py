@@ -32,6 +32,12 @@ class Settings(BaseSettings):
         None, description="Bearer token; required for any address but loopback."
     )
     log: Literal["text", "json"] = Field("text", description="Form of the log's lines.")
+    keep_jobs: int = Field(
+        1000, ge=1, description="Ended jobs to keep; older ones are deleted with their files."
+    )
+    keep_states: int = Field(
+        5, ge=0, description="Cancelled or failed jobs that can be resumed, the newest."
+    )
     root_path: str = Field(
         "",
         pattern=r"^(/[A-Za-z0-9._~-]+)*$",

@@ -35,6 +35,7 @@ from app.store.migrate import migrate
 from app.store.records import Claim
 from app.store.schema import check_schema
 from jobs.executor import Executor, Exit, Handle, LocalProcess
+from jobs.retention import Retention
 
 logger = logging.getLogger(__name__)
 
@@ -89,6 +90,7 @@ class Supervisor:
         executor: Runs the attempts; local processes by default.
         timeouts: Timeouts.
         min_free_bytes: Free space of the disk below which no job starts [bytes].
+        retention: Removes old jobs whenever one has ended.
     """
 
     def __init__(
@@ -100,6 +102,7 @@ class Supervisor:
         executor: Executor | None = None,
         timeouts: Timeouts | None = None,
         min_free_bytes: int = MIN_FREE_BYTES,
+        retention: Retention | None = None,
     ) -> None:
         self._lock = ServerLock(store, data_dir)
         self._timeouts = timeouts or Timeouts()
@@ -110,6 +113,7 @@ class Supervisor:
         self._executor = executor or LocalProcess(store.url, data_dir)
         self._data_dir = data_dir
         self._min_free_bytes = min_free_bytes
+        self._retention = retention
         self._workers: dict[Claim, _Worker] = {}
         self._orphans_queued = False
         self._not_before = -math.inf
@@ -266,6 +270,8 @@ class Supervisor:
             if worker.ended is not None:
                 self._settle(claim, worker.ended)
                 del self._workers[claim]
+                if self._retention is not None:
+                    self._retention.apply()
 
     def _settle(self, claim: Claim, ended: Exit) -> None:
         """Record the end of an attempt, if its worker has not."""

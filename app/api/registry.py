@@ -7,7 +7,7 @@ worlds and routes share the loaded objects, so that equal states give equal deci
 import logging
 import threading
 from collections import OrderedDict
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any, Generic, Protocol, TypeVar
 
 from app.errors import Damaged, InvalidInput, NotFound
@@ -131,6 +131,12 @@ class PolicyRegistry(Generic[P]):
             if policy is not None:
                 self._policies.move_to_end(policy.checkpoint)
             return policy
+
+    def forget(self, removed: Iterable[str]) -> None:
+        """Drop the policies of deleted checkpoints, by SHA-256."""
+        with self._lock:
+            for sha256 in removed:
+                self._policies.pop(sha256, None)
 
     def load(self, reference: str | None) -> P:
         """Return a policy by SHA-256 or alias, from the store if it is not in memory.

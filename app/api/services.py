@@ -24,6 +24,7 @@ from app.sim.sorting.sorting_values import SortingValues
 from app.store.engine import Store
 from jobs.cell_catalog import CellCatalog
 from jobs.recording_catalog import RecordingCatalog
+from jobs.retention import Retention
 from jobs.supervisor import Supervisor
 
 MAX_UPLOADS = 4
@@ -91,6 +92,8 @@ class Services:
     """The database."""
     supervisor: Supervisor
     """Runs the jobs; woken when one is posted."""
+    retention: Retention
+    """Removes ended jobs."""
     checkpoints: CheckpointNames
     """Stored checkpoints by name."""
     task_policies: PolicyRegistry[TaskPolicy]

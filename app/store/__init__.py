@@ -18,6 +18,7 @@ migrate      Creation and upgrade of the tables
 recordings   Imported human motion, as bytes under a name; the store never opens them
 records      Data types of the store: frozen dataclasses, no database rows
 reserve      Space reserved in the database, for ends of jobs when it is full
+retention    Removal of ended jobs and states: on request, and beyond the numbers to keep
 schema       Check of the database's schema, for workers, which never change it
 tables       The tables
 migrations/  Alembic's scripts: one file per change of the tables

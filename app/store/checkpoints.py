@@ -178,6 +178,20 @@ def insert_checkpoint(
         connection.execute(sa.update(checkpoints).where(same).values(imported=True))
 
 
+def sole_checkpoints(connection: sa.Connection, job_id: str) -> tuple[str, ...]:
+    """Return the SHA-256 of the checkpoints that nothing but a job refers to."""
+    others = sa.select(job_checkpoints.c.sha256).where(job_checkpoints.c.job_id != job_id)
+    query = (
+        sa.select(checkpoints.c.sha256)
+        .join(job_checkpoints, job_checkpoints.c.sha256 == checkpoints.c.sha256)
+        .where(job_checkpoints.c.job_id == job_id, sa.not_(checkpoints.c.imported))
+        .where(checkpoints.c.sha256.not_in(others))
+        .where(checkpoints.c.sha256.not_in(sa.select(aliases.c.sha256)))
+        .distinct()
+    )
+    return tuple(connection.execute(query).scalars())
+
+
 def drop_job_checkpoints(connection: sa.Connection, job_id: str, *, beyond: int) -> None:
     """Delete a job's checkpoints beyond a step, and their bytes where unreferenced."""
     mine = sa.and_(job_checkpoints.c.job_id == job_id, job_checkpoints.c.step > beyond)

@@ -12,7 +12,7 @@ import sqlalchemy as sa
 from app.errors import StaleAttempt
 from app.store.engine import Store
 from app.store.events import append_event
-from app.store.jobs import job_from_row
+from app.store.jobs import find_job
 from app.store.records import Claim, JobRecord
 from app.store.tables import jobs
 
@@ -54,12 +54,9 @@ def peek(store: Store, claim: Claim) -> JobRecord:
     Raises:
         StaleAttempt: The attempt no longer holds the job.
     """
-    with store.reading() as connection:
-        row = connection.execute(sa.select(jobs).where(jobs.c.id == claim.job_id))
-        found = row.mappings().first()
-    if found is None:  # deleted after its end
+    job = find_job(store, claim.job_id)
+    if job is None:  # deleted after its end
         raise StaleAttempt(claim.job_id, claim.attempt)
-    job = job_from_row(found)
     if job.attempt != claim.attempt or job.state not in ("running", "cancelling"):
         raise StaleAttempt(claim.job_id, claim.attempt)
     return job

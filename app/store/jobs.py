@@ -72,6 +72,14 @@ def get_job(store: Store, job_id: str) -> JobRecord:
         return read_job(connection, job_id)
 
 
+def find_job(store: Store, job_id: str) -> JobRecord | None:
+    """Return one job; None where it was deleted."""
+    query = sa.select(jobs).where(jobs.c.id == job_id)
+    with store.reading() as connection:
+        row = connection.execute(query).mappings().first()
+    return None if row is None else job_from_row(row)
+
+
 def list_jobs(
     store: Store,
     *,

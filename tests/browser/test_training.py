@@ -159,6 +159,10 @@ def test_ended_job_is_retried_cloned_and_named(
     row.locator(".job-head").click()
     retry.click()
     expect(row.locator(".job-actions .field-error")).to_contain_text("wait for it")
+    row.locator('[data-action="delete"]').click()
+    row.locator('[data-action="delete-yes"]').click()
+    expect(row).to_have_count(0)
+    assert patient_http.get(f"{server}/v1/jobs/{ended['id']}").status_code == 404
     for job in (clone, again):
         stop(server, job)
 

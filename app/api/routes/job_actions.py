@@ -1,4 +1,4 @@
-"""Actions on jobs: cancel, resume, retry, clone, label."""
+"""Actions on jobs: cancel, resume, retry, clone, label, delete."""
 
 from dataclasses import replace
 from typing import Annotated, Any
@@ -22,6 +22,10 @@ CHANGES = Body(
 )
 
 LABELS = Body(openapi_examples=named({"label": examples.LABELS}))
+DELETED: dict[int | str, dict[str, Any]] = {
+    409: {"description": "The job has not ended, or one of its checkpoints is in use"},
+    507: {},
+}
 ENDED: dict[int | str, dict[str, Any]] = {
     409: {"description": "The job is in another state"},
     507: {},
@@ -107,3 +111,12 @@ def update_job(
     changes = {name: value for name, value in given if name in body.model_fields_set}
     changed = job_actions.change_labels(services.store, job.id, changes)
     return shown(changed, services)
+
+
+@router.delete("", status_code=204, summary="Delete an ended job", responses=DELETED)
+def delete_job(job: JobDep, services: ServicesDep) -> None:
+    """Delete a job with its curve, its states and the checkpoints without an alias."""
+    removed = services.retention.delete(job.id)
+    policies = (services.task_policies, services.sorting_policies, services.reach_policies)
+    for one in policies:
+        one.forget(removed)

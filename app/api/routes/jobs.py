@@ -109,7 +109,10 @@ async def stream_job(
             after = event.id
             yield sent(event)
         if not news:
-            now = await run_in_threadpool(jobs.get_job, services.store, job.id)
+            now = await run_in_threadpool(jobs.find_job, services.store, job.id)
+            if now is None:
+                yield ServerSentEvent(event="end", data={"state": "deleted"})
+                return
             if now.is_final and now.last_event <= after:
                 yield ServerSentEvent(event="end", data={"state": now.state})
                 return

@@ -3,6 +3,9 @@ from typing import Any
 import pytest
 from fastapi.testclient import TestClient
 
+from app.api.services import Services
+from app.main import acting_in
+
 TRAIN = {"kind": "train", "preset": "pick-td3", "seed": 1, "priority": -100}
 
 
@@ -116,3 +119,29 @@ def test_actions_on_an_unknown_job_are_not_found(client: TestClient) -> None:
     for action in ("cancel", "resume", "retry", "clone"):
         assert client.post(f"/v1/jobs/nothing/{action}", json={}).status_code == 404
     assert client.patch("/v1/jobs/nothing", json={}).status_code == 404
+
+
+def test_ended_job_is_deleted_a_queued_one_is_not(
+    client: TestClient, ended: dict[str, Any]
+) -> None:
+    job = client.post(f"/v1/jobs/{ended['id']}/clone", json={"priority": -100}).json()
+    refused = client.delete(f"/v1/jobs/{job['id']}")
+    assert refused.status_code == 409
+    assert refused.json()["field"] == "state"
+    assert refused.json()["choices"] == ["succeeded", "failed", "cancelled"]
+    assert client.delete(f"/v1/jobs/{ended['id']}").status_code == 204
+    assert client.get(f"/v1/jobs/{ended['id']}").status_code == 404
+    assert client.delete(f"/v1/jobs/{ended['id']}").status_code == 404
+    assert cancelled(client, job)["parent"] == ended["id"]
+
+
+def test_acting_checkpoints_are_known_with_their_place(client: TestClient) -> None:
+    worlds = services_of(client).worlds
+    acting = client.get("/v1/worlds/main").json()["checkpoint"]
+    assert acting_in(worlds)[acting] == "world main"
+
+
+def services_of(client: TestClient) -> Services:
+    app: Any = client.app
+    services: Services = app.state.services
+    return services

@@ -1,6 +1,6 @@
 // What can be done with a job: cancel, resume, retry, clone, delete, name, notes, priority.
 import { html, useRef, useState } from "../vendor/htm-preact-standalone.module.js";
-import { patch, post } from "../api.js";
+import { patch, post, remove } from "../api.js";
 import * as format from "../format.js";
 import { Icon } from "../icons.js";
 
@@ -53,6 +53,7 @@ export function JobActions({ job, onChanged, onOpen, onClone }) {
       title="Run a new job with the same values from its start">Retry</button>`}
     ${job.kind === "train" && html`<button type="button" class="tool" data-action="clone"
       onClick=${() => onClone(job)} title="Start a job like this one, with changes">Clone …</button>`}
+    ${FINAL.has(job.state) && html`<${Delete} job=${job} onChanged=${onChanged} />`}
     ${isActive(job) && html`<${Cancel} job=${job} onChanged=${onChanged} />`}
     <${Fault} error=${again.error} />`;
 }
@@ -63,6 +64,12 @@ function Cancel({ job, onChanged }) {
   return html`<${Ask} name="cancel" label="Cancel …" question="Cancel it? Its checkpoints stay."
     yes="Cancel the job" no="Keep going" action=${cancelling}
     onYes=${() => post(`v1/jobs/${job.id}/cancel`)} />`;
+}
+
+function Delete({ job, onChanged }) {
+  return html`<${Ask} name="delete" label="Delete …" yes="Delete the job" no="Keep it"
+    question="Delete it? Its curve and its checkpoints go with it." action=${useAction(onChanged)}
+    onYes=${() => remove(`v1/jobs/${job.id}`)} />`;
 }
 
 /** A button that asks before it acts. */

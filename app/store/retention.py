@@ -1,0 +1,117 @@
+"""Removal of ended jobs and of their states: on request, and beyond the numbers to keep."""
+
+import logging
+from collections.abc import Mapping
+
+import sqlalchemy as sa
+
+from app.errors import WrongState
+from app.store.checkpoints import drop_job_checkpoints, sole_checkpoints
+from app.store.engine import Store
+from app.store.jobs import job_from_row, read_job
+from app.store.records import FINAL_STATES, JobRecord
+from app.store.reserve import write_with_reserve
+from app.store.tables import jobs, resume_states
+
+logger = logging.getLogger(__name__)
+
+_ENDED = jobs.c.state.in_(FINAL_STATES)
+
+
+def delete_job(store: Store, job_id: str, acting: Mapping[str, str]) -> tuple[str, ...]:
+    """Delete an ended job: its curve, events and states, and the checkpoints only it has.
+
+    Checkpoints with an alias, imported ones and those of other jobs stay.
+
+    Args:
+        store: The database.
+        job_id: The job.
+        acting: SHA-256 of each checkpoint that acts, with its place: ``"world main"``.
+
+    Returns:
+        SHA-256 of the deleted checkpoints.
+
+    Raises:
+        NotFound: There is no such job.
+        WrongState: It has not ended, or one of these checkpoints is in use.
+        StorageFull: No room is left.
+    """
+
+    def delete(connection: sa.Connection) -> tuple[str, ...]:
+        job = read_job(connection, job_id, for_update=True)
+        if not job.is_final:
+            rule = f"must be final to delete job {job.number}: cancel it first"
+            raise WrongState("state", job.state, rule, FINAL_STATES)
+        removed = sole_checkpoints(connection, job_id)
+        _require_unused(connection, job, removed, acting)
+        drop_job_checkpoints(connection, job_id, beyond=-1)
+        connection.execute(sa.delete(jobs).where(jobs.c.id == job_id))
+        return removed
+
+    return write_with_reserve(store, delete)
+
+
+def prune(
+    store: Store, *, keep_jobs: int, keep_states: int, acting: Mapping[str, str]
+) -> tuple[str, ...]:
+    """Delete ended jobs beyond the newest, and states to resume from beyond the newest.
+
+    A job with a checkpoint in use stays.
+
+    Args:
+        store: The database.
+        keep_jobs: Number of ended jobs to keep.
+        keep_states: Number of ended jobs whose states are kept.
+        acting: As for :func:`delete_job`.
+
+    Returns:
+        Ids of the deleted jobs.
+
+    Raises:
+        StorageFull: No room is left.
+    """
+    newest = sa.select(jobs.c.id).where(_ENDED)
+    newest = newest.order_by(jobs.c.finished_at.desc(), jobs.c.number.desc())
+    with_state = newest.where(jobs.c.id.in_(sa.select(resume_states.c.job_id)))
+    with store.reading() as connection:
+        old = connection.execute(newest.offset(keep_jobs)).scalars().all()
+        stale = connection.execute(with_state.offset(keep_states)).scalars().all()
+    if stale:
+        ended = sa.select(jobs.c.id).where(_ENDED, jobs.c.id.in_(stale))
+        with store.writing() as connection:
+            connection.execute(
+                sa.delete(resume_states).where(resume_states.c.job_id.in_(ended))
+            )
+    return tuple(job_id for job_id in old if _deleted(store, job_id, acting))
+
+
+def _deleted(store: Store, job_id: str, acting: Mapping[str, str]) -> bool:
+    try:
+        delete_job(store, job_id, acting)
+    except WrongState as error:
+        logger.info("job %s is kept: %s", job_id, error.message)
+        return False
+    return True
+
+
+def _require_unused(
+    connection: sa.Connection,
+    job: JobRecord,
+    removed: tuple[str, ...],
+    acting: Mapping[str, str],
+) -> None:
+    """Check that no checkpoint that would go acts or is to be evaluated."""
+    for sha256 in removed:
+        if sha256 in acting:
+            rule = f"of job {job.number} acts in {acting[sha256]}: choose another policy there"
+            raise WrongState("checkpoint", sha256, rule)
+    active = sa.select(jobs).where(sa.not_(_ENDED))
+    for row in connection.execute(active).mappings():
+        user = job_from_row(row)
+        sha256 = str(user.spec.get("checkpoint"))
+        if sha256 in removed:
+            rule = (
+                f"of job {job.number} is evaluated by job {user.number}: wait for its end, or "
+                "cancel it first"
+            )
+            raise WrongState("checkpoint", sha256, rule)

@@ -1,0 +1,54 @@
+"""Retention of ended jobs: how many are kept, and what is removed with a job."""
+
+import logging
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from app.store import retention
+from app.store.engine import Store
+
+logger = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Retention:
+    """Removes ended jobs with their output."""
+
+    store: Store
+    """The database."""
+    logs: Path
+    """Folder with the output of each job."""
+    keep_jobs: int
+    """Number of ended jobs to keep."""
+    keep_states: int
+    """Number of cancelled or failed jobs whose states to resume from are kept."""
+    acting: Callable[[], Mapping[str, str]]
+    """Returns the SHA-256 of each checkpoint that acts, with its place."""
+
+    def delete(self, job_id: str) -> tuple[str, ...]:
+        """Delete an ended job; return the SHA-256 of the checkpoints that went with it.
+
+        Raises:
+            NotFound: There is no such job.
+            WrongState: It has not ended, or one of its checkpoints is in use.
+            StorageFull: No room is left.
+        """
+        removed = retention.delete_job(self.store, job_id, self.acting())
+        self._remove_log(job_id)
+        return removed
+
+    def apply(self) -> None:
+        """Remove what is beyond the numbers to keep."""
+        gone = retention.prune(
+            self.store,
+            keep_jobs=self.keep_jobs,
+            keep_states=self.keep_states,
+            acting=self.acting(),
+        )
+        for job_id in gone:
+            logger.info("job %s is deleted: the newest %d are kept", job_id, self.keep_jobs)
+            self._remove_log(job_id)
+
+    def _remove_log(self, job_id: str) -> None:
+        (self.logs / f"{job_id}.log").unlink(missing_ok=True)

@@ -1,0 +1,92 @@
+import pytest
+import sqlalchemy as sa
+
+from app.errors import NotFound, WrongState
+from app.store import attempts, checkpoints, completion, events, jobs, metrics, retention
+from app.store.engine import Store
+from app.store.records import Claim, NewJob, ResumeState
+from tests.store.test_checkpoints import policy, second_job
+
+
+def save(store: Store, claim: Claim, step: int, content: bytes) -> str:
+    state = ResumeState(step=step, manifest={}, tensors=b"state")
+    made = policy(content)
+    attempts.record_checkpoint(store, claim, step, made, state)
+    return made.sha256
+
+
+def rows(store: Store, table: str) -> int:
+    with store.reading() as connection:
+        return int(connection.execute(sa.text(f"SELECT count(*) FROM {table}")).scalar_one())
+
+
+def test_deleted_job_leaves_nothing_but_shared_and_named_checkpoints(
+    store: Store, claim: Claim
+) -> None:
+    own, named, shared = (save(store, claim, k, bytes([k])) for k in (1, 2, 3))
+    attempts.record_progress(store, claim, 4, {"value": 1.0})
+    checkpoints.set_alias(store, "best", named)
+    completion.finish(store, claim, state="cancelled")
+    other = second_job(store)
+    save(store, other, 3, bytes([3]))
+    assert retention.delete_job(store, claim.job_id, {}) == (own,)
+    assert {c.sha256 for c in checkpoints.list_checkpoints(store).items} == {named, shared}
+    assert (rows(store, "metrics"), rows(store, "resume_states")) == (0, 1)
+    assert events.list_events(store, claim.job_id) == ()
+    assert jobs.find_job(store, claim.job_id) is None
+    with pytest.raises(NotFound):
+        retention.delete_job(store, claim.job_id, {})
+
+
+def test_job_that_has_not_ended_is_not_deleted(store: Store, claim: Claim) -> None:
+    with pytest.raises(WrongState, match="must be final to delete job 1: cancel it first"):
+        retention.delete_job(store, claim.job_id, {})
+
+
+def test_job_with_an_acting_checkpoint_is_not_deleted(store: Store, claim: Claim) -> None:
+    sha256 = save(store, claim, 1, b"1")
+    completion.finish(store, claim)
+    with pytest.raises(WrongState, match="acts in world main") as refused:
+        retention.delete_job(store, claim.job_id, {sha256: "world main"})
+    assert refused.value.problem()["field"] == "checkpoint"
+    assert checkpoints.get_checkpoint(store, sha256).job_id == claim.job_id
+
+
+def test_job_whose_checkpoint_is_to_be_evaluated_is_not_deleted(
+    store: Store, claim: Claim
+) -> None:
+    spec = {"kind": "evaluate", "checkpoint": save(store, claim, 1, b"1")}
+    completion.finish(store, claim)
+    user = jobs.create_job(store, NewJob(kind="evaluate", spec=spec))
+    with pytest.raises(WrongState, match=f"is evaluated by job {user.number}"):
+        retention.delete_job(store, claim.job_id, {})
+    jobs.request_cancel(store, user.id)
+    assert len(retention.delete_job(store, claim.job_id, {})) == 1
+
+
+def test_newest_ended_jobs_and_states_are_kept(store: Store, claim: Claim) -> None:
+    ended = [claim.job_id]
+    acts = save(store, claim, 1, b"0")
+    completion.fail(store, claim, "x")
+    for k in range(1, 5):
+        later = second_job(store)
+        save(store, later, 1, bytes([k]))
+        completion.fail(store, later, "x")
+        ended.append(later.job_id)
+    active = second_job(store)
+    save(store, active, 1, b"active")
+    gone = retention.prune(store, keep_jobs=2, keep_states=1, acting={acts: "world main"})
+    assert set(gone) == set(ended[1:3])
+    kept = {ended[0], ended[3], ended[4], active.job_id}
+    assert {job.id for job in jobs.list_jobs(store).items} == kept
+    assert attempts.load_resume(store, ended[4]) is not None
+    assert attempts.load_resume(store, ended[3]) is None
+    assert attempts.load_resume(store, active.job_id) is not None
+    assert retention.prune(store, keep_jobs=2, keep_states=1, acting={acts: "w"}) == ()
+
+
+def test_curve_of_a_deleted_job_is_not_found(store: Store, claim: Claim) -> None:
+    completion.finish(store, claim)
+    retention.delete_job(store, claim.job_id, {})
+    with pytest.raises(NotFound):
+        metrics.list_metrics(store, claim.job_id)
