@@ -4,8 +4,9 @@
 
 ``candidates-3`` is the live cell's case, ``candidates-1000`` the most a request may hold. What
 is timed is ``TaskPolicy.decide`` with the shipped checkpoint, as the service calls it: inverse
-kinematics, features, all networks. ``actor-3`` and ``actor-1000`` are the actor alone,
-``actor-torch-3`` and ``actor-torch-1000`` the same with torch.
+kinematics, features, all networks. ``networks-3`` and ``networks-1000`` are all networks
+alone, ``networks-torch-3`` and ``networks-torch-1000`` the same with torch. ``risk-map-2500``
+is a map of 50 x 50 places of a person with three candidates.
 
 ``sorting`` is one move of the largest sorting cell with a shipped checkpoint, by that,
 ``sorting-planner`` one of ``sorting-e1`` by the exact planner, both as
@@ -32,13 +33,13 @@ from app.policies.checkpoints.model_state import under
 from app.policies.inference.sorting_policy import SortingPolicy
 from app.policies.inference.task_selection import TaskChooser
 from app.policies.inference.value_networks import ValueNetworks, pick_preset_of
-from app.policies.networks.forward import ForwardPass
-from app.policies.networks.pick import actor_of
+from app.policies.networks.outcome import OutcomeHead
+from app.policies.networks.pick import actor_of, critics_for
 from app.sim.cells.cell import Cell, load_cell
 from app.sim.core.arrays import Vec
 from app.sim.human.person import Person
 from app.sim.pick.batch import PickBatch, PickSettings
-from app.sim.pick.task_policy import Candidate, TaskPolicy
+from app.sim.pick.task_policy import Candidate, MovedPerson, TaskPolicy
 from app.sim.sorting.batch import SortingSettings, batch_in, shape_of
 from app.sim.sorting.decision import decide
 from app.sim.sorting.sorting_values import SortingValues
@@ -107,23 +108,38 @@ def measured(policy: TaskPolicy, n: int, seed: int, seconds: float) -> Row:
     return summary(f"candidates-{n}", n, times)
 
 
-def actor_rows(seed: int, seconds: float) -> Iterator[Row]:
-    """Yield the rows of the actor, without torch and with it."""
+def network_rows(seed: int, seconds: float) -> Iterator[Row]:
+    """Yield the rows of all networks, without torch and with it."""
     checkpoint, rng = pretrained.load("pick"), np.random.default_rng(seed)
-    n_obs = ValueNetworks(checkpoint).n_obs
-    module = actor_of(pick_preset_of(checkpoint), n_obs)
-    module.load_state_dict(under(checkpoint.arrays(), "actor"))
-    forward, varying = ForwardPass(module.net), np.ones(n_obs, dtype=bool)
+    preset, networks = pick_preset_of(checkpoint), ValueNetworks(checkpoint)
+    actor, critics = actor_of(preset, networks.n_obs), critics_for(preset, networks.n_obs)
+    head = OutcomeHead(networks.n_obs)
+    for name, module in (("actor", actor), ("critic", critics), ("outcome", head)):
+        module.load_state_dict(under(checkpoint.arrays(), name))
+
+    def by_torch(rows: torch.Tensor) -> None:
+        head.predict(rows, critics.least(rows, actor(rows)))
+
     for n in (3, 1000):
-        obs = rng.normal(size=(n, n_obs)).astype(np.float32)
+        obs = rng.normal(size=(n, networks.n_obs)).astype(np.float32)
         calls: dict[str, Callable[[], object]] = {
-            "actor": partial(forward, obs, varying),
-            "actor-torch": partial(module.net, torch.as_tensor(obs)),
+            "networks": partial(networks.evaluate, obs),
+            "networks-torch": partial(by_torch, torch.as_tensor(obs)),
         }
         for name, call in calls.items():
             with torch.inference_mode():
                 times = np.fromiter(timed_ms(call, seconds), dtype=np.float64)
             yield summary(f"{name}-{n}", n, times)
+
+
+def map_row(policy: TaskPolicy, seed: int, seconds: float) -> Row:
+    """Return the row of a risk map of 50 x 50 places with three candidates."""
+    state, grid = states(seed)[0], np.linspace(-1.2, 1.2, 50)
+    postures = np.repeat(state.person.q[None], 2500, axis=0)
+    postures[:, 0], postures[:, 1] = np.tile(grid, 50), np.repeat(grid + 1.2, 50)
+    moved, offered = MovedPerson(index=0, q=postures), candidates(3, seed)
+    ask = partial(policy.risk_map, state.q, state.qd, [state.person], offered, moved)
+    return summary("risk-map-2500", 2500, np.fromiter(timed_ms(ask, seconds), dtype=np.float64))
 
 
 def timed_ms(call: Callable[[], object], seconds: float) -> Iterator[float]:
@@ -182,7 +198,8 @@ def main() -> None:
     policy = TaskChooser(pretrained.load("pick"), load_cell())
     seconds = options.rounds * options.seconds
     rows = [measured(policy, n, options.seed, seconds) for n in (3, 1000)]
-    rows += actor_rows(options.seed, 0.2 * seconds)
+    rows += network_rows(options.seed, 0.2 * seconds)
+    rows.append(map_row(policy, options.seed, 0.5 * seconds))
     shipped = [name for name in SORTING_CELLS if name in pretrained.ALIASES]
     for name in shipped[:1]:
         sorting_policy = SortingPolicy(pretrained.load(name))

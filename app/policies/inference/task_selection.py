@@ -34,7 +34,8 @@ from app.sim.perception.observed_people import (
     is_far,
     nearest_index,
 )
-from app.sim.pick.batch import TaskView, observation_workspace_of, observe, step_robot
+from app.sim.pick.batch import step_robot
+from app.sim.pick.candidate_observer import CandidateObserver
 from app.sim.pick.kernels.grasp import LIFT, GraspRules
 from app.sim.pick.kernels.observation_layout import DISTANCE_SCALE
 from app.sim.pick.task_policy import (
@@ -150,7 +151,8 @@ class TaskChooser(TrainedPolicy):
         self._hysteresis = hysteresis
         self._networks = ValueNetworks(checkpoint)
         self._arm, self._people = arm_of(self._cell), people_of(self._cell)
-        self._sight = observation_workspace_of(self._cell)  # its kernel keeps the GIL
+        n_obs = self._networks.n_obs
+        self._observer = CandidateObserver(self._cell, n_obs=n_obs, grasp=self.grasp)
         self._limits, self._ranges = (
             StateLimits(self._arm, limits_jerk=False),
             TrainedRanges(checkpoint),
@@ -248,19 +250,12 @@ class TaskChooser(TrainedPolicy):
     def _evaluate(self, asked: "_Question", seen: tuple[Vec, Vec, Vec]) -> "_Evaluation":
         """Return values and choices beside people, or beside each of m sets of people."""
         terms, last = asked.terms, asked.last
-        task = TaskView(
-            n_obs=self._networks.n_obs,
-            grasp=self.grasp,
-            current=last,
-            phase=terms.progress.phase,
-            closing_s=terms.progress.closing_s,
-        )
-        shared = self._arm, self._people, self._sight
         q, qd, _ = asked.state.clamped
         left = min(LONGEST_S, max(0.0, terms.time_left_s))
-        obs, reachable = observe(*shared, (q, qd), seen, asked.goals, left, task)
-        act, values = self._networks.act_and_value(obs)
-        outcomes = self._networks.predict(obs, values)
+        obs, reachable = self._observer.observe(
+            (q, qd), seen, asked.goals, left, last, terms.progress
+        )
+        act, values, outcomes = self._networks.evaluate(obs)
         by_set = values.reshape(-1, len(asked.ids))
         if last is not None and terms.progress.phase == LIFT:
             chosen = np.full(len(by_set), last)

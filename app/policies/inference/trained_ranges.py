@@ -27,9 +27,12 @@ class TrainedRanges:
         self._trained_without_people = pick_preset_of(checkpoint).people.human_absent > 0.0
         self._low = {name: np.array(entry["low"]) for name, entry in ranges.items()}
         self._high = {name: np.array(entry["high"]) for name, entry in ranges.items()}
-        self._state = tuple(
-            np.concatenate([self._bound(name, n, low) for name, n in STATE_SIZES])
-            for low in (True, False)
+        self._state, self._goal = (
+            tuple(
+                np.concatenate([self._bound(name, n, low) for name, n in sizes])
+                for low in (True, False)
+            )
+            for sizes in (STATE_SIZES, (("goal", 3),))
         )
 
     def _bound(self, key: str, n: int, low: bool) -> Vec:
@@ -69,7 +72,7 @@ class TrainedRanges:
     def of_goals(self, goals: Vec) -> tuple[tuple[OutsideField, ...], ...]:
         """Return the coordinates of each target outside the range, shape (n, 3) [m]."""
         found: list[tuple[OutsideField, ...]] = [()] * len(goals)
-        low, high = (self._bound("goal", 3, lower) for lower in (True, False))
+        low, high = self._goal
         for i in np.flatnonzero(((goals < low) | (goals > high)).any(axis=1)).tolist():
             found[i] = self._outside("goal", goals[i], "position", ("x", "y", "z"))
         return tuple(found)

@@ -3,9 +3,10 @@
 HTTP route, live cell and evaluations use the same forward passes; torch only trains.
 """
 
+from collections.abc import Callable
+
 import numpy as np
 import torch
-from numpy.typing import NDArray
 
 from app.errors import CheckpointMismatch
 from app.policies.checkpoints.checkpoint import (
@@ -17,13 +18,23 @@ from app.policies.checkpoints.checkpoint import (
 from app.policies.checkpoints.model_state import under
 from app.policies.configs.fields import read_config
 from app.policies.configs.pick import PickPreset
-from app.policies.networks.actor_critic import BASE_WEIGHT
-from app.policies.networks.forward import ForwardPass
-from app.policies.networks.outcome import CLIP, OutcomeHead, OutcomePrediction, combine
+from app.policies.networks.candidate_values import (
+    ActorCritic,
+    add_base,
+    evaluate_few,
+    new_workspace,
+)
+from app.policies.networks.forward import FEW, Floats, forward_many, layers_of
+from app.policies.networks.outcome import (
+    CLIP,
+    OutcomeHead,
+    OutcomePrediction,
+    combine_members,
+    new_prediction,
+)
 from app.policies.networks.pick import LAYOUTS, actor_of, critics_for
+from app.sim.core.jit import direct
 from app.sim.robot.kernels.arm import CONTROLLED
-
-Floats = NDArray[np.float32]
 
 
 def pick_preset_of(checkpoint: Checkpoint) -> PickPreset:
@@ -63,49 +74,65 @@ class ValueNetworks:
                 module.load_state_dict(under(arrays, name))
             except RuntimeError as error:
                 raise CheckpointMismatch("tensors", f"those of {name}", str(error)) from error
-        self._base, self._fade = actor.base, actor.fade
-        self._actor = ForwardPass(actor.net)
-        self._critics = [ForwardPass(critic.children()) for critic in critics.children()]
-        self._members = [ForwardPass(member.children()) for member in outcome.members]
-        self._mean, self._scale = outcome.mean.numpy(), outcome.scale.numpy()
-        self._widen = float(outcome.widen)
+        fade = () if actor.fade is None else actor.fade
+        self._networks = ActorCritic(
+            actor=layers_of(actor.net),
+            critics=tuple(layers_of(critic.children()) for critic in critics.children()),
+            members=tuple(layers_of(member.children()) for member in outcome.members),
+            base=actor.base.start,
+            fade=np.array(fade, dtype=np.float32),
+            mean=outcome.mean.numpy(),
+            scale=outcome.scale.numpy(),
+            widen=float(outcome.widen),
+        )
+        self._work = new_workspace(self._networks, self.n_obs, CONTROLLED)  # kept by the GIL
+        self._few: Callable[..., None] | None = None
 
-    def act_and_value(self, obs: Floats) -> tuple[Floats, Floats]:
-        """Return actions, shape (n, 5), and values, shape (n,), of observations."""
-        both = np.empty((len(obs), self.n_obs + CONTROLLED), dtype=np.float32)
-        varying = np.ones(both.shape[1], dtype=bool)
-        varying[: self.n_obs] = (obs != obs[:1]).any(axis=0)
-        act = self._act(obs, self._actor(obs, varying[: self.n_obs]))
-        both[:, : self.n_obs], both[:, self.n_obs :] = obs, act
-        values = [critic(both, varying) for critic in self._critics]
-        return act, np.minimum.reduce(values)[:, 0]
-
-    def _act(self, obs: Floats, residual: Floats) -> Floats:
-        """Return the actions that add residuals to base motions (``ResidualActor``)."""
-        base = obs[:, self._base].clip(-1.0, 1.0)
-        act: Floats = np.tanh(residual + np.arctanh(np.float32(BASE_WEIGHT) * base))
-        if self._fade is None:
-            return act
-        place, full, zero = self._fade
-        share = ((zero - obs[:, place : place + 1]) / (zero - full)).clip(0.0, 1.0)
-        faded: Floats = base + share * (act - base)
-        return faded
-
-    def predict(self, obs: Floats, values: Floats) -> OutcomePrediction | None:
-        """Return the predicted outcomes of observations; None without such a network.
+    def evaluate(
+        self, obs: Floats, *, predict: bool = True
+    ) -> tuple[Floats, Floats, OutcomePrediction | None]:
+        """Return actions, values and outcomes of observations.
 
         Args:
-            obs: Observations, shape (n, n_obs).
-            values: The critic's values, shape (n,).
+            obs: Observations, shape (n, n_obs), contiguous.
+            predict: Whether to predict outcomes.
+
+        Returns:
+            Actions, shape (n, 5), values, shape (n,), and predicted outcomes; None where they
+            are not asked for or the checkpoint does not predict them.
         """
-        if not self.predicts:
-            return None
-        rows = np.empty((len(obs), self.n_obs + 1), dtype=np.float32)
-        np.subtract(obs, self._mean[:-1], out=rows[:, :-1])
-        np.subtract(values, self._mean[-1], out=rows[:, -1])
-        rows /= self._scale
-        rows.clip(-CLIP, CLIP, out=rows)
-        varying = (rows != rows[:1]).any(axis=0)
-        return combine(
-            np.stack([member(rows, varying) for member in self._members]), self._widen
-        )
+        act = np.empty((len(obs), CONTROLLED), dtype=np.float32)
+        values, outcomes = np.empty(len(obs), dtype=np.float32), new_prediction(len(obs))
+        predict = predict and self.predicts
+        if len(obs) > FEW:
+            rows = self._act_and_value(obs, act, values)
+            if predict:
+                self._predict(rows, outcomes)
+        else:
+            arguments = self._networks, obs, self._work, act, values, outcomes
+            if self._few is None:
+                self._few = direct(evaluate_few, arguments)
+            self._few(*arguments)
+        return act, values, outcomes if predict else None
+
+    def _act_and_value(self, obs: Floats, act: Floats, values: Floats) -> Floats:
+        """Fill actions and values of many observations; return inputs for ``_predict``."""
+        nets, n = self._networks, self.n_obs
+        rows = np.empty((len(obs), n + CONTROLLED), dtype=np.float32)
+        varying = np.ones(n + CONTROLLED, dtype=np.bool_)
+        varying[:n] = (obs != obs[:1]).any(axis=0)
+        act[:] = forward_many(nets.actor, obs, varying[:n])
+        add_base(obs, nets, act)
+        rows[:, :n], rows[:, n:] = obs, act
+        found = [forward_many(critic, rows, varying)[:, 0] for critic in nets.critics]
+        np.minimum.reduce(found, out=values)
+        rows[:, n] = values
+        return rows[:, : n + 1]
+
+    def _predict(self, rows: Floats, outcomes: OutcomePrediction) -> None:
+        """Fill outcomes for observations with their values, shape (n, n_obs + 1)."""
+        nets = self._networks
+        inputs = ((rows - nets.mean) / nets.scale).clip(-CLIP, CLIP)
+        varying = (inputs != inputs[:1]).any(axis=0)
+        outputs = np.stack([forward_many(member, inputs, varying) for member in nets.members])
+        combine_members(outputs, nets.widen, outcomes)

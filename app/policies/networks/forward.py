@@ -5,14 +5,14 @@ compiled function that skips units that are zero; more rows are multiplied by th
 of numpy.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from torch import nn
 
-from app.sim.core.jit import FAST, direct, kernel
+from app.sim.core.jit import FAST, kernel
 from app.sim.geometry.capsules import copy_values
 
 Floats = NDArray[np.float32]
@@ -113,49 +113,38 @@ def _activate_rows(layer: Layer, sums: Floats, last: bool, rows: Floats) -> None
         _activate(layer, last, rows[i])
 
 
-class ForwardPass:
-    """Network for inference; safe to call from several threads.
+def layers_of(modules: Iterable[nn.Module]) -> Layers:
+    """Return the weights of linear layers, each followed by layer normalisation or not."""
+    layers: list[Layer] = []
+    none = np.zeros(0, dtype=np.float32)
+    for module in modules:
+        if isinstance(module, nn.Linear):
+            weight, bias = (p.detach().numpy() for p in (module.weight, module.bias))
+            layers.append(Layer(np.ascontiguousarray(weight.T), bias.copy(), none, none))
+        elif isinstance(module, nn.LayerNorm):
+            gain, shift = (p.detach().numpy().copy() for p in (module.weight, module.bias))
+            layers[-1] = layers[-1]._replace(gain=gain, shift=shift)
+    return tuple(layers)
+
+
+def width_of(layers: Layers) -> int:
+    """Return the number of units of the widest layer."""
+    return max(len(layer.bias) for layer in layers)
+
+
+def forward_many(layers: Layers, x: Floats, varying: Flags) -> Floats:
+    """Return the outputs of a network by the matrix library, shape (n, n_out).
 
     Args:
-        modules: Linear layers, each followed by layer normalisation or not, and ReLU.
+        layers: The network.
+        x: Inputs, shape (n, n_in).
+        varying: Whether an input differs between rows, shape (n_in,).
     """
-
-    def __init__(self, modules: Iterable[nn.Module]) -> None:
-        layers: list[Layer] = []
-        none = np.zeros(0, dtype=np.float32)
-        for module in modules:
-            if isinstance(module, nn.Linear):
-                weight, bias = (p.detach().numpy() for p in (module.weight, module.bias))
-                layers.append(Layer(np.ascontiguousarray(weight.T), bias.copy(), none, none))
-            elif isinstance(module, nn.LayerNorm):
-                gain, shift = (p.detach().numpy().copy() for p in (module.weight, module.bias))
-                layers[-1] = layers[-1]._replace(gain=gain, shift=shift)
-        self._layers: Layers = tuple(layers)
-        self._width = max(len(layer.bias) for layer in layers)
-        self._few: Callable[..., None] | None = None
-
-    def __call__(self, x: Floats, varying: Flags) -> Floats:
-        """Return the outputs, shape (n, n_out).
-
-        Args:
-            x: Inputs, shape (n, n_in), contiguous.
-            varying: Whether an input differs between rows, shape (n_in,).
-        """
-        if len(x) > FEW:
-            return self._many(x, varying)
-        out = np.empty((len(x), len(self._layers[-1].bias)), dtype=np.float32)
-        arguments = self._layers, x, varying, np.empty((3, self._width), dtype=np.float32), out
-        if self._few is None:
-            self._few = direct(forward_few, arguments)
-        self._few(*arguments)
-        return out
-
-    def _many(self, x: Floats, varying: Flags) -> Floats:
-        first, last = self._layers[0], self._layers[-1]
-        sums: Floats = np.add(first.bias, x[0, ~varying] @ first.weight[~varying])
-        rows: Floats = np.matmul(x[:, varying], first.weight[varying])
-        _activate_rows(first, sums, first is last, rows)
-        for layer in self._layers[1:]:
-            rows = np.matmul(rows, layer.weight)
-            _activate_rows(layer, layer.bias, layer is last, rows)
-        return rows
+    first, last = layers[0], layers[-1]
+    sums: Floats = np.add(first.bias, x[0, ~varying] @ first.weight[~varying])
+    rows: Floats = np.matmul(x[:, varying], first.weight[varying])
+    _activate_rows(first, sums, first is last, rows)
+    for layer in layers[1:]:
+        rows = np.matmul(rows, layer.weight)
+        _activate_rows(layer, layer.bias, layer is last, rows)
+    return rows

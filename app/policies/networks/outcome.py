@@ -9,6 +9,7 @@ Source: ours. Lakshminarayanan et al., *Simple and scalable predictive uncertain
 using deep ensembles* (2017). The thesis shows the critic's values only.
 """
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -17,6 +18,7 @@ from numpy.typing import NDArray
 from torch import nn
 
 from app.policies.networks.actor_critic import hidden
+from app.sim.core.jit import kernel
 
 Floats = NDArray[np.float32]
 MEMBERS = 3
@@ -87,15 +89,48 @@ class OutcomeHead(nn.Module):
             return combine(self(obs, value).numpy(), float(self.widen))
 
 
-def combine(outputs: Floats, widen: float) -> OutcomePrediction:
-    """Return the prediction of an ensemble.
+@kernel(nogil=True)
+def combine_members(outputs: Floats, widen: float, to: OutcomePrediction) -> None:
+    """Write the prediction of an ensemble.
 
     Args:
-        outputs: Outputs of the members, shape (MEMBERS, n, N_OUT).
+        outputs: Outputs of the members, shape (MEMBERS, n or more, N_OUT); the logits become
+            probabilities.
         widen: Factor of the spread.
+        to: Filled, for n observations.
     """
-    logits = outputs[..., : len(OUTCOMES)]
-    each = np.exp(logits - logits.max(axis=-1, keepdims=True))
-    each /= each.sum(axis=-1, keepdims=True)
-    spread = np.float32(1.96 * widen) * each.std(axis=0, ddof=1)
-    return OutcomePrediction(each.mean(axis=0), spread, outputs[..., -1].mean(axis=0).clip(0.0))
+    members, outcomes = outputs.shape[0], outputs.shape[2] - 1
+    for i in range(to.time_s.shape[0]):
+        for m in range(members):
+            row, largest, total = outputs[m, i], outputs[m, i, 0], np.float32(0.0)
+            for k in range(1, outcomes):
+                largest = max(largest, row[k])
+            for k in range(outcomes):
+                row[k] = math.exp(row[k] - largest)
+                total += row[k]
+            for k in range(outcomes):
+                row[k] /= total
+        for k in range(outcomes + 1):
+            mean, square = 0.0, 0.0
+            for m in range(members):
+                mean += outputs[m, i, k] / members
+            for m in range(members):
+                square += (outputs[m, i, k] - mean) ** 2
+            if k == outcomes:
+                to.time_s[i] = max(mean, 0.0)
+            else:
+                to.probability[i, k] = mean
+                to.spread[i, k] = 1.96 * widen * math.sqrt(square / (members - 1))
+
+
+def new_prediction(n: int) -> OutcomePrediction:
+    """Return room for the prediction of n observations."""
+    shapes = (n, len(OUTCOMES)), (n, len(OUTCOMES)), (n,)
+    return OutcomePrediction(*(np.empty(shape, dtype=np.float32) for shape in shapes))
+
+
+def combine(outputs: Floats, widen: float) -> OutcomePrediction:
+    """Return the prediction of an ensemble; see :func:`combine_members`."""
+    found = new_prediction(outputs.shape[1])
+    combine_members(outputs, widen, found)
+    return found

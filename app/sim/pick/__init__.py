@@ -1,6 +1,8 @@
 """The pick scenario.
 
 batch         The pick scenario of thesis chapter 5: one robot, one person, cubes and docks
+candidate_observer
+              Observations of one state for each of several candidates
 case_verdict  Whether what happened in a case study is what it is for: expected, observed,
               verdict
 cases         The four case studies of task selection (docs/method.md 3.6, thesis table 5.3)

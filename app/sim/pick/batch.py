@@ -19,10 +19,9 @@ from app.sim.core.kernels.rng import start_stream
 from app.sim.human import model as human
 from app.sim.people.human_motion_config import USUAL, HumanMotionConfig
 from app.sim.people.kernels.motion import record_palms
-from app.sim.people.kernels.people import People, new_people_geometry
+from app.sim.people.kernels.people import new_people_geometry
 from app.sim.pick.kernels import episode, starts
 from app.sim.pick.kernels.grasp import DESCEND, REACH_ONLY, GraspRules
-from app.sim.pick.kernels.observation import observe_batch
 from app.sim.pick.kernels.observation_layout import (
     N_FEATURES,
     N_PICK,
@@ -267,72 +266,6 @@ def queries(
     human_q, human_qd, size = people
     share = closing / grasp.close_s
     return PickQuery(*robot, human_q, human_qd, size, points, wanted, q_grasps, phase, share)
-
-
-def observe(
-    arm: Arm,
-    people: People,
-    sight: PickObservationWorkspace,
-    robot: tuple[Vec, Vec],
-    seen: tuple[Vec, Vec, Vec],
-    goals: Vec,
-    time_left_s: float,
-    task: "TaskView",
-) -> tuple[NDArray[np.float32], Flags]:
-    """Return the observation of one state for each of n targets, beside people or each of m.
-
-    Args:
-        arm: From :func:`~app.sim.scene.scene.arm_of`.
-        people: From :func:`~app.sim.scene.scene.people_of`.
-        sight: From :func:`observation_workspace_of`.
-        robot: Joint positions [rad] and speeds [rad/s], shape (6,) each.
-        seen: Joint positions [m, rad] and speeds [m/s, rad/s] of P people, the one nearest to
-            the robot first, shape (P, 18) or (m, P, 18) each, and body dimensions [m],
-            (P, body.N_SIZE) or (m, P, body.N_SIZE).
-        goals: Targets [m], shape (n, 3).
-        time_left_s: Time left [s].
-        task: What is observed of the task.
-
-    Returns:
-        Observations, shape (m n, task.n_obs), those of one set of people together, and whether
-        each target is reachable, (n,).
-    """
-    n, targets = len(goals), as_kernel_array(goals)
-    q_goals, q_grasps, reachable = target_configurations(arm, task.grasp, targets)
-    sets = [as_kernel_array(value).reshape(-1, *value.shape[-2:]) for value in seen]
-    m = len(sets[0])
-    q, qd = (np.tile(as_kernel_array(value), (m * n, 1)) for value in robot)
-    tiled = [value.repeat(n, axis=0) for value in sets]
-    phase, closing = np.zeros(n, dtype=np.int64), np.zeros(n)
-    if task.current is not None:
-        phase[task.current], closing[task.current] = task.phase, task.closing_s
-    states = queries(
-        task.grasp,
-        (q, qd),
-        (tiled[0], tiled[1], tiled[2]),
-        (np.tile(targets, (m, 1)), np.tile(q_goals, (m, 1)), np.tile(q_grasps, (m, 1))),
-        (np.tile(phase, m), np.tile(closing, m)),
-    )
-    left = np.full(m * n, float(time_left_s))
-    obs = np.empty((m * n, task.n_obs), dtype=np.float32)
-    observe_batch(arm, people.floor_z, states, left, sight, obs)
-    return obs, reachable
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class TaskView:
-    """Observation and progress of a task, for :func:`observe`."""
-
-    n_obs: int = N_FEATURES
-    """Length of an observation, one of those in ``VIEWS``."""
-    grasp: GraspRules = field(default=REACH_ONLY)
-    """Phases of a pick."""
-    current: int | None = None
-    """Number of the target that is being picked."""
-    phase: int = 0
-    """Phase of that pick."""
-    closing_s: float = 0.0
-    """Its closing time [s]."""
 
 
 def step_robot(

@@ -7,13 +7,14 @@ import torch
 from app.policies.checkpoints import pretrained
 from app.policies.checkpoints.model_state import under
 from app.policies.inference.value_networks import ValueNetworks, pick_preset_of
+from app.policies.networks.forward import FEW
 from app.policies.networks.outcome import OutcomeHead
 from app.policies.networks.pick import actor_of, critics_for
 from app.sim.cells.cell import load_cell
 from app.sim.pick.batch import WHOLE_PICK, PickBatch
 
 
-@pytest.mark.parametrize("n", [3, 200])
+@pytest.mark.parametrize("n", [1, 3, FEW, FEW + 1, 200])
 def test_the_shipped_policy_decides_as_its_modules_of_torch_do(n: int) -> None:
     checkpoint = pretrained.load("pick")
     networks, preset = ValueNetworks(checkpoint), pick_preset_of(checkpoint)
@@ -25,9 +26,8 @@ def test_the_shipped_policy_decides_as_its_modules_of_torch_do(n: int) -> None:
     for name, module in parts.items():
         module.load_state_dict(under(checkpoint.arrays(), name))
     obs = PickBatch(load_cell(), n, 5, WHOLE_PICK).reset()
-    act, values = networks.act_and_value(obs)
-    found = networks.predict(obs, values)
-    assert found is not None
+    act, values, found = networks.evaluate(obs)
+    assert found is not None and networks.evaluate(obs, predict=False)[2] is None
     with torch.inference_mode():
         rows = torch.as_tensor(obs)
         expected = parts["actor"](rows)

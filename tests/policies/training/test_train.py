@@ -112,7 +112,7 @@ def test_a_policy_that_observes_the_size_decides_by_it(body_policy, tiny_run):
     obs = np.random.default_rng(4).normal(0.0, 0.3, N_WITH_BODY).astype(np.float32)
     obs = np.stack([obs, obs])
     obs[1, N_FEATURES:] += 0.1
-    act, value = networks.act_and_value(obs)
+    act, value, _ = networks.evaluate(obs)
     assert value[0] != value[1] and not np.array_equal(act[0], act[1])
 
 

@@ -17,13 +17,8 @@ from app.sim.perception.observed_people import (
     nearest_index,
     person_from_cylinder,
 )
-from app.sim.pick.batch import (
-    PickBatch,
-    PickSettings,
-    TaskView,
-    observation_workspace_of,
-    observe,
-)
+from app.sim.pick.batch import PickBatch, PickSettings
+from app.sim.pick.candidate_observer import CandidateObserver
 from app.sim.pick.kernels.observation_layout import N_FEATURES
 from app.sim.scene.scene import NO_CYLINDERS, arm_of, people_of
 
@@ -40,7 +35,7 @@ def test_the_person_seen_is_the_one_a_batch_sees() -> None:
     settings = PickSettings(people=("worker", "worker", "walker"))
     batch = PickBatch(CELL, 40, 6, settings)
     obs = batch.reset().copy()
-    state, seen = batch.state, set()
+    state, seen, observer = batch.state, set(), CandidateObserver(CELL)
     for e in range(40):
         walker = state.people.walkers.rows[e, 0]
         x, y, r = state.people.cylinders[e, 0]
@@ -60,10 +55,7 @@ def test_the_person_seen_is_the_one_a_batch_sees() -> None:
         assert index is not None
         seen.add(index)
         size = people[index].size
-        found, _ = observe(
-            batch.arm,
-            batch.world.people,
-            observation_workspace_of(batch.cell),
+        found, _ = observer.observe(
             (state.q[e], state.qd[e]),
             (
                 people[index].q[None],
@@ -72,7 +64,6 @@ def test_the_person_seen_is_the_one_a_batch_sees() -> None:
             ),
             state.goal[e][None],
             state.time_left[e],
-            TaskView(),
         )
         assert found.shape == (1, N_FEATURES)
         np.testing.assert_allclose(found[0], obs[e], atol=1e-5)

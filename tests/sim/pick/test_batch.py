@@ -10,8 +10,9 @@ from app.sim.collision.fcl_recheck import Recheck, Trajectory
 from app.sim.collision.kernels import contact as contact_kernel
 from app.sim.human import model as human
 from app.sim.pick import batch as pick
-from app.sim.pick.batch import OUTCOMES, PickBatch, PickSettings, TaskView
-from app.sim.pick.kernels import observation as features
+from app.sim.pick.batch import OUTCOMES, PickBatch, PickSettings
+from app.sim.pick.candidate_observer import CandidateObserver
+from app.sim.pick.kernels.candidates import observe_candidates
 from app.sim.pick.kernels.observation_layout import LAYOUT
 from app.sim.robot.kernels import actions
 from app.sim.robot.kernels.joints import JointPath
@@ -131,7 +132,7 @@ def test_meshes_find_no_contact_that_the_kernels_missed(cell: Cell) -> None:
 def test_single_state_functions_do_what_the_batch_does(cell: Cell) -> None:
     batch = PickBatch(cell, 6, 13, TEN_SECONDS)
     batch.reset()
-    state, people = batch.state, batch.world.people
+    state, people, observer = batch.state, batch.world.people, CandidateObserver(cell)
     for act in random_actions(40, 6):
         q, qd, person = state.q.copy(), state.qd.copy(), state.people.q.copy()
         result = batch.step(act, auto_reset=False)
@@ -147,15 +148,11 @@ def test_single_state_functions_do_what_the_batch_does(cell: Cell) -> None:
                 sizes=state.people.size[e],
             )
             assert hit.kind == "none" and hit.clearance_m == state.clear[e, 0]
-            seen, _ = pick.observe(
-                batch.arm,
-                people,
-                batch._sight,
+            seen, _ = observer.observe(
                 (piece.q, piece.qd),
                 (state.people.q[e], state.people.qd[e], state.people.size[e]),
                 state.goal[e : e + 1],
                 state.time_left[e],
-                TaskView(),
             )
             np.testing.assert_array_equal(seen[0], result.obs[e])
 
@@ -201,18 +198,18 @@ def test_read_only_integer_and_strided_inputs_compile_nothing_again(cell: Cell) 
     arm, people = arm_of(cell), people_of(cell)
     person = human.rest_posture(*cell.human.home)
     q, zero, goals = arm.home.copy(), np.zeros(6), cell.positions()
-    sight = pick.observation_workspace_of(cell)
+    observer = CandidateObserver(cell)
 
     def use() -> None:
         pick.step_robot(arm, q, zero, zero, zero[:5])
         contact(arm, people, JointPath(q, zero, zero, zero), (person[None], person[None]))
         seen = person[None], np.zeros((1, 18)), people.bodies
-        pick.observe(arm, people, sight, (q, zero), seen, goals[::2], 10, TaskView())
+        observer.observe((q, zero), seen, goals[::2], 10)
         pick.tool_state(arm, q, zero, goals[0])
         human.capsules(person, cell.body, cell.floor_z)
 
     use()
-    kernels = (features.observe_states, contact_kernel.sweep, actions.advance)
+    kernels = (observe_candidates, contact_kernel.sweep, actions.advance)
     before = [len(compiled.signatures) for compiled in kernels]
     zero, goals = np.zeros(6, dtype=np.int64), goals[:, :]
     for array in (q, person, goals):

@@ -256,7 +256,7 @@ class Evaluator:
         )
         floor_z, left = batch.world.people.floor_z, state.time_left[env]
         observe_batch(batch.arm, floor_z, states, left, self._sight, obs)
-        act, value = self._networks.act_and_value(obs)
+        act, value, predicted = self._networks.evaluate(obs, predict=predicts)
         actions = np.zeros((len(rows), width, act.shape[1]), dtype=np.float32)
         values = np.full((len(rows), width), -np.inf, dtype=np.float32)
         distances = np.full((len(rows), width), np.inf)
@@ -265,7 +265,6 @@ class Evaluator:
         distances[owner, place] = np.linalg.norm(away, axis=1)
         clearances = np.full((len(rows), width), -np.inf)
         clearances[owner, place] = goal_clearance(obs)
-        predicted = self._networks.predict(obs, value) if predicts else None
         outcomes = None
         if predicted is not None:
             outcomes = np.zeros((len(rows), width, 4))

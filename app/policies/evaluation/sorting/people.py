@@ -230,7 +230,7 @@ class SortingBesidePeople:
         progress = phase, np.where(phase != APPROACH, state.closing[env], 0.0)
         robot, left = (state.q[env], state.qd[env]), state.time_left[env]
         obs = self._observe(robot, _of(sight, owner), point, progress, left)
-        act, value = self._networks.act_and_value(obs)
+        act, value, _ = self._networks.evaluate(obs, predict=False)
         later = np.flatnonzero((tasks.held[env] == NOTHING) & (counts[owner] > 1))
         if rule is critic and later.size:
             ends = np.concatenate([tasks.places[e] for e in rows])[later]
@@ -256,7 +256,7 @@ class SortingBesidePeople:
         n, q = len(picks), self._q_goals[picks]
         progress, left = (np.zeros(n, np.int64), np.zeros(n)), np.full(n, PLACE_TIME_S)
         obs = self._observe((q, np.zeros_like(q)), people, places, progress, left)
-        return self._networks.act_and_value(obs)[1]
+        return self._networks.evaluate(obs, predict=False)[1]
 
     def _observe(
         self,

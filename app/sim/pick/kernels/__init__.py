@@ -1,5 +1,6 @@
 """Compiled pick episodes.
 
+candidates             Observation of several candidates in one call
 episode                Steps, ends and rewards of episodes
 grasp                  Phases of a pick
 monitored_step         Steps under speed and separation monitoring

@@ -14,25 +14,11 @@ from app.sim.pick.kernels.episode import conclude
 from app.sim.pick.kernels.starts import PickCell, PickTask
 from app.sim.scenario.kernels.episode import RUNNING, EpisodeState, Indices, StepWorkspace
 from app.sim.scenario.kernels.monitored_motion import (
-    begin_account,
     close_account,
     command_action,
     move_monitored,
 )
 from app.sim.scenario.kernels.monitored_state import MonitoredState
-
-
-@kernel(nogil=True, error_model="numpy")
-def begin_rows(
-    world: PickCell,
-    state: EpisodeState,
-    envs: Indices,
-    monitor: MonitoredState,
-    work: StepWorkspace,
-) -> None:
-    """Begin the episodes of some environments, shape (k,), that were just reset."""
-    for e in envs:
-        begin_account(world.arm, world.people, state, e, monitor, work)
 
 
 @kernel(nogil=True, error_model="numpy")

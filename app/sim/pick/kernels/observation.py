@@ -306,12 +306,26 @@ def observe(
         work: Work space.
         out: Filled, shape (N_FEATURES,), (N_WITH_BODY,), (N_WITH_PHASE,) or (N_PICK,).
     """
+    place_person(floor_z, state.human_q[0], state.human_qd[0], state.size[0], work.person)
+    observe_target(arm, floor_z, state, time_left, robot, work, out)
+
+
+@kernel(inline="always")
+def observe_target(
+    arm: Arm,
+    floor_z: float,
+    state: PickQuery,
+    time_left: float,
+    robot: RobotPose,
+    work: PickObservationWorkspace,
+    out: Obs,
+) -> None:
+    """Apply :func:`observe` with the first person already placed in ``work.person``."""
     n_obs, second = out.shape[0], 0
     if n_obs == N_WITH_BODY:
         for i in range(body.N_SIZE):
             out[N_FEATURES + i] = state.size[0, i]
     q, goal, q_goal, person = state.q, state.goal, state.q_goal, work.person
-    place_person(floor_z, state.human_q[0], state.human_qd[0], state.size[0], person)
     _write_joints(arm, state, out)
     _write_tool(state.qd, goal, robot, out)
     _write_human_arms(person, robot, goal, out)

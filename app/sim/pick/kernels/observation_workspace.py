@@ -170,7 +170,10 @@ def new_pick_observation_workspace(
 def predict_person(
     floor_z: float, q: Vec, qd: Vec, size: Vec, who: int, work: PickObservationWorkspace
 ) -> None:
-    """Place the predicted capsules of a person, unless they are those of the last call."""
+    """Place the predicted capsules of a person, unless they are those of the last call.
+
+    The second person's points are overwritten; the first one's serve all candidates.
+    """
     known, same = work.known[who], True
     for j in range(18):
         same = same and known[j] == q[j] and known[18 + j] == qd[j]
@@ -184,4 +187,4 @@ def predict_person(
         known[36 + j] = size[j]
     predict_worker(work.predictor, q, qd, work.predicted)
     for i in range(3):
-        place_predicted(floor_z, work.predicted[i], size, work.person, work.ahead[who, i])
+        place_predicted(floor_z, work.predicted[i], size, work.second, work.ahead[who, i])

@@ -23,6 +23,7 @@ from app.sim.robot.kernels.joints import JointState
 from app.sim.safety.layer import SafetySettings
 from app.sim.scenario.batch import StepResult
 from app.sim.scenario.kernels.episode import Indices
+from app.sim.scenario.kernels.monitored_motion import begin_rows
 from app.sim.scenario.monitoring import (
     MonitoredEpisodes,
     MonitoringSettings,
@@ -109,8 +110,8 @@ class MonitoredReachBatch(ReachBatch):
 
     def _start(self, envs: Indices) -> None:
         super()._start(envs)
-        monitor = self._monitor
-        self._call(step.begin_rows, self.world, self.state, envs, monitor, self._work)
+        world, state, monitor = self.world, self.state, self._monitor
+        self._call(begin_rows, world.arm, world.people, state, envs, monitor, self._work)
 
     def _move(self, act: NDArray[np.float32]) -> None:
         self._execute(self._all, Commands(act, np.empty((0, 6))))

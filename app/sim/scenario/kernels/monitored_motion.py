@@ -44,7 +44,7 @@ from app.sim.safety.kernels.separation_check import (
     place_node,
 )
 from app.sim.safety.kernels.ssm import decide
-from app.sim.scenario.kernels.episode import EpisodeState, StepWorkspace, measure
+from app.sim.scenario.kernels.episode import EpisodeState, Indices, StepWorkspace, measure
 from app.sim.scenario.kernels.monitored_state import (
     ALLOWED,
     BELOW_HALF,
@@ -92,25 +92,29 @@ def follow_track(state: EpisodeState, e: int, monitor: MonitoredState, dt: float
         state.people.cylinders[e, 0, i] = now[i]
 
 
-@kernel(inline="always")
-def begin_account(
+@kernel(nogil=True, error_model="numpy")
+def begin_rows(
     arm: Arm,
     people: People,
     state: EpisodeState,
-    e: int,
+    envs: Indices,
     monitor: MonitoredState,
     work: StepWorkspace,
 ) -> None:
-    """Clear the account of environment ``e`` and move its person onto the track, if any."""
-    for k in range(N_ACCOUNT):
-        monitor.account[e, k] = 0.0
-    monitor.override[e], monitor.period[e] = 1.0, 0
-    if monitor.tracks.shape[0] > 0:
-        follow_track(state, e, monitor, arm.dt)
-        place_robot(arm, state.q[e], work.robot)
-        place_people(people, state.people, e, work.crowd)
-        measure(arm, people, state, e, work)
-    state.time_left[e] = min(monitor.horizon, state.time_left[e])
+    """Clear the accounts of environments, shape (k,), that were just reset.
+
+    Their pedestrians move onto their tracks, if any.
+    """
+    for e in envs:
+        for k in range(N_ACCOUNT):
+            monitor.account[e, k] = 0.0
+        monitor.override[e], monitor.period[e] = 1.0, 0
+        if monitor.tracks.shape[0] > 0:
+            follow_track(state, e, monitor, arm.dt)
+            place_robot(arm, state.q[e], work.robot)
+            place_people(people, state.people, e, work.crowd)
+            measure(arm, people, state, e, work)
+        state.time_left[e] = min(monitor.horizon, state.time_left[e])
 
 
 @kernel(inline="always")

@@ -81,7 +81,7 @@ def test_batch_evaluation_and_service_value_people_alike(workers):
     batch.reset()
     move_away(batch)
     obs = batch._look(np.arange(n))
-    np.testing.assert_allclose(networks.act_and_value(obs)[1], views[0][:, 0], atol=1e-5)
+    np.testing.assert_allclose(networks.evaluate(obs)[1], views[0][:, 0], atol=1e-5)
     ids = [station.id for station in cell.pick_stations]
     for e in range(n):
         people = [

@@ -8,8 +8,8 @@ import pytest
 from app.sim.cells.cell import Cell, load_cell
 from app.sim.core.observation_layout import slices_of
 from app.sim.human import model as human
-from app.sim.pick import batch as pick
-from app.sim.pick.batch import TaskView
+from app.sim.pick.batch import PickBatch, PickSettings
+from app.sim.pick.candidate_observer import CandidateObserver
 from app.sim.pick.kernels.grasp import DESCEND, GraspRules
 from app.sim.pick.kernels.observation_layout import (
     DISTANCE_SCALE,
@@ -19,11 +19,11 @@ from app.sim.pick.kernels.observation_layout import (
     N_WITH_PHASE,
     PICK_SIZES,
 )
+from app.sim.pick.task_policy import PickProgress
 from app.sim.prediction.kernels.worker import TIMES, predict_worker
 from app.sim.prediction.weights import new_worker_predictor
 from app.sim.robot.ur10 import Robot
 from app.sim.scenario.kernels.person_observation import HORIZONS
-from app.sim.scene.scene import arm_of, people_of
 
 
 @pytest.fixture(scope="module")
@@ -47,9 +47,9 @@ def seen(cell: Cell, **changes: Any) -> np.ndarray:
     at = state(cell) | changes
     human_q, human_qd = np.atleast_2d(at["human_q"]), np.atleast_2d(at["human_qd"])
     people = human_q, human_qd, np.tile(cell.body, (len(human_q), 1))
-    robot, task = (at["q"], at["qd"]), at.get("task", TaskView())
-    shared = arm_of(cell), people_of(cell), pick.observation_workspace_of(cell)
-    return pick.observe(*shared, robot, people, at["goals"], 7.0, task)[0]
+    observer = CandidateObserver(cell, **at.get("task", {}))
+    robot, current = (at["q"], at["qd"]), at.get("current", ())
+    return observer.observe(robot, people, at["goals"], 7.0, *current)[0]
 
 
 def test_layout_covers_the_observation_without_gap_or_overlap() -> None:
@@ -117,7 +117,7 @@ def test_approaching_person_shortens_the_look_ahead(cell: Cell) -> None:
 
 
 def test_seen_values_stay_within_a_few_units(cell: Cell) -> None:
-    batch = pick.PickBatch(cell, 200, 3, pick.PickSettings())
+    batch = PickBatch(cell, 200, 3, PickSettings())
     obs = batch.reset().copy()
     for _ in range(20):
         obs = batch.step(np.ones((200, 5), dtype=np.float32)).obs
@@ -128,12 +128,11 @@ def test_seen_values_stay_within_a_few_units(cell: Cell) -> None:
 PICK = slices_of(PICK_SIZES)
 
 
-def picking(**changes: Any) -> TaskView:
-    return TaskView(n_obs=N_PICK, grasp=GraspRules(), **changes)
+PICKING = {"n_obs": N_PICK, "grasp": GraspRules()}
 
 
 def test_a_pick_adds_to_the_features_of_a_reach(cell: Cell) -> None:
-    reach, both = seen(cell), seen(cell, task=picking())
+    reach, both = seen(cell), seen(cell, task=PICKING)
     ahead = ("look_ahead_still", "look_ahead_base", "goal_clearance")
     places = np.concatenate([np.arange(N_FEATURES)[LAYOUT[name]] for name in ahead])
     other = np.setdiff1d(np.arange(N_FEATURES), places)
@@ -146,9 +145,9 @@ def test_clearances_ahead_are_those_to_the_predicted_person(cell: Cell) -> None:
     at["human_q"] = human.rest_posture(0.1, 1.2, -1.5)
     predicted = np.empty((len(HORIZONS), 18))
     predict_worker(new_worker_predictor(), at["human_q"], at["human_qd"], predicted)
-    row = seen(cell, **at, task=picking())[0]
+    row = seen(cell, **at, task=PICKING)[0]
     for k, posture in enumerate(predicted):
-        there = seen(cell, **at | {"human_q": posture}, task=picking())[0]
+        there = seen(cell, **at | {"human_q": posture}, task=PICKING)[0]
         now = there[LAYOUT["distance_tilt_clearance_time"]][2]
         assert row[LAYOUT["look_ahead_still"]][k] == pytest.approx(now, abs=1e-5)
         at_goal = there[LAYOUT["goal_clearance"]][0]
@@ -157,8 +156,8 @@ def test_clearances_ahead_are_those_to_the_predicted_person(cell: Cell) -> None:
 
 
 def test_in_the_descent_the_target_is_the_object(cell: Cell) -> None:
-    over = seen(cell, task=picking())
-    low = seen(cell, task=picking(current=1, phase=DESCEND, closing_s=0.5))
+    over = seen(cell, task=PICKING)
+    low = seen(cell, task=PICKING, current=(1, PickProgress(phase=DESCEND, closing_s=0.5)))
     np.testing.assert_array_equal(np.delete(low, 1, axis=0), np.delete(over, 1, axis=0))
     goal = over[1, LAYOUT["goal_minus_tcp"]] - [0, 0, 2.0 * GraspRules().depth]
     np.testing.assert_allclose(low[1, LAYOUT["goal_minus_tcp"]], goal, atol=1e-6)
@@ -175,10 +174,10 @@ def test_the_second_person_is_the_one_nearer_to_the_target(cell: Cell) -> None:
         human_q=np.stack([first, left, right]),
         human_qd=np.zeros((3, 18)),
         goals=goals,
-        task=picking(),
+        task=PICKING,
     )
     np.testing.assert_allclose(obs[:, PICK["second_pelvis"]][:, 0], [-0.6, 0.6], atol=1e-6)
-    alone = seen(cell, human_q=left, human_qd=np.zeros(18), goals=goals, task=picking())
+    alone = seen(cell, human_q=left, human_qd=np.zeros(18), goals=goals, task=PICKING)
     np.testing.assert_allclose(
         obs[0, PICK["second_goal_clearance"]], alone[0, LAYOUT["goal_clearance"]], atol=1e-6
     )
@@ -188,16 +187,16 @@ def test_the_second_person_is_the_one_nearer_to_the_target(cell: Cell) -> None:
 
 
 def test_without_a_second_person_within_4_m_one_far_away_is_observed(cell: Cell) -> None:
-    row, at = seen(cell, task=picking())[0], state(cell)
+    row, at = seen(cell, task=PICKING)[0], state(cell)
     np.testing.assert_array_equal(row[PICK["second_clearance"].start :], 3.0)
     np.testing.assert_allclose(row[PICK["second_pelvis"]], [0.0, 2.75, 0.0], atol=1e-6)
     for x, y in ((3.0, 2.9), (0.0, 4.0)):
         two = np.stack([at["human_q"], human.rest_posture(x, y, 0.5)])
         moving = np.stack([at["human_qd"], np.ones(18)])
-        beside = seen(cell, human_q=two, human_qd=moving, task=picking())[0]
+        beside = seen(cell, human_q=two, human_qd=moving, task=PICKING)[0]
         np.testing.assert_array_equal(beside, row)
     two[1, 1] = 3.9
-    beside = seen(cell, human_q=two, human_qd=moving, task=picking())[0]
+    beside = seen(cell, human_q=two, human_qd=moving, task=PICKING)[0]
     np.testing.assert_allclose(beside[PICK["second_pelvis"]][1], 2.65, atol=1e-6)
-    one = seen(cell, task=TaskView(n_obs=N_WITH_PHASE, grasp=GraspRules()))[0]
+    one = seen(cell, task=PICKING | {"n_obs": N_WITH_PHASE})[0]
     np.testing.assert_array_equal(row[:N_WITH_PHASE], one)

@@ -23,7 +23,6 @@ from app.sim.scenario.kernels.episode import (
     distance_to,
 )
 from app.sim.scenario.kernels.monitored_motion import (
-    begin_account,
     close_account,
     command_action,
     move_monitored,
@@ -76,19 +75,6 @@ def _command_segment(
         work.c[j], work.d[j], work.qdd[j] = c[j], 0.0, 2.0 * c[j]
         work.q[j] = state.q[e, j] + dt * (state.qd[e, j] + dt * c[j])
         work.qd[j] = state.qd[e, j] + 2.0 * dt * c[j]
-
-
-@kernel(nogil=True, error_model="numpy")
-def begin_rows(
-    world: ReachCell,
-    state: EpisodeState,
-    envs: Indices,
-    monitor: MonitoredState,
-    work: StepWorkspace,
-) -> None:
-    """Begin the episodes of some environments, shape (k,), that were just reset."""
-    for e in envs:
-        begin_account(world.arm, world.people, state, e, monitor, work)
 
 
 @kernel(nogil=True, error_model="numpy")
