@@ -124,7 +124,7 @@ $(VENV)/dev.stamp: $(VENV)/runtime.stamp requirements-dev.lock
 	@touch $@
 
 # The server does this too, at every start; done here, it starts in seconds.
-$(VENV)/setup.stamp: $(VENV)/runtime.stamp $(wildcard app/sim/*/kernels/*.py app/sim/*/*/kernels/*.py app/sim/core/*.py app/sim/geometry/*.py app/store/migrations/versions/*.py)
+$(VENV)/setup.stamp: $(VENV)/runtime.stamp $(wildcard app/sim/*/kernels/*.py app/sim/*/*/kernels/*.py app/sim/core/*.py app/sim/geometry/*.py app/policies/*/*.py app/store/migrations/versions/*.py)
 	$(SAY) "database and compiled kernels"
 	@$(PY) -m app setup
 	@touch $@

@@ -9,17 +9,27 @@ import hashlib
 from importlib import resources
 from pathlib import Path
 
+COMPILED = b"from app.sim.core.jit import"
+"""Line of modules outside kernel packages that have compiled functions."""
+
+
+def kernel_sources() -> list[Path]:
+    """Return the files with compiled functions, and those they depend on."""
+    folder = Path(str(resources.files("app")))
+    return sorted(
+        {
+            *folder.glob("sim/**/kernels/*.py"),
+            *folder.glob("sim/core/*.py"),
+            *folder.glob("sim/geometry/*.py"),
+            *(one for one in folder.glob("policies/**/*.py") if COMPILED in one.read_bytes()),
+        }
+    )
+
 
 def fingerprint() -> str:
     """Return a short hash of the sources of all kernels."""
-    digest = hashlib.sha256()
-    folder = Path(str(resources.files("app.sim")))
-    sources = {
-        *folder.glob("**/kernels/*.py"),
-        *folder.glob("core/*.py"),
-        *folder.glob("geometry/*.py"),
-    }
-    for source in sorted(sources):
+    digest, folder = hashlib.sha256(), Path(str(resources.files("app")))
+    for source in kernel_sources():
         name = source.relative_to(folder).as_posix()
         digest.update(name.encode() + b"\0" + source.read_bytes() + b"\0")
     return digest.hexdigest()[:16]

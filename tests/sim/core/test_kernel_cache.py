@@ -1,10 +1,13 @@
 """Compiled kernels of one version are not used by another."""
 
 import os
+import re
 from pathlib import Path
 
-from app.sim.core.kernel_cache import fingerprint, kernel_cache
+from app.sim.core.kernel_cache import fingerprint, kernel_cache, kernel_sources
 from app.sim.robot.kernels.acceleration_bounds import greatest_end_speed
+
+ROOT = Path(__file__).parents[3]
 
 
 def test_cache_folder_lies_in_the_data_folder_and_names_the_version(tmp_path: Path) -> None:
@@ -16,3 +19,13 @@ def test_cache_folder_lies_in_the_data_folder_and_names_the_version(tmp_path: Pa
 def test_kernels_of_the_tests_are_kept_under_the_fingerprint() -> None:
     greatest_end_speed(1.0, 0.0, 1.0, 0.1)
     assert greatest_end_speed.stats.cache_path.startswith(os.environ["NUMBA_CACHE_DIR"])
+
+
+def test_every_module_with_compiled_functions_counts() -> None:
+    compiled = {
+        path
+        for path in (ROOT / "app").rglob("*.py")
+        if re.search(r"^@(kernel|njit)\(", path.read_text(), re.MULTILINE)
+    }
+    assert compiled <= set(kernel_sources())
+    assert len(compiled) > 60
