@@ -11,11 +11,13 @@ Ornstein-Uhlenbeck process (table 4.2), which is here too.
 """
 
 import math
+from collections.abc import Callable
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from app.policies.configs.reach import ReachExploration
 from app.policies.configs.td3 import NoiseExploration
 from app.sim.core.arrays import Vec
 from app.sim.pick.batch import PickBatch
@@ -71,27 +73,37 @@ class PerEnvAR1Noise:
 
 
 class OUNoise:
-    """The noise of thesis table 4.2: ``x += theta (0 - x) + sigma N(0, 1)`` per period.
+    """Ornstein-Uhlenbeck noise: ``x += -theta x dt + sigma sqrt(dt) N(0, 1)`` per period.
+
+    The process starts at 0 with every episode. The time step ``dt`` is one of the process, not
+    of the robot; Stable-Baselines 2, the library of the thesis, has 0.01.
 
     Args:
         shape: Environments and numbers of an action, (n_envs, n_act).
-        theta: Rate toward 0 per period.
-        sigma: Scale per period.
+        config: Rate ``ou_theta``, scale ``ou_sigma`` and time step ``ou_dt``.
+        started: Returns which environments are at the start of an episode, shape (n_envs,).
         rng: Random numbers.
     """
 
     n_greedy = 0
 
     def __init__(
-        self, shape: tuple[int, int], theta: float, sigma: float, rng: np.random.Generator
+        self,
+        shape: tuple[int, int],
+        config: ReachExploration,
+        started: Callable[[], NDArray[np.bool_]],
+        rng: np.random.Generator,
     ) -> None:
-        self._theta, self._sigma, self._rng = theta, sigma, rng
+        self._pull = config.ou_theta * config.ou_dt
+        self._push = config.ou_sigma * math.sqrt(config.ou_dt)
+        self._started, self._rng = started, rng
         self._noise = np.zeros(shape)
 
     def apply(self, act: NDArray[np.float32]) -> NDArray[np.float32]:
         """Return perturbed actions, shape (n_envs, n_act)."""
+        self._noise[self._started()] = 0.0
         fresh = self._rng.standard_normal(self._noise.shape)
-        self._noise += self._sigma * fresh - self._theta * self._noise
+        self._noise += self._push * fresh - self._pull * self._noise
         return np.clip(act + self._noise, -1.0, 1.0).astype(np.float32)
 
 

@@ -27,6 +27,7 @@ from app.policies.algorithms.prioritized_replay import Ints, PrioritisedReplay
 from app.policies.algorithms.vecenv import BatchVecEnv
 from app.policies.configs.td3 import TD3Learning
 from app.policies.networks.actor_critic import Critics
+from app.policies.networks.ddpg import RunningNormalisation
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -39,6 +40,8 @@ class Networks:
     """Returns new critics."""
     width: int
     """Units per hidden layer."""
+    norm: RunningNormalisation | None = None
+    """Normalisation of observations that all networks share; None without one."""
 
 
 class Minibatch(NamedTuple):
@@ -127,6 +130,7 @@ class BatchTD3(TD3):
     ) -> None:
         start, end = learning.lr_start, learning.lr_end
         self.learning, self.exploration = learning, exploration
+        self._norm = networks.norm
         replay: dict[str, Any] = {"n_steps": learning.n_steps}
         if learning.alpha > 0.0:
             own = {"gamma": learning.gamma, "alpha": learning.alpha, "seed": seed}
@@ -170,8 +174,11 @@ class BatchTD3(TD3):
     ) -> tuple[NDArray[Any], NDArray[Any]]:
         """Return actions, twice: to take and to store. There is no uniform warm-up phase."""
         assert self._last_obs is not None
+        obs = torch.as_tensor(self._last_obs)
+        if self._norm is not None:
+            self._norm.update(obs)
         with torch.inference_mode():
-            act = self.actor(torch.as_tensor(self._last_obs)).numpy()
+            act = self.actor(obs).numpy()
         explored = self.exploration.apply(act)
         return explored, explored
 

@@ -1,7 +1,8 @@
 """Training configurations of the reach scenario: TD3 and DDPG (docs/method.md 2.2, 2.3, 2.5).
 
 Deviates: values that learn in minutes replace those of thesis table 4.2 (many parallel
-environments, speed targets, features, reward for progress); ``reach-ddpg-thesis`` is the table.
+environments, speed targets, features, reward for progress). ``reach-ddpg-thesis`` is the table,
+``reach-ddpg-authors`` the run of its authors.
 """
 
 from typing import Literal, Self
@@ -23,7 +24,7 @@ from app.policies.configs.td3 import (
     NoiseExploration,
     TD3Learning,
 )
-from app.sim.reach.batch import GoalRule, StartRule, ViewName
+from app.sim.reach.batch import GoalRule, LimitRule, StartRule, ViewName
 from app.sim.reach.goal_sets import MOST_HALTON, N_HALTON
 
 MAX_BYTES = 16 * 1024 * 1024
@@ -43,11 +44,15 @@ class ReachLearning(TD3Learning):
 class ReachNetworks(ActorCriticNetworks):
     """Kinds of actor and critics."""
 
-    actor: Literal["residual", "plain"] = choice(
-        "residual", "Actor: residual to the nominal controller, or plain"
+    actor: Literal["residual", "plain", "ddpg"] = choice(
+        "residual", "Actor: residual to the nominal controller, plain, or Glorot-initialised"
     )
-    critic: Literal["mean", "quantiles"] = choice(
-        "mean", "Critic: expected return, or quantiles of it (TQC)"
+    critic: Literal["mean", "quantiles", "ddpg"] = choice(
+        "mean",
+        "Critic: expected return, quantiles of it (TQC), or DDPG's of Stable-Baselines 2",
+    )
+    normalisation: Literal["none", "running"] = choice(
+        "none", "Observations of ddpg networks: as they are, or by running mean and deviation"
     )
     n_quantiles: Whole = number(25, 2, 100, "", "Quantiles per critic")
     dropped_quantiles: Whole = number(
@@ -64,6 +69,9 @@ class ReachNetworks(ActorCriticNetworks):
         if self.dropped_quantiles >= self.n_quantiles:
             rule = f"must be below n_quantiles = {self.n_quantiles}"
             raise InvalidInput("networks.dropped_quantiles", self.dropped_quantiles, rule)
+        if self.normalisation == "running" and (self.actor, self.critic) != ("ddpg", "ddpg"):
+            rule = "needs actor = ddpg and critic = ddpg"
+            raise InvalidInput("networks.normalisation", self.normalisation, rule)
         per_network = self.width * ((self.layers - 1) * self.width + MOST_SEEN)
         size = 4 * (1 + self.n_critics) * per_network
         if size > MAX_BYTES:
@@ -81,8 +89,9 @@ class ReachExploration(NoiseExploration):
     noise: Literal["ar1", "ou"] = choice(
         "ar1", "Noise: AR(1) with a scale per environment, or Ornstein-Uhlenbeck"
     )
-    ou_theta: float = number(0.3, 0.0, 1.0, "per step", "Ornstein-Uhlenbeck rate θ")
+    ou_theta: float = number(0.3, 0.0, 1.0, "", "Ornstein-Uhlenbeck rate θ")
     ou_sigma: float = number(0.15, 0.0, 2.0, "", "Ornstein-Uhlenbeck scale σ")
+    ou_dt: float = number(0.01, 1e-4, 1.0, "", "Ornstein-Uhlenbeck time step per control cycle")
 
 
 class ReachEpisode(FieldGroup):
@@ -95,9 +104,13 @@ class ReachEpisode(FieldGroup):
     start_clearance_m: float = number(
         0.05, 0.0, 1.0, "m", "Start clearance: least distance of robot and people"
     )
-    collision: Literal["terminates", "continues"] = choice(
-        "terminates", "Collision: terminates the episode, or the episode continues"
+    collision: Literal["terminates", "continues", "blocks"] = choice(
+        "terminates", "Collision: terminates the episode, continues it, or blocks the arm"
     )
+    timeout: Literal["as-observed", "terminates"] = choice(
+        "as-observed", "Time-out: truncates an episode if its time is not observed, or ends it"
+    )
+    limits: LimitRule = choice("cell", "Joint limits: of the cell, or of the authors' code")
     safety: Literal["none", "ssm"] = choice(
         "none", "Safety layer: none, or speed and separation monitoring"
     )
@@ -124,6 +137,12 @@ class ReachReward(FieldGroup):
     c_step: float = number(0.003, 0.0, 1.0, "", "Time cost c_step: per control cycle")
     c_c: float = number(4.0, 0.0, 100.0, "", "Collision cost c_c")
     c_s: float = number(4.0, 0.0, 100.0, "", "Success bonus c_s")
+    c_u: float = number(
+        0.0, 0.0, 10.0, "", "Command cost c_u: of the norm of the action; collision = blocks"
+    )
+    bonus: Literal["added", "alone"] = choice(
+        "added", "Success bonus: added to the other terms, or alone; collision = blocks"
+    )
     c_o: float = number(
         0.0, 0.0, 10.0, "", "Stop cost c_o: per control cycle stopped by the safety layer"
     )
@@ -160,6 +179,7 @@ class ReachPreset(TrainingConfig):
         ):
             rule = "needs n_people above 0 and collision = terminates"
             raise InvalidInput("episode.safety", episode.safety, rule)
+        self._check_blocked()
         if people.count == "up-to" and (
             not 1 <= people.n_people <= self.learning.n_envs or episode.safety != "none"
         ):
@@ -167,40 +187,85 @@ class ReachPreset(TrainingConfig):
             raise InvalidInput("people.count", people.count, rule)
         return self
 
+    def _check_blocked(self) -> None:
+        """Check the reward and the people of an arm that contacts block."""
+        reward, episode = self.reward, self.episode
+        blocks = episode.collision == "blocks"
+        if blocks and (reward.c_p, reward.c_a, reward.c_step, reward.c_o) != (0.0,) * 4:
+            rule = "needs c_p = c_a = c_step = c_o = 0"
+            raise InvalidInput("episode.collision", episode.collision, rule)
+        if blocks and self.people.count == "up-to":
+            raise InvalidInput("people.count", "up-to", "needs another collision than blocks")
+        if not blocks and reward.c_u > 0.0:
+            raise InvalidInput("reward.c_u", reward.c_u, "needs collision = blocks")
+        if not blocks and reward.bonus != "added":
+            raise InvalidInput("reward.bonus", reward.bonus, "needs collision = blocks")
 
-THESIS = ReachPreset(
-    name="reach-ddpg-thesis",
-    learning=ReachLearning(
-        total_steps=4_000_000,
-        n_envs=1,
-        buffer_size=200_000,
-        batch_size=128,
-        learning_starts=1_000,
-        update_every=60,
-        lr_start=1e-4,
-        lr_end=1e-4,
-        actor_lr_ratio=10.0,
-        n_steps=1,
-        tau=0.001,
-        target_noise=0.0,
-        target_noise_clip=0.0,
-        actor_frozen_updates=0,
-        alpha=0.6,
-        progress_steps=50_000,
-        checkpoint_steps=500_000,
-    ),
-    networks=ReachNetworks(
-        width=400, layers=10, actor="plain", critic_norm="none", n_critics=1
-    ),
-    exploration=ReachExploration(sigma_max=0.6, noise="ou"),
-    episode=ReachEpisode(collision="continues", observation="state"),
-    action=ActionConfig(bounds="one-step", meaning="coefficient"),
-    reward=ReachReward(c_d=1.0, c_p=0.0, c_a=0.1, c_step=0.0, c_c=5.0, c_s=20.0),
+
+_AUTHORS_LEARNING = ReachLearning(
+    total_steps=4_998_000,
+    n_envs=60,
+    buffer_size=200_000,
+    batch_size=128,
+    learning_starts=120,
+    lr_start=1e-4,
+    lr_end=1e-4,
+    actor_lr_ratio=10.0,
+    n_steps=1,
+    tau=0.001,
+    target_noise=0.0,
+    target_noise_clip=0.0,
+    actor_frozen_updates=0,
+    progress_steps=49_980,
+    checkpoint_steps=499_800,
 )
-"""Thesis table 4.2 as printed: DDPG, prioritised replay, Ornstein-Uhlenbeck noise. Not printed
-and chosen here: the exponents of the priorities are those of Schaul et al. (2016), the time
-unit of the process is one period, an episode continues after a collision as in the authors'
-code."""
+AUTHORS = ReachPreset(
+    name="reach-ddpg-authors",
+    learning=_AUTHORS_LEARNING,
+    networks=ReachNetworks(
+        width=400,
+        layers=10,
+        actor="ddpg",
+        critic="ddpg",
+        normalisation="running",
+        critic_norm="none",
+        n_critics=1,
+    ),
+    exploration=ReachExploration(noise="ou"),
+    episode=ReachEpisode(
+        goals="in-turn",
+        start="authors",
+        collision="blocks",
+        timeout="terminates",
+        limits="authors",
+        observation="state",
+    ),
+    reward=ReachReward(
+        c_d=1.0, c_p=0.0, c_step=0.0, c_c=5.0, c_s=20.0, c_u=0.01, bonus="alone"
+    ),
+)
+"""DDPG as the authors ran it: their public code, its parameters and the defaults of
+Stable-Baselines 2 (docs/method.md 2.5).
+
+Deviates: 60 environments are stepped together, with one update per step of all, in place of one
+environment with an update every 60 steps; intervals are multiples of 60 for that reason. The
+arm is blocked by a rule in place of contact forces.
+"""
+
+THESIS = AUTHORS.model_copy(
+    update={
+        "name": "reach-ddpg-thesis",
+        "learning": ReachLearning(
+            **{**_AUTHORS_LEARNING.model_dump(), "total_steps": 3_998_400, "alpha": 0.6}
+        ),
+        "episode": AUTHORS.episode.model_copy(update={"start": "uniform"}),
+        "reward": ReachReward(c_d=1.0, c_p=0.0, c_step=0.0, c_c=5.0, c_s=20.0, c_u=0.1),
+    }
+)
+"""DDPG as thesis tables 4.1 and 4.2 print it; values that they do not print are those of
+``reach-ddpg-authors``. Differences: prioritised replay (exponents of Schaul et al. 2016), an
+action cost of 0.1, a success bonus beside the other terms (4.28), the printed walk (4.1), and
+4e6 steps."""
 
 MONITORED = ReachPreset(
     name="reach-td3-monitored",
@@ -217,5 +282,5 @@ PEOPLE_SET = ReachPreset(
 )
 """``reach-td3`` beside one to four people, observed as a set."""
 
-REACH_PRESETS = (ReachPreset(), MONITORED, PEOPLE_SET, THESIS)
+REACH_PRESETS = (ReachPreset(), MONITORED, PEOPLE_SET, AUTHORS, THESIS)
 """All presets of the scenario."""

@@ -20,10 +20,12 @@ from app.policies.checkpoints.checkpoint import (
     require_purpose,
     task_of,
 )
+from app.policies.checkpoints.model_state import under
 from app.policies.configs.fields import read_config
 from app.policies.configs.reach import ReachPreset
 from app.policies.inference.trained_policy import TrainedPolicy
 from app.policies.networks.actor_critic import BASE_WEIGHT, CROWD_WIDTH, CrowdShape
+from app.policies.networks.ddpg import CLIP, RunningNormalisation
 from app.sim.core.arrays import Vec
 from app.sim.core.jit import direct
 from app.sim.people.kernels.people import MAX_PEOPLE
@@ -53,6 +55,8 @@ MAX_LAYERS = 16
 
 ACTOR_LAYERS, CROWD_LAYERS = "actor.net", "actor.crowd.0.block"
 """Prefix of the names of an actor's tensors."""
+NORMALISATION = "actor.norm"
+"""Prefix of the names of the tensors that normalise observations."""
 
 Floats = NDArray[np.float32]
 Layer = tuple[Floats, Floats]
@@ -88,7 +92,7 @@ class ReachPolicy(TrainedPolicy):
         """Meaning of the actions (docs/method.md 2.2)."""
         self.targets: Vec | None = None
         """Training targets [m], shape (n, 3); None for a whole box."""
-        if self.goals == "grid":
+        if self.goals in ("grid", "in-turn"):
             self.targets = goal_region_of(self._cell).targets()
         elif self.goals == "halton":
             self.targets = halton_targets(goal_region_of(self._cell), preset.episode.n_halton)
@@ -100,6 +104,12 @@ class ReachPolicy(TrainedPolicy):
             self._crowd = _layers_of(arrays, CROWD_LAYERS, PEOPLE_SET.n_block, CROWD_WIDTH)
             n_seen = PEOPLE_SET.first + CROWD_WIDTH
         self._layers = _layers_of(arrays, ACTOR_LAYERS, n_seen, N_ACT)
+        self._moments: tuple[Floats, Floats] | None = None
+        if preset.networks.normalisation == "running":
+            norm = RunningNormalisation(self.n_obs)
+            norm.load_state_dict(under(arrays, NORMALISATION))
+            mean, spread = norm.moments()
+            self._moments = mean.numpy(), spread.numpy()
         self._residual = preset.networks.actor == "residual"
         self._few = self.kernel_network
         self._answers: Callable[..., None] | None = None
@@ -133,7 +143,11 @@ class ReachPolicy(TrainedPolicy):
             )
         if self._few is not None and len(obs) <= FEW:
             return self._compiled_acts(self._few, obs)
-        rows = _hidden(self._with_crowd(obs), self._layers[:-1])
+        seen = self._with_crowd(obs)
+        if self._moments is not None:
+            mean, spread = self._moments
+            seen = ((obs - mean) / spread).clip(-CLIP, CLIP)
+        rows = _hidden(seen, self._layers[:-1])
         weight, bias = self._layers[-1]
         rows = rows @ weight
         rows += bias

@@ -6,7 +6,8 @@ down) and what must go on (from the next level up). A pick fails and leaves ever
 was, so the true value of a pick is linear in the failure probability of its cell; the network
 says value and slope per type and tower, and never prefers the riskier of two duplicates.
 
-:class:`PrintedNetwork` is the source's: one-hot numbers through two layers of 128 (table 3.1).
+:class:`PrintedNetwork` is the source's: one-hot numbers, two layers of 128 (table 3.1) in each
+of two streams; :class:`InformedNetwork` also observes failure probabilities.
 
 Both are dueling: ``Q = V + A - mean A``; ours takes the mean over the moves that are valid and
 puts all others out of the question, in exploration, targets and prediction alike.
@@ -187,30 +188,48 @@ class SharedNetwork(nn.Module):
 
 
 class PrintedNetwork(nn.Module):
-    """Two layers of the same width over one-hot numbers, as table 3.1 prints it.
+    """Two dueling streams of two layers each over one-hot numbers (table 3.1).
+
+    As in Stable-Baselines 2, the library of the thesis, value and advantages have hidden layers
+    of their own. Failure probabilities are not observed: the policy has to learn them.
 
     Args:
         shape: Size of the task.
         width: Width of the hidden layers.
     """
 
+    informed = False
+    """Whether failure probabilities are observed."""
+
     def __init__(self, shape: SortingShape, width: int) -> None:
         super().__init__()
-        self.shape = shape
         self.n_places = shape.n_cells * (1 + 2 * shape.n_colours)
-        self.first = OneHotLinear(self.n_places, shape.n_types + 1, shape.n_cells, width)
-        self.second = nn.Linear(width, width)
-        self.advantage = nn.Linear(width, shape.n_actions)
-        self.value = nn.Linear(width, 1)
+        sizes = self.n_places, shape.n_types + 1, shape.n_cells, width
+        self.advantage_first, self.value_first = OneHotLinear(*sizes), OneHotLinear(*sizes)
+        self.advantage = _second_layer(width, shape.n_actions)
+        self.value = _second_layer(width, 1)
 
     def forward(self, obs: Tensor) -> Tensor:
         """Return the values of all moves, (B, n_actions); it knows nothing of valid ones."""
-        codes, fail = obs[:, : self.n_places], obs[:, self.n_places :].float() / FAILURE_SCALE
-        hidden = self.first(codes.to(torch.uint8).contiguous(), fail).relu()
-        hidden = self.second(hidden).relu()
-        advantage = self.advantage(hidden)
-        values: Tensor = self.value(hidden) + advantage - advantage.mean(dim=1, keepdim=True)
+        codes = obs[:, : self.n_places].to(torch.uint8).contiguous()
+        fail = obs[:, self.n_places :].float() / FAILURE_SCALE
+        if not self.informed:
+            fail = torch.zeros_like(fail)
+        advantage = self.advantage(self.advantage_first(codes, fail))
+        value = self.value(self.value_first(codes, fail))
+        values: Tensor = value + advantage - advantage.mean(dim=1, keepdim=True)
         return values
+
+
+def _second_layer(width: int, n_out: int) -> nn.Sequential:
+    """Return the layers of a stream after its first one."""
+    return nn.Sequential(nn.ReLU(), nn.Linear(width, width), nn.ReLU(), nn.Linear(width, n_out))
+
+
+class InformedNetwork(PrintedNetwork):
+    """The same with the failure probabilities of the cells in the observation."""
+
+    informed = True
 
 
 def _relative_codes(shape: SortingShape) -> Tensor:
@@ -233,6 +252,6 @@ def _histogram(codes: Tensor, n: int) -> Tensor:
 
 
 NETWORKS: Mapping[str, type[SharedNetwork] | type[PrintedNetwork]] = MappingProxyType(
-    {"shared": SharedNetwork, "printed": PrintedNetwork}
+    {"shared": SharedNetwork, "printed": PrintedNetwork, "printed-informed": InformedNetwork}
 )
 """Networks by the name that presets give them."""

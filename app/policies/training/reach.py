@@ -18,6 +18,7 @@ from app.policies.checkpoints.checkpoint import Checkpoint
 from app.policies.configs.reach import ReachExploration, ReachPreset
 from app.policies.inference.reach_policy import LAYOUTS, PEOPLE_SET
 from app.policies.networks.actor_critic import Critics, PlainActor, ResidualActor
+from app.policies.networks.ddpg import DDPGActor, DDPGCritics, RunningNormalisation
 from app.policies.training.reporter import Callbacks, Reporter
 from app.policies.training.run import TrainingRun
 from app.policies.training.td3 import TD3Scenario, TrainingMonitor, first_step, start_td3
@@ -27,6 +28,7 @@ from app.sim.envs.tasks import ArmTask
 from app.sim.people.kernels.pedestrian import VX, VY, R, X, Y
 from app.sim.pick.batch import OUTCOMES
 from app.sim.reach.batch import N_ACT, ReachBatch, ReachSettings
+from app.sim.reach.blocked_batch import BlockedReachBatch
 from app.sim.reach.kernels.observation import BASE_START
 from app.sim.reach.kernels.reward import ReachWeights
 from app.sim.reach.mixed_batch import MixedReachBatch, ReachEnvironments
@@ -41,7 +43,7 @@ CURVE_SEED = 1_000_003
 def settings_of(preset: ReachPreset) -> ReachSettings:
     """Return the scenario's settings of a preset."""
     walker: HumanKind = "walker"
-    episode = preset.episode
+    episode, weights = preset.episode, preset.reward.model_dump(exclude={"c_u", "bonus"})
     return ReachSettings(
         time_limit_s=episode.time_limit_s,
         goals=episode.goals,
@@ -50,9 +52,12 @@ def settings_of(preset: ReachPreset) -> ReachSettings:
         start=episode.start,
         start_clearance_m=episode.start_clearance_m,
         collision_ends=episode.collision == "terminates",
+        limits=episode.limits,
+        command_cost=preset.reward.c_u,
+        bonus_alone=preset.reward.bonus == "alone",
         action=preset.action.settings,
         observation=episode.observation,
-        weights=ReachWeights(**preset.reward.model_dump(), gamma=1.0),
+        weights=ReachWeights(**weights, gamma=1.0),
     )
 
 
@@ -63,7 +68,8 @@ def batch_of(preset: ReachPreset, cell: Cell, n_envs: int, seed: int) -> ReachEn
         return MonitoredReachBatch(cell, n_envs, seed, settings, safety_settings(cell))
     if preset.people.count == "up-to":
         return MixedReachBatch(cell, n_envs, seed, settings)
-    return ReachBatch(cell, n_envs, seed, settings)
+    kind = BlockedReachBatch if preset.episode.collision == "blocks" else ReachBatch
+    return kind(cell, n_envs, seed, settings)
 
 
 def exploration_of(
@@ -72,8 +78,14 @@ def exploration_of(
     """Return the exploration of a preset."""
     rng, shape = np.random.default_rng(seed), (batch.n_envs, N_ACT)
     if config.noise == "ou":
-        return OUNoise(shape, config.ou_theta, config.ou_sigma, rng)
+        return OUNoise(shape, config, lambda: elapsed_times(batch) == 0.0, rng)
     return PerEnvAR1Noise(shape, batch.arm.dt, config, rng)
+
+
+def elapsed_times(batch: ReachEnvironments) -> Vec:
+    """Return the times since the starts of the present episodes [s], shape (n_envs,)."""
+    parts = batch.parts if isinstance(batch, MixedReachBatch) else (batch,)
+    return np.concatenate([part.state.elapsed for part in parts])
 
 
 def networks_of(preset: ReachPreset, n_obs: int) -> Networks:
@@ -82,19 +94,25 @@ def networks_of(preset: ReachPreset, n_obs: int) -> Networks:
     width, layers, normed = sizes.width, sizes.layers, sizes.critic_norm == "layer"
     crowd = PEOPLE_SET if preset.episode.observation == "people-set" else None
 
-    def actor() -> ResidualActor | PlainActor:
+    norm = RunningNormalisation(n_obs) if sizes.normalisation == "running" else None
+
+    def actor() -> ResidualActor | PlainActor | DDPGActor:
+        if sizes.actor == "ddpg":
+            return DDPGActor(width, n_obs, N_ACT, layers, norm)
         if sizes.actor == "residual":
             return ResidualActor(width, n_obs, N_ACT, BASE_START, layers, crowd)
         return PlainActor(width, n_obs, N_ACT, layers, crowd)
 
     def critic() -> Critics:
         n = sizes.n_critics
+        if sizes.critic == "ddpg":
+            return DDPGCritics(width, n_obs, N_ACT, n, layers, norm)
         if sizes.critic == "mean":
             return Critics(width, n_obs, N_ACT, n, layers, normed, crowd=crowd)
         quantiles = sizes.n_quantiles, sizes.dropped_quantiles
         return QuantileCritics(width, n_obs, N_ACT, n, layers, normed, *quantiles, crowd)
 
-    return Networks(actor=actor, critic=critic, width=width)
+    return Networks(actor=actor, critic=critic, width=width, norm=norm)
 
 
 def start(
@@ -107,8 +125,10 @@ def start(
     """
     first = seed + first_step(resume)
     batch = batch_of(preset, cell, preset.learning.n_envs, first)
+    episode = preset.episode
+    ends = episode.observation != "state" or episode.timeout == "terminates"
     scenario = TD3Scenario(
-        task=ArmTask(batch, sees_time=preset.episode.observation != "state"),
+        task=ArmTask(batch, sees_time=ends),
         exploration=exploration_of(preset.exploration, batch, first),
         networks=networks_of(preset, batch.obs_size),
         layout=LAYOUTS[preset.episode.observation],

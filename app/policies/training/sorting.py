@@ -28,8 +28,6 @@ from app.sim.sorting.state import NULL, SortingShape
 
 CURVE_SEED = 1_000_003
 """Seed of the episodes behind a point of the curve; no evaluation uses it."""
-FADE = 0.8
-"""Share of the training over which the curriculum fades."""
 FADE_EVERY = 16
 """Steps of all tasks between two looks at the curriculum."""
 
@@ -106,7 +104,8 @@ class SortingReporter(Reporter):
     def watch(self, rewards: NDArray[np.floating]) -> None:
         """Let the curriculum fade with the steps."""
         if (self.num_timesteps // len(rewards)) % FADE_EVERY == 0:
-            done = self.num_timesteps / (FADE * self._preset.learning.total_steps)
+            share = self._preset.episode.fade_share
+            done = self.num_timesteps / (share * self._preset.learning.total_steps)
             self._trained.tasks.settings = self._preset.settings(done)
 
     def rates(self) -> dict[str, Any]:

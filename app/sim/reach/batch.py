@@ -22,6 +22,7 @@ from app.sim.people.kernels.people import People
 from app.sim.people.pedestrian import AUTHORS_WALK, pedestrian_rules
 from app.sim.prediction.weights import new_motion_predictor
 from app.sim.reach.goal_sets import N_HALTON, halton_targets
+from app.sim.reach.joint_limits import with_authors_limits
 from app.sim.reach.kernels import episode, queries
 from app.sim.reach.kernels.observation import ALL_PEOPLE, N_FEATURES, N_STATE
 from app.sim.reach.kernels.observation_workspace import new_observation_workspace
@@ -46,7 +47,8 @@ from app.sim.scene.scene import (
 N_ACT = 6
 """Joints that a policy moves: all."""
 StartRule = Literal["clearance", "uniform", "authors"]
-GoalRule = Literal["grid", "halton", "box"]
+GoalRule = Literal["grid", "in-turn", "halton", "box"]
+LimitRule = Literal["cell", "authors"]
 ViewName = Literal["features", "state", "forecast", "people-set"]
 VIEWS = {
     "state": (PLAIN, N_STATE),
@@ -79,8 +81,8 @@ class ReachSettings:
     time_limit_s: float = 5.0
     """Longest episode [s]."""
     goals: GoalRule = "grid"
-    """Goals: the grid points of the cell's goal region, the points of a Halton set in it, or
-    uniform in it."""
+    """Goals: the grid points of the cell's goal region (drawn, or in turn), the points of a
+    Halton set in it, or uniform in it."""
     n_halton: int = N_HALTON
     """Number of points of the Halton set."""
     people: tuple[HumanKind, ...] | None = None
@@ -96,6 +98,12 @@ class ReachSettings:
     collision_ends: bool = True
     """Whether a collision ends the episode. If not, the episode continues until success or
     timeout and then counts as a collision."""
+    limits: LimitRule = "cell"
+    """Limits of the joints: the cell's, or those of the authors (``joint_limits.py``)."""
+    command_cost: float = 0.0
+    """Cost of the norm of the action; read by BlockedReachBatch."""
+    bonus_alone: bool = False
+    """Whether the success bonus replaces the other terms; read by BlockedReachBatch."""
     work: HumanMotionConfig = field(default=REACHING)
     """Motion, body dimensions and yielding of the workers."""
     action: ActionSettings = field(default=DEFAULT_ACTION)
@@ -106,7 +114,12 @@ class ReachSettings:
     """Reward coefficients (docs/method.md 2.3)."""
 
     def __post_init__(self) -> None:
-        choices = (("goals", GoalRule), ("start", StartRule), ("observation", ViewName))
+        choices = (
+            ("goals", GoalRule),
+            ("start", StartRule),
+            ("observation", ViewName),
+            ("limits", LimitRule),
+        )
         for name, known in choices:
             value = getattr(self, name)
             if value not in get_args(known):
@@ -124,7 +137,7 @@ def stated_rules(cell: Cell, settings: ReachSettings) -> dict[str, Any]:
         cell: Work cell.
         settings: Settings of the scenario.
     """
-    chosen = _with_people(cell, settings)
+    chosen = _cell_of(cell, settings)
     stated: dict[str, Any] = {
         "cell": cell.name,
         "people": list(kinds_of(chosen)),
@@ -133,6 +146,8 @@ def stated_rules(cell: Cell, settings: ReachSettings) -> dict[str, Any]:
         "goals": settings.goals,
         "time_limit_s": settings.time_limit_s,
     }
+    if settings.limits != "cell":
+        stated["limits"] = settings.limits
     if settings.goals == "halton":
         stated["n_halton"] = settings.n_halton
     if settings.start == "clearance":
@@ -175,7 +190,9 @@ def with_workplace(cell: Cell) -> Cell:
     return cell.model_copy(update={"people": (*cell.people, worker), "stations": stations})
 
 
-def _with_people(cell: Cell, settings: ReachSettings) -> Cell:
+def _cell_of(cell: Cell, settings: ReachSettings) -> Cell:
+    if settings.limits == "authors":
+        cell = with_authors_limits(cell)
     if settings.people is None:
         return cell
     if "worker" in settings.people and not cell.workers:
@@ -261,7 +278,7 @@ class ReachBatch(EnvBatch):
     def __init__(
         self, cell: Cell, n_envs: int, seed: int, settings: ReachSettings, first_env: int = 0
     ) -> None:
-        self.cell, self.settings = _with_people(cell, settings), settings
+        self.cell, self.settings = _cell_of(cell, settings), settings
         targets = targets_of(goal_region_of(self.cell), settings)
         world = reach_cell_of(self.cell, _people_of(self.cell, settings), targets)
         people = new_people_state(self.cell, world.people, n_envs)
@@ -278,6 +295,16 @@ class ReachBatch(EnvBatch):
         self._sight = new_observation_workspace(
             self.arm, world.people, people, new_motion_predictor()
         )
+
+    def _start(self, envs: Indices) -> None:
+        """Start episodes in some environments, with the next goals where they are in turn."""
+        super()._start(envs)
+        if self.settings.goals == "in-turn":
+            robot, targets = self._work.robot, self.world.targets
+            numbers = (self._first + envs + self.state.episode[envs]) % len(targets)
+            for e, number in zip(envs.tolist(), numbers.tolist(), strict=True):
+                episode.set_goal(self.world, self.state, e, targets[number], robot)
+                self.state.target[e] = number
 
     def set_goals(self, envs: Indices, goals: Vec) -> NDArray[np.float32]:
         """Set other goals in some environments, until their episodes end.

@@ -7,6 +7,7 @@ import torch
 from app.policies.algorithms.exploration import OptionExploration, OUNoise, PerEnvAR1Noise
 from app.policies.algorithms.prioritized_replay import PrioritisedReplay
 from app.policies.algorithms.td3 import BatchTD3, critics_of
+from app.policies.configs.reach import ReachExploration
 from app.policies.configs.td3 import NoiseExploration
 from app.policies.networks.actor_critic import Critics, PlainActor, ResidualActor
 from app.policies.training import pick as pick_training
@@ -90,11 +91,11 @@ def test_critics_learn_the_value_of_an_episode_that_ends_at_once(model):
 def ddpg() -> BatchTD3:
     """The thesis recipe with small networks."""
     small = {
-        "learning.total_steps": 4000,
-        "learning.progress_steps": 1000,
-        "learning.checkpoint_steps": 1000,
+        "learning.total_steps": 6000,
+        "learning.progress_steps": 3000,
+        "learning.progress_episodes": 4,
+        "learning.checkpoint_steps": 3000,
         "learning.buffer_size": 2000,
-        "learning.learning_starts": 100,
         "networks.width": 16,
         "learning.batch_size": 16,
     }
@@ -104,8 +105,8 @@ def ddpg() -> BatchTD3:
 
 
 def test_ddpg_is_td3_with_one_critic_and_updates_every_sixty_steps(ddpg):
-    ddpg.learn(700)
-    assert ddpg._n_updates == sum(1 for step in range(101, 701) if step % 60 == 0)
+    ddpg.learn(720)
+    assert ddpg._n_updates == (720 - 120) // 60
     assert critics_of(ddpg.critic).n_critics == 1
     linear = [m for m in ddpg.actor.mu.modules() if isinstance(m, torch.nn.Linear)]
     assert len(linear) == 11
@@ -113,11 +114,19 @@ def test_ddpg_is_td3_with_one_critic_and_updates_every_sixty_steps(ddpg):
     assert ddpg.actor.optimizer.param_groups[0]["lr"] == pytest.approx(10.0 * critic)
 
 
+def test_all_networks_of_ddpg_share_the_counted_observations(ddpg):
+    norm = ddpg._norm
+    shared = [ddpg.actor.mu.norm, ddpg.actor_target.mu.norm]
+    shared += [critics_of(one).q1.norm for one in (ddpg.critic, ddpg.critic_target)]
+    assert all(one is norm for one in shared)
+    assert norm.count.item() == pytest.approx(720.01)
+
+
 def test_prioritised_replay_learns_where_the_errors_are(ddpg):
     assert isinstance(ddpg.replay_buffer, PrioritisedReplay)
     before = ddpg.replay_buffer._tree[1]
     ddpg.train(1, 16)
-    ddpg.num_timesteps = 720
+    ddpg.num_timesteps = 780
     ddpg.train(1, 16)
     assert ddpg.replay_buffer._tree[1] != before
 
@@ -146,9 +155,14 @@ def test_options_take_over_in_every_second_noisy_row():
     assert changed.tolist() == [row >= explorer.n_greedy and row % 2 == 0 for row in range(16)]
 
 
-def test_ornstein_uhlenbeck_noise_settles_where_push_and_pull_balance():
-    noise, still = OUNoise((64, 6), 0.3, 0.1, np.random.default_rng(2)), np.zeros((64, 6))
-    taken = np.stack([noise.apply(still.astype(np.float32)) for _ in range(400)])[50:]
-    assert taken.std() == pytest.approx(0.1 / np.sqrt(1.0 - 0.7**2), rel=0.03)
-    one, later = taken[:-1].ravel(), taken[1:].ravel()
-    assert np.corrcoef(one, later)[0, 1] == pytest.approx(0.7, abs=0.02)
+def test_ornstein_uhlenbeck_noise_pulls_and_pushes_by_its_time_step():
+    """theta 0.3, sigma 0.15, dt 0.01: a pull of 0.003 and a push of 0.015 per period."""
+    started, config = np.ones(2, dtype=bool), ReachExploration()
+    noise = OUNoise((2, 6), config, lambda: started, np.random.default_rng(2))
+    still, drawn = np.zeros((2, 6), dtype=np.float32), np.random.default_rng(2)
+    first = 0.015 * drawn.standard_normal((2, 6))
+    assert noise.apply(still) == pytest.approx(first, rel=1e-5)
+    started[:] = [False, True]
+    second = 0.015 * drawn.standard_normal((2, 6))
+    second[0] += (1.0 - 0.003) * first[0]
+    assert noise.apply(still) == pytest.approx(second, rel=1e-5)

@@ -9,7 +9,7 @@ import torch
 from app.errors import CheckpointMismatch, InvalidInput
 from app.policies.checkpoints import checkpoint as formats
 from app.policies.checkpoints import pretrained
-from app.policies.checkpoints.model_state import under
+from app.policies.checkpoints.model_state import under, weights_of
 from app.policies.inference.reach_policy import PEOPLE_SET, ReachPolicy, is_reach
 from app.policies.training.reach import networks_of
 from app.sim.cells.cell import load_cell
@@ -44,6 +44,22 @@ def test_it_acts_as_the_network_that_was_trained(layers, kind):
     act = policy.acts(obs)
     assert act.dtype == np.float32 and np.ptp(act) > 0.1
     np.testing.assert_allclose(act, expected, atol=2e-6)
+
+
+def test_a_normalised_actor_acts_as_in_training():
+    overrides = {"width": 24, "layers": 3, "actor": "ddpg", "critic": "ddpg"}
+    overrides["normalisation"] = "running"
+    checkpoint = untrained_reach(seed=4, **overrides)
+    n_obs = sum(size for _, size in checkpoint.manifest["layout"])
+    actor = networks_of(reach_preset(**overrides), n_obs).actor()
+    obs = 3.0 + 2.0 * np.random.default_rng(1).normal(size=(300, n_obs)).astype(np.float32)
+    actor.load_state_dict(under(checkpoint.arrays(), "actor"))
+    actor.norm.update(torch.as_tensor(obs))
+    tensors = {**checkpoint.arrays(), **weights_of({"actor": actor})}
+    policy = ReachPolicy(formats.pack(checkpoint.manifest, tensors))
+    with torch.no_grad():
+        expected = actor(torch.as_tensor(obs)).numpy()
+    np.testing.assert_allclose(policy.acts(obs), expected, atol=1e-5)
 
 
 def test_few_states_are_answered_as_many_are():

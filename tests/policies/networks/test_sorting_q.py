@@ -103,14 +103,28 @@ def test_turning_all_colours_turns_the_values(n_colours):
         assert values[0, action] == pytest.approx(values[1, duplicate], abs=1e-5)
 
 
-def test_the_printed_network_has_two_layers_of_its_width():
+def test_the_printed_network_has_two_streams_of_two_layers():
     net = PrintedNetwork(SHAPE, 128)
-    assert net.first.weight.shape == (50 * 7, 128)
-    assert net.first.plain.shape == (10, 128)
-    assert (net.second.in_features, net.second.out_features) == (128, 128)
+    for first, stream in (
+        (net.advantage_first, net.advantage),
+        (net.value_first, net.value),
+    ):
+        assert first.weight.shape == (50 * 7, 128)
+        assert (stream[1].in_features, stream[1].out_features) == (128, 128)
+    assert (net.advantage[3].out_features, net.value[3].out_features) == (SHAPE.n_actions, 1)
     obs = torch.as_tensor(batch_in(load_cell("sorting-e0"), 3, 1).reset())
-    assert net(obs).shape == (3, SHAPE.n_actions)
+    advantage = net(obs) - net(obs).mean(dim=1, keepdim=True)
+    assert torch.allclose(advantage.mean(dim=1), torch.zeros(3), atol=1e-6)
+
+
+def test_only_the_informed_network_observes_failure_probabilities():
+    obs = torch.as_tensor(batch_in(load_cell("sorting-e0"), 3, 1).reset())
+    other = obs.clone()
+    other[:, -10:] = 255 - other[:, -10:]
+    hidden, informed = NETWORKS["printed"](SHAPE, 16), NETWORKS["printed-informed"](SHAPE, 16)
+    assert torch.equal(hidden(obs), hidden(other))
+    assert not torch.equal(informed(obs), informed(other))
 
 
 def test_presets_name_networks_that_there_are():
-    assert set(NETWORKS) == {"shared", "printed"}
+    assert set(NETWORKS) == {"shared", "printed", "printed-informed"}

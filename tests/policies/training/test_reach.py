@@ -8,10 +8,10 @@ from app.errors import CheckpointMismatch, InvalidInput
 from app.policies.algorithms.vecenv import BatchVecEnv
 from app.policies.configs import presets
 from app.policies.inference.reach_policy import ReachPolicy
-from app.policies.training.reach import batch_of, play, settings_of, visited_states
+from app.policies.training.reach import batch_of, play, settings_of, start, visited_states
 from app.sim.cells.cell import load_cell
 from app.sim.envs.tasks import ArmTask
-from app.sim.reach.batch import THESIS_WEIGHTS, ReachBatch, ReachSettings
+from app.sim.reach.batch import ReachBatch, ReachSettings
 from app.sim.reach.monitored.batch import MonitoredReachBatch
 from tests.policies.conftest import Recorder, preset_of
 
@@ -131,18 +131,45 @@ def test_without_people_there_is_no_range_of_them():
     assert set(visited_states(batch)) == {"q", "qd", "goal"}
 
 
-def test_the_thesis_preset_is_table_4_2():
-    preset = presets.get("reach-ddpg-thesis")
-    settings = settings_of(preset)
-    assert settings.weights == THESIS_WEIGHTS
-    assert (settings.observation, settings.collision_ends) == ("state", False)
-    assert (settings.action.bounds, settings.action.meaning) == ("one-step", "coefficient")
-    assert (preset.networks.layers, preset.networks.width, preset.learning.batch_size) == (
-        10,
-        400,
-        128,
+@pytest.mark.parametrize(
+    ("name", "alpha", "steps", "walk"),
+    [
+        ("reach-ddpg-thesis", 0.6, 4_000_000, "uniform"),
+        ("reach-ddpg-authors", 0.0, 5_000_000, "authors"),
+    ],
+)
+def test_the_recipes_of_the_thesis_and_of_its_authors(name, alpha, steps, walk):
+    preset = presets.get(name)
+    settings, learning, networks = settings_of(preset), preset.learning, preset.networks
+    assert (settings.observation, settings.goals, settings.start) == ("state", "in-turn", walk)
+    assert (settings.action.meaning, settings.limits) == ("speed", "authors")
+    assert (networks.layers, networks.width, networks.n_critics) == (10, 400, 1)
+    assert (networks.actor, networks.critic, networks.normalisation) == (
+        "ddpg",
+        "ddpg",
+        "running",
     )
-    assert preset.learning.lr_start * preset.learning.actor_lr_ratio == pytest.approx(1e-3)
+    assert learning.lr_start * learning.actor_lr_ratio == pytest.approx(1e-3)
+    assert (learning.batch_size, learning.buffer_size) == (128, 200_000)
+    assert learning.n_envs * learning.update_every == 60
+    assert learning.alpha == alpha
+    assert learning.total_steps == pytest.approx(steps, rel=1e-3)
+
+
+def test_a_time_out_ends_an_episode_of_the_recipe_for_good():
+    preset = preset_of("reach-ddpg-authors", {**TINY, "networks.layers": 2})
+    run, monitor = start(preset, 1, None, load_cell("shared-workspace"))
+    assert not monitor.env._task.cut(np.array([3])).any()
+
+
+def test_a_recipe_resumes_with_its_normalisation():
+    preset = preset_of("reach-ddpg-authors", {**TINY, "networks.layers": 2})
+    recorder = Recorder(stop_at=512)
+    stopped = recorder.run(preset)
+    counted = stopped.checkpoint.arrays()["actor.norm.count"][0]
+    assert counted == pytest.approx(512.01)
+    run, _ = start(preset, 1, recorder.checkpoints[-1][2], load_cell("shared-workspace"))
+    assert run.model._norm.count.item() == pytest.approx(counted)
 
 
 @pytest.mark.parametrize(
@@ -154,6 +181,10 @@ def test_the_thesis_preset_is_table_4_2():
         ({"action.degree": 3, "action.bounds": "one-step"}, "overrides.action.bounds"),
         ({"networks.width": 1024, "networks.layers": 8}, "overrides.networks.width"),
         ({"episode.observation": "state"}, "overrides.networks.actor"),
+        ({"episode.collision": "blocks"}, "overrides.episode.collision"),
+        ({"reward.c_u": 0.1}, "overrides.reward.c_u"),
+        ({"reward.bonus": "alone"}, "overrides.reward.bonus"),
+        ({"networks.normalisation": "running"}, "overrides.networks.normalisation"),
         ({"networks.dropped_quantiles": 25}, "overrides.networks.dropped_quantiles"),
         ({"people.count": "up-to", "people.n_people": 0}, "overrides.people.count"),
         ({"people.count": "up-to", "episode.safety": "ssm"}, "overrides.people.count"),

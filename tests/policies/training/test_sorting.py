@@ -5,7 +5,10 @@ import pytest
 import torch
 
 from app.errors import CheckpointMismatch, InvalidInput
+from app.policies.configs import presets
 from app.policies.inference.sorting_policy import SortingPolicy, is_sorting
+from app.policies.training.reporter import Callbacks
+from app.policies.training.sorting import SortingReporter, start
 from app.sim.cells.cell import load_cell
 from app.sim.sorting.batch import OUTCOMES, SortingSettings, batch_in
 from tests.policies.conftest import Recorder, preset_of
@@ -76,6 +79,39 @@ def test_a_policy_that_moves_is_no_policy_that_sorts(tiny_run):
         SortingPolicy(tiny_run.result.checkpoint)
 
 
+@pytest.mark.parametrize(("name", "n_t"), [("e0", 2_000_000), ("e1", 8_000_000)])
+def test_the_thesis_presets_have_the_defaults_of_its_library(name, n_t):
+    preset = presets.get(f"sorting-{name}-thesis")
+    learning, exploration = preset.learning, preset.exploration
+    assert learning.gradient_steps == learning.n_envs
+    assert (learning.target_update_interval, learning.learning_starts) == (500, 1_000)
+    assert learning.total_steps * exploration.eps_share == n_t
+    assert preset.episode.localisation_rate > 0.0
+    assert preset.networks.kind == "printed"
+    halfway, end = preset.settings(0.5), preset.settings(1.0)
+    assert (halfway.solved_episodes, halfway.solved_share) == pytest.approx((0.25, 0.4))
+    assert (end.solved_episodes, end.solved_share) == (0.0, 0.0)
+
+
+def test_the_curriculum_of_the_thesis_has_faded_at_n_t():
+    small = {
+        "learning.total_steps": 8_000,
+        "learning.progress_steps": 4_000,
+        "learning.checkpoint_steps": 8_000,
+        "learning.progress_episodes": 10,
+        "learning.gradient_steps": 1,
+    }
+    run, model = start(preset_of("sorting-e0-thesis", small), 1, None, load_cell("sorting-e0"))
+    shares = []
+    calls = Callbacks(lambda _: None, lambda *_: None, lambda: False)
+    reporter = SortingReporter(run, calls, model)
+    for step in (2_560, 5_120):
+        model.num_timesteps = reporter.num_timesteps = step
+        reporter.watch(np.zeros(40))
+        shares.append(model.tasks.settings.solved_episodes)
+    assert shares == pytest.approx([0.5 * (1.0 - 2_560 / 4_000), 0.0])
+
+
 @pytest.mark.parametrize("name", ["sorting-e0-thesis", "sorting-e1-dqn"])
 def test_other_presets_train_too(name):
     steps = {
@@ -85,7 +121,8 @@ def test_other_presets_train_too(name):
     }
     small = {
         **steps,
-        "learning.learning_starts": 4_000,
+        "learning.learning_starts": 7_600,
+        "learning.gradient_steps": 1,
         "learning.n_envs": 40,
         "learning.progress_episodes": 20,
     }
