@@ -13,6 +13,7 @@ import typer
 
 from app import logs
 from app.cli import backup, cells, evaluate, recordings, serve, train
+from app.cli.report.command import report
 from app.errors import InvalidInput, NotFound, ServiceError
 
 app = typer.Typer(
@@ -26,6 +27,7 @@ app.command()(backup.backup)
 app.command()(backup.restore)
 app.command()(train.train)
 app.command()(evaluate.evaluate)
+app.command()(report)
 app.command(
     context_settings={"allow_extra_args": True, "ignore_unknown_options": True},
 )(evaluate.bench)

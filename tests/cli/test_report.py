@@ -1,0 +1,80 @@
+"""The report that compares Tandem with the thesis."""
+
+import json
+import re
+from pathlib import Path
+
+from app.__main__ import main
+from app.cli.report.command import PAGE, RESULTS
+from app.cli.report.page import ITEMS, page
+from app.cli.report.parts import Config, Curve, Measure, StoredValue
+
+PRINTED = (
+    "Table 3.1", "Figure 3.1", "Figure 3.2", "figure 3.3", "Figure 4.1", "Table 4.1",
+    "Table 4.2", "Figure 4.4", "Figures 4.5, 4.6", "Table 4.3", "Figure 4.7", "Figure 4.9",
+    "table 4.4", "Tables 5.1, 5.2", "figure 5.3", "Table 5.3", "figures 5.4 to 5.7",
+)  # fmt: skip
+"""Tables and figures of the results of the thesis."""
+
+
+def test_the_page_of_the_site_is_the_one_that_stored_results_give():
+    assert PAGE.read_text(encoding="utf-8") == page(RESULTS)[0]
+
+
+def test_every_table_and_figure_is_there_in_the_order_of_the_thesis():
+    text = page(RESULTS)[0]
+    places = [text.index(one) for one in PRINTED]
+    assert places == sorted(places)
+    assert all(item.agreement.endswith(".") for item in ITEMS)
+
+
+def test_images_exist():
+    paths = [path for item in ITEMS for path, _ in item.images]
+    assert paths and all((PAGE.parent / "../img" / path).exists() for path in paths)
+
+
+def test_every_number_names_its_file_command_commit_and_machine():
+    sections = page(RESULTS)[0].split("\n### ")[1:]
+    for item, text in zip(ITEMS, sections, strict=True):
+        sources = [one for line in item.measures for one in (line.recipe, line.best)]
+        files = {one.file for one in sources if isinstance(one, StoredValue)}
+        for file in files:
+            if (RESULTS / f"{file}.json").exists():
+                assert re.search(rf"`docs/results/{file}\.json`: `python -m .+commit `", text)
+
+
+def test_without_results_everything_is_not_measured_and_commands_are_named(tmp_path: Path):
+    text, missing = page(tmp_path)
+    assert "%" not in "".join(re.findall(r"\| ([^|]*) \|\n", text))
+    assert any(name.startswith("Table 5.3") for name in missing)
+    assert "not measured: `python -m tools.docs.training_curves reach-ddpg-authors" in text
+
+
+def test_the_command_writes_the_page_and_says_what_is_missing(tmp_path: Path, capsys):
+    out = tmp_path / "sub" / "report.md"
+    assert main(["report", "--output", str(out), "--json"]) == 0
+    assert out.read_text(encoding="utf-8") == PAGE.read_text(encoding="utf-8")
+    assert json.loads(capsys.readouterr().out)["page"] == str(out)
+
+
+def test_a_folder_that_is_not_there_is_refused(tmp_path: Path, capsys):
+    assert main(["report", "--results", str(tmp_path / "none")]) == 2
+    assert "must be a folder of result files" in capsys.readouterr().err
+
+
+def test_numbers_are_written_with_interval_deviation_or_unit():
+    rate = {"mean": 0.5, "low": 0.25, "high": 0.75}
+    found = {"results": [{"name": "a", "rate": rate, "time_s": {**rate, "sd": 0.1}, "ms": 2.0}]}
+    assert StoredValue("x", "a", "rate").value(found) == "50.00 % (25.00-75.00)"
+    assert StoredValue("x", "a", "time_s", "s").value(found) == "0.50 ± 0.10 s"
+    assert StoredValue("x", "a", "ms", "ms").value(found) == "2 ms"
+    assert StoredValue("x", "b", "ms", "ms").value(found) is None
+    ends = [{"step": 4_000_000, "success": share, "reward": -2.0} for share in (0.2, 0.4)]
+    curves = [{"name": "p", "played": [one]} for one in ends]
+    said = Curve("x", "p", "success").value({"curves": curves})
+    assert said == "30.0 % after 4.00 M steps, 2 seeds"
+    one = Curve("x", "p", "reward", "points").value({"curves": curves[:1]})
+    assert one == "-2.00 after 4.00 M steps, 1 seed"
+    assert Curve("x", "q", "success").value({"curves": curves}) is None
+    assert Config("reach-ddpg-thesis", "learning.lr_start", 10.0).value() == 1e-3
+    assert Measure("a", "b").recipe == ""
