@@ -92,7 +92,7 @@ world: $(VENV)/dev.stamp ## measure, draw and write docs/world.md
 lock: $(VENV)/dev.stamp ## resolve the lock files (UPGRADE=--upgrade: newest versions)
 	@$(PIP) install --quiet uv==$(UV)
 	@$(RESOLVE) --extra postgres -o requirements.lock
-	@$(RESOLVE) --extra postgres --extra dev --extra docs -c requirements.lock -o requirements-dev.lock
+	@$(RESOLVE) --extra postgres --extra dev --extra docs --extra onnx --extra otel -c requirements.lock -o requirements-dev.lock
 
 clean: ## remove the virtual environment and the caches
 	rm -rf $(VENV) .mypy_cache .ruff_cache .pytest_cache .import_linter_cache

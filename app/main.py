@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from fastapi import FastAPI
+from opentelemetry.trace import NoOpTracerProvider, Tracer, TracerProvider
 from starlette.concurrency import run_in_threadpool
 
 import web
@@ -27,6 +28,7 @@ from app.api.registry import (
     CheckpointNames,
     PolicyRegistry,
 )
+from app.api.service_state import ServiceState
 from app.api.services import LiveWorld, Services
 from app.errors import Damaged, ServiceError
 from app.live.reach.interfaces import LiveReachPolicy
@@ -62,22 +64,24 @@ STOP_S = 5.0
 STATIC = Path(web.__file__).parent / "page"
 
 
-def create_app(settings: Settings) -> FastAPI:
+def create_app(settings: Settings, traces: TracerProvider | None = None) -> FastAPI:
     """Return the application; its lifespan starts and stops the service.
 
     Args:
         settings: Where and how the service runs.
+        traces: Receives the spans; None: none are made.
 
     Raises:
         InvalidInput: The settings give unprotected access.
     """
     check_access(settings)
     counts = Metrics(VERSION)
+    tracer = (traces or NoOpTracerProvider()).get_tracer("tandem", VERSION)
 
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:
         try:
-            service = await run_in_threadpool(Service, settings, counts)
+            service = await run_in_threadpool(Service, settings, counts, tracer)
         except ServiceError as error:
             app.state.failure = error.message
             raise
@@ -94,6 +98,7 @@ def create_app(settings: Settings) -> FastAPI:
         token=settings.secret,
         version=VERSION,
         counts=counts,
+        traces=traces,
     )
 
 
@@ -103,12 +108,13 @@ class Service:
     Args:
         settings: Where and how the service runs.
         counts: Metrics of the application.
+        tracer: Makes the spans of decisions and job attempts.
 
     Raises:
         Conflict: Another server uses the same database.
     """
 
-    def __init__(self, settings: Settings, counts: Metrics) -> None:
+    def __init__(self, settings: Settings, counts: Metrics, tracer: Tracer) -> None:
         settings.data.mkdir(parents=True, exist_ok=True)
         store = Store(settings.database)
         worlds: dict[str, LiveWorld] = {}
@@ -119,7 +125,7 @@ class Service:
             keep_states=settings.keep_states,
             acting=lambda: acting_in(worlds),
         )
-        supervisor = Supervisor(store, settings.data, retention=retention)
+        supervisor = Supervisor(store, settings.data, retention=retention, tracer=tracer)
         try:
             supervisor.start()
             names = CheckpointNames(store)
@@ -140,9 +146,10 @@ class Service:
             cells=CellCatalog(store),
             recordings=RecordingCatalog(store, self._imports),
             start_world=start_world,
-            count_outside=counts.count_outside,
+            metrics=counts,
+            tracer=tracer,
         )
-        counts.watch(self.parts)
+        counts.watch(ServiceState(self.parts))
         self._warm_up = threading.Thread(target=self._start_cell, name="warm-up", daemon=True)
         self._warm_up.start()
 

@@ -19,6 +19,9 @@ from dataclasses import asdict, dataclass
 from datetime import datetime
 from pathlib import Path
 
+from opentelemetry.context import Context
+from opentelemetry.trace import NoOpTracer, Span, StatusCode, Tracer
+
 from app.errors import (
     Conflict,
     LeaseLost,
@@ -73,6 +76,7 @@ class _Worker:
     """A running attempt. Times are on the monotonic clock, which stops during suspend."""
 
     handle: Handle
+    span: Span
     heartbeat_at: datetime | None = None
     heartbeat_seen: float
     writable_since: float | None = None
@@ -91,6 +95,7 @@ class Supervisor:
         timeouts: Timeouts.
         min_free_bytes: Free space of the disk below which no job starts [bytes].
         retention: Removes old jobs whenever one has ended.
+        tracer: Makes a span of each attempt.
     """
 
     def __init__(
@@ -103,6 +108,7 @@ class Supervisor:
         timeouts: Timeouts | None = None,
         min_free_bytes: int = MIN_FREE_BYTES,
         retention: Retention | None = None,
+        tracer: Tracer | None = None,
     ) -> None:
         self._lock = ServerLock(store, data_dir)
         self._timeouts = timeouts or Timeouts()
@@ -112,6 +118,7 @@ class Supervisor:
         self._max_running = max_running
         self._executor = executor or LocalProcess(store.url, data_dir)
         self._data_dir = data_dir
+        self._tracer = tracer or NoOpTracer()
         self._min_free_bytes = min_free_bytes
         self._retention = retention
         self._workers: dict[Claim, _Worker] = {}
@@ -261,7 +268,10 @@ class Supervisor:
             failures = self._timeouts.max_failures
             completion.crash(self._store, claim, reason, max_failures=failures)
             return False
-        self._workers[claim] = _Worker(handle=handle, heartbeat_seen=time.monotonic())
+        about = {**asdict(claim), "kind": job.kind, "preset": job.preset or ""}
+        span = self._tracer.start_span("job attempt", Context(), attributes=about)
+        now = time.monotonic()
+        self._workers[claim] = _Worker(handle=handle, span=span, heartbeat_seen=now)
         return True
 
     def _reap(self) -> None:
@@ -269,6 +279,7 @@ class Supervisor:
             worker.ended = worker.ended or self._executor.poll(worker.handle)
             if worker.ended is not None:
                 self._settle(claim, worker.ended)
+                _end(worker.span, worker.ended)
                 del self._workers[claim]
                 if self._retention is not None:
                     self._retention.apply()
@@ -329,7 +340,8 @@ class Supervisor:
             self._executor.stop(worker.handle, force=True)
         while self._alive():
             time.sleep(0.02)
-        for claim in self._workers:
+        for claim, worker in self._workers.items():
+            _end(worker.span, self._executor.poll(worker.handle))
             self._guarded(lambda claim=claim: self._give_back(claim))  # type: ignore[misc]
         self._workers.clear()
 
@@ -351,3 +363,12 @@ class Supervisor:
 
 def _is_full(error: OSError) -> bool:
     return error.errno in (errno.ENOSPC, errno.EDQUOT)
+
+
+def _end(span: Span, ended: Exit | None) -> None:
+    """End the span of an attempt."""
+    if ended is not None:
+        span.set_attribute("exit", ended.code)
+        if ended.code != 0:
+            span.set_status(StatusCode.ERROR, ended.reason.partition("\n")[0])
+    span.end()

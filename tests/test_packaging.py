@@ -13,8 +13,8 @@ from packaging.utils import canonicalize_name
 ROOT = Path(__file__).resolve().parent.parent
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 ROOTS = ("app", "jobs", "web")
-RUN_BY_HAND = {"tools/distance_fields.py"}
-"""Modules of scripts that make committed data; they may use the development extras."""
+EXTRAS = {"tools/distance_fields.py": "dev", "app/policies/inference/onnx_export.py": "onnx"}
+"""Modules that are imported only where an extra is installed."""
 
 
 def pins(name: str) -> dict[str, str]:
@@ -38,10 +38,11 @@ def names_in(lines: list[str]) -> set[str]:
 
 def test_every_imported_package_is_declared() -> None:
     declared = names_in(PROJECT["project"]["dependencies"])
-    by_hand = declared | names_in(PROJECT["project"]["optional-dependencies"]["dev"])
+    extras = PROJECT["project"]["optional-dependencies"]
     owners = {**packages_distributions(), "pinocchio": ["pin"]}
     for path in (path for folder in ROOTS for path in (ROOT / folder).rglob("*.py")):
-        allowed = by_hand if path.relative_to(ROOT).as_posix() in RUN_BY_HAND else declared
+        extra = EXTRAS.get(path.relative_to(ROOT).as_posix())
+        allowed = declared | names_in(extras[extra] if extra else [])
         for root in imported_roots(path):
             packages = {canonicalize_name(name) for name in owners[root]}
             assert packages & allowed, f"{path} imports {root}, which pyproject.toml lacks"
@@ -52,7 +53,7 @@ def test_every_declared_package_is_locked_but_torch() -> None:
     runtime, everything = pins("requirements.lock"), pins("requirements-dev.lock")
     for lines, lock in (
         (PROJECT["project"]["dependencies"], runtime),
-        (extras["dev"], everything),
+        (extras["dev"] + extras["onnx"] + extras["otel"], everything),
     ):
         for requirement in map(Requirement, lines):
             if requirement.name != "torch":

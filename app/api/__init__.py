@@ -10,9 +10,11 @@ job_requests      Jobs of requests: the one a path names, checks before one is q
                   its answer
 json_route        Routes of decisions: bodies validated as JSON bytes
 known_people      Conversion of the people of a request to person states
+metrics           Metrics for Prometheus that are counted at requests
 problems          Errors as problem documents (RFC 9457, ``application/problem+json``)
 registry          Cache of loaded policies, and names of stored checkpoints
 security          Access control: one ASGI layer around every route, mount and socket
+service_state     Metrics that are read from the service at a scrape
 services          Parts of the service that routes use; ``app.main`` creates them
 sockets           Refusal of a WebSocket with a reason
 texts             Detection of JSON that no route accepts

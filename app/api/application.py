@@ -5,6 +5,7 @@ from contextlib import AbstractAsyncContextManager
 from pathlib import Path
 
 from fastapi import FastAPI, Request
+from opentelemetry.trace import TracerProvider
 from starlette.middleware.gzip import GZipMiddleware
 from starlette.responses import FileResponse, Response
 from starlette.staticfiles import StaticFiles
@@ -14,6 +15,7 @@ from app.api.answers import Answers
 from app.api.bodies import BodyRules
 from app.api.metrics import Metrics
 from app.api.routes import (
+    aliases,
     cells,
     checkpoints,
     health,
@@ -47,7 +49,13 @@ DESCRIPTION = (
 
 
 def build_app(
-    *, lifespan: Lifespan, static: Path, token: str | None, version: str, counts: Metrics
+    *,
+    lifespan: Lifespan,
+    static: Path,
+    token: str | None,
+    version: str,
+    counts: Metrics,
+    traces: TracerProvider | None,
 ) -> FastAPI:
     """Return the application; its lifespan sets ``app.state.services``.
 
@@ -57,8 +65,15 @@ def build_app(
         token: The token required of every request; None on loopback.
         version: Version of the service.
         counts: Metrics of the application.
+        traces: Receives a span of each request; None: none is made.
     """
     app = FastAPI(
+        telemetry={
+            "tracer_provider": traces,
+            "tracing": traces is not None,
+            "metrics": False,
+            "logs": False,
+        },
         title="Tandem",
         version=version,
         description=DESCRIPTION,
@@ -82,6 +97,7 @@ def build_app(
         jobs,
         job_actions,
         checkpoints,
+        aliases,
         presets,
         cells,
         recordings,
@@ -94,7 +110,7 @@ def build_app(
         app.include_router(part.router)
     description.install(app)
     add_page(app, static)
-    app.add_middleware(BodyRules, files=recordings.FILES)
+    app.add_middleware(BodyRules, files=recordings.FILES | checkpoints.FILES)
     open_paths = (SESSION_PATH, ICON_PATH, *health.PATHS)
     app.add_middleware(Guard, token=token, open_paths=open_paths)
     app.add_middleware(Answers, metrics=counts)

@@ -1,12 +1,10 @@
-"""Metrics for Prometheus: counted at requests, and read from the service at a scrape.
+"""Metrics for Prometheus that are counted at requests; ``service_state`` reads the others.
 
 Every application has its own registry. ``docs/operations.md`` lists the metrics.
 """
 
 import platform
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Sequence
 
 from prometheus_client import (
     CollectorRegistry,
@@ -17,15 +15,9 @@ from prometheus_client import (
     PlatformCollector,
     ProcessCollector,
 )
-from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, HistogramMetricFamily
 from prometheus_client.registry import Collector
 
-from app.api.motion.load import MAX_SOCKETS
-from app.api.services import MAX_VIEWERS, Services
-from app.errors import StorageFull, StorageUnavailable
-from app.live.snapshot import WorldSnapshot
 from app.provenance import describe
-from app.store.jobs import count_jobs, list_jobs
 
 BUCKETS_S = (
     *(0.0001, 0.0002, 0.0005, 0.001, 0.002, 0.005, 0.01, 0.02, 0.05),
@@ -61,6 +53,22 @@ class Metrics:
             ("endpoint",),
             registry=self.registry,
         )
+        self._waits = Histogram(
+            "tandem_socket_wait_seconds",
+            "Time from the arrival of a message on a motion socket to its decision.",
+            buckets=BUCKETS_S,
+            registry=self.registry,
+        )
+        self._missed = Counter(
+            "tandem_socket_deadlines_missed",
+            "Answers on motion sockets after their deadline.",
+            registry=self.registry,
+        )
+        self._superseded = Counter(
+            "tandem_socket_messages_superseded",
+            "Messages on motion sockets that were not answered because a newer one arrived.",
+            registry=self.registry,
+        )
         build = {
             "version": version,
             "commit": str(describe()["commit"] or ""),
@@ -69,7 +77,7 @@ class Metrics:
         Info("tandem_build", "Version of the service.", registry=self.registry).info(build)
         for collector in (ProcessCollector, PlatformCollector, GCCollector):
             collector(registry=self.registry)
-        self._state: ServiceState | None = None
+        self._state: Collector | None = None
         self._children: dict[tuple[str, str, int], Histogram] = {}
 
     def observe(self, method: str, endpoint: str, status: int, seconds: float) -> None:
@@ -93,201 +101,36 @@ class Metrics:
         if any(fields):
             self._outside.labels(endpoint).inc()
 
-    def watch(self, services: Services) -> None:
+    def count_message(
+        self,
+        endpoint: str,
+        status: int,
+        wait_s: float,
+        total_s: float,
+        *,
+        missed: bool,
+        left: int,
+    ) -> None:
+        """Count an answer on a socket.
+
+        Args:
+            endpoint: Path of the socket.
+            status: Status of the answer, as of the route.
+            wait_s: Time from the arrival of the message to the begin of the decision [s].
+            total_s: Time from the arrival to the answer [s].
+            missed: Whether the answer missed its deadline.
+            left: Older messages that were not answered.
+        """
+        self.observe("MESSAGE", endpoint, status, total_s)
+        self._waits.observe(wait_s)
+        if missed:
+            self._missed.inc()
+        if left:
+            self._superseded.inc(left)
+
+    def watch(self, state: Collector) -> None:
         """Read the state of a service at each scrape, in place of one before."""
         if self._state is not None:
             self.registry.unregister(self._state)
-        self._state = ServiceState(services)
-        self.registry.register(self._state)
-
-
-Labelled = Iterable[tuple[tuple[str, ...], float]]
-"""Values with their labels."""
-
-
-@dataclass(frozen=True, slots=True)
-class StateMetric:
-    """A metric that is read from the service."""
-
-    name: str
-    """Name of the metric; a counter's without ``_total``."""
-    text: str
-    """Description."""
-    labels: tuple[str, ...]
-    """Names of the labels."""
-    read: Callable[[Services], Labelled]
-    """Returns the values."""
-    counts: bool = False
-    """Whether it is a counter; a counter of a live world starts again at its reset."""
-
-
-class ServiceState(Collector):
-    """Reads the state of a service.
-
-    Args:
-        services: The parts of the service.
-    """
-
-    def __init__(self, services: Services) -> None:
-        self._services = services
-
-    def collect(self) -> Iterator[Any]:
-        """Yield the metrics; those of the database are left out while it does not answer."""
-        for one in STATE_METRICS:
-            yield _family(one, one.read(self._services))
-        yield self._lateness()
-        try:
-            stored = [_family(one, list(one.read(self._services))) for one in STORED_METRICS]
-        except (StorageUnavailable, StorageFull):
-            stored = []
-        up = GaugeMetricFamily("tandem_database_up", "Whether the database answers.")
-        up.add_metric((), float(bool(stored)))
-        yield from (up, *stored)
-
-    def _lateness(self) -> HistogramMetricFamily:
-        family = HistogramMetricFamily(
-            "tandem_live_tick_lateness_seconds",
-            "Time from the due time of a tick of a live world to its begin.",
-            labels=("world",),
-        )
-        for world_id, world in self._services.worlds.copy().items():
-            late = world.lateness
-            family.add_metric((world_id,), late.buckets(), late.total_s)
-        return family
-
-
-def _family(one: StateMetric, values: Labelled) -> GaugeMetricFamily | CounterMetricFamily:
-    kind = CounterMetricFamily if one.counts else GaugeMetricFamily
-    family = kind(one.name, one.text, labels=one.labels)
-    for labels, value in values:
-        family.add_metric(labels, value)
-    return family
-
-
-def _of_worlds(
-    value: Callable[[WorldSnapshot], float | None],
-) -> Callable[[Services], Labelled]:
-    def read(services: Services) -> Labelled:
-        for world_id, world in services.worlds.copy().items():
-            snapshot = world.handle.snapshot()
-            if (found := value(snapshot)) is not None:
-                yield (world_id, snapshot.cell), float(found)
-
-    return read
-
-
-def _stop_ratio(snapshot: WorldSnapshot) -> float | None:
-    safety = snapshot.safety
-    return safety.stopped_s / safety.moving_s if safety.moving_s > 0.0 else None
-
-
-def _tracker_ages(services: Services) -> Labelled:
-    for one in services.trackers.all():
-        yield (one.id, one.cell), one.since_frame_s()
-
-
-def _sockets(services: Services) -> Labelled:
-    yield ("motion",), services.motion_load.n_open
-    yield ("viewer",), MAX_VIEWERS - services.viewers._value
-
-
-def _limits(_services: Services) -> Labelled:
-    yield ("motion",), MAX_SOCKETS
-    yield ("viewer",), MAX_VIEWERS
-
-
-def _steps(services: Services) -> Labelled:
-    for job in list_jobs(services.store, state="running").items:
-        yield (job.id, job.kind, job.preset or ""), job.step
-
-
-def _total_steps(services: Services) -> Labelled:
-    for job in list_jobs(services.store, state="running").items:
-        if job.total_steps is not None:
-            yield (job.id, job.kind, job.preset or ""), job.total_steps
-
-
-_WORLD, _JOB = ("world", "cell"), ("job_id", "kind", "preset")
-STATE_METRICS = (
-    StateMetric(
-        "tandem_ready",
-        "Whether the service can decide.",
-        (),
-        lambda services: [((), services.readiness.ready)],
-    ),
-    StateMetric(
-        "tandem_queue_waiting",
-        "Whether no job runs because the disk is full or the database takes no writes.",
-        (),
-        lambda services: [((), services.supervisor.waiting is not None)],
-    ),
-    StateMetric(
-        "tandem_damaged_checkpoints",
-        "Checkpoints that were found damaged.",
-        (),
-        lambda services: [((), len(services.checkpoints.damaged))],
-    ),
-    StateMetric(
-        "tandem_live_safety_on",
-        "Whether the robot of a live world obeys the safety layer.",
-        _WORLD,
-        _of_worlds(lambda world: world.safety.on),
-    ),
-    StateMetric(
-        "tandem_live_override_ratio",
-        "Speed override that a live world executes, 0 to 1.",
-        _WORLD,
-        _of_worlds(lambda world: world.safety.override),
-    ),
-    StateMetric(
-        "tandem_live_stop_ratio",
-        "Share of the time of motions with override 0, since the reset of a live world.",
-        _WORLD,
-        _of_worlds(_stop_ratio),
-    ),
-    StateMetric(
-        "tandem_live_moving_seconds",
-        "Time of motions of a live world.",
-        _WORLD,
-        _of_worlds(lambda world: world.safety.moving_s),
-        counts=True,
-    ),
-    StateMetric(
-        "tandem_live_stopped_seconds",
-        "Part of the time of motions with override 0.",
-        _WORLD,
-        _of_worlds(lambda world: world.safety.stopped_s),
-        counts=True,
-    ),
-    StateMetric(
-        "tandem_live_contacts",
-        "Contacts of the moving robot of a live world.",
-        _WORLD,
-        _of_worlds(lambda world: world.counters.contacts),
-        counts=True,
-    ),
-    StateMetric(
-        "tandem_live_outside_training",
-        "Inputs of a live world outside the training range of its policy.",
-        _WORLD,
-        _of_worlds(lambda world: len(world.outside)),
-    ),
-    StateMetric(
-        "tandem_tracker_age_seconds",
-        "Time since the newest frame of a tracker.",
-        ("tracker", "cell"),
-        _tracker_ages,
-    ),
-    StateMetric("tandem_sockets_open", "Open sockets.", ("kind",), _sockets),
-    StateMetric("tandem_sockets_limit", "Largest number of open sockets.", ("kind",), _limits),
-)
-STORED_METRICS = (
-    StateMetric(
-        "tandem_jobs",
-        "Jobs by state.",
-        ("state",),
-        lambda services: (((state,), n) for state, n in count_jobs(services.store).items()),
-    ),
-    StateMetric("tandem_job_steps", "Steps done by a running job.", _JOB, _steps),
-    StateMetric("tandem_job_total_steps", "Steps of a running job.", _JOB, _total_steps),
-)
+        self._state = state
+        self.registry.register(state)

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import Any, Generic, Protocol, TypeVar
 
 from app.errors import Damaged, InvalidInput, NotFound
-from app.store.checkpoints import list_aliases, put_checkpoint, set_alias
+from app.store.checkpoints import list_aliases, put_checkpoint, remove_alias, set_alias
 from app.store.engine import Store
 from app.store.records import CheckpointRecord, NewCheckpoint
 from jobs.checkpoints import read_sound
@@ -71,6 +71,16 @@ class CheckpointNames:
             set_alias(self.store, alias, sha256)
             with self._lock:
                 self._aliases = list_aliases(self.store)
+
+    def remove(self, alias: str) -> None:
+        """Remove an alias; its checkpoint stays.
+
+        Raises:
+            NotFound: There is no such alias.
+        """
+        remove_alias(self.store, alias)
+        with self._lock:
+            self._aliases = list_aliases(self.store)
 
     @property
     def aliases(self) -> Mapping[str, str]:
@@ -137,6 +147,15 @@ class PolicyRegistry(Generic[P]):
         with self._lock:
             for sha256 in removed:
                 self._policies.pop(sha256, None)
+
+    def check(self, manifest: Mapping[str, Any], tensors: bytes) -> None:
+        """Check that a checkpoint can be loaded as a policy of this kind.
+
+        Raises:
+            InvalidInput: The manifest breaks a rule.
+            CheckpointMismatch: It is of another kind, or its tensors do not fit.
+        """
+        self._build(manifest, tensors)
 
     def load(self, reference: str | None) -> P:
         """Return a policy by SHA-256 or alias, from the store if it is not in memory.

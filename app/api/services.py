@@ -7,9 +7,11 @@ from pathlib import Path
 from typing import Annotated, Protocol
 
 from fastapi import Depends
+from opentelemetry.trace import Tracer
 from starlette.concurrency import run_in_threadpool
 from starlette.requests import HTTPConnection
 
+from app.api.metrics import Metrics
 from app.api.motion.load import MotionLoad
 from app.api.registry import CheckpointNames, PolicyRegistry
 from app.api.tracker_sessions import TrackerSessions
@@ -108,8 +110,10 @@ class Services:
     """Recordings of human motion by name."""
     start_world: StartWorld
     """Starts a live world."""
-    count_outside: Callable[..., None]
-    """Counts a decision with inputs outside a range: its endpoint, and lists of fields."""
+    tracer: Tracer
+    """Makes the spans of decisions."""
+    metrics: Metrics
+    """Counts decisions."""
     worlds: dict[str, LiveWorld] = field(default_factory=dict)
     """Live worlds by id; empty until the kernels are compiled."""
     trackers: TrackerSessions = field(default_factory=TrackerSessions)

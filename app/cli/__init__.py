@@ -13,6 +13,7 @@ backup          The commands ``backup`` and ``restore``
 cells           The command group ``cells``: list, show, check, add and remove work cells
 database        The database as commands open it, beside a running server or without one
 entry           The Typer application and its entry point
+export          The command ``export``: write a checkpoint as an ONNX model
 evaluate        The commands ``evaluate`` and ``bench``
 http_limits     Limits of HTTP connections: size of the request head, time, progress, number of
                 clients

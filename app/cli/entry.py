@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import typer
 
 from app import logs
-from app.cli import backup, cells, evaluate, recordings, serve, train
+from app.cli import backup, cells, evaluate, export, recordings, serve, train
 from app.cli.report.command import report
 from app.errors import InvalidInput, NotFound, ServiceError
 
@@ -28,6 +28,7 @@ app.command()(backup.restore)
 app.command()(train.train)
 app.command()(evaluate.evaluate)
 app.command()(report)
+app.command()(export.export)
 app.command(
     context_settings={"allow_extra_args": True, "ignore_unknown_options": True},
 )(evaluate.bench)

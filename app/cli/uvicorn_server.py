@@ -90,11 +90,12 @@ def run(settings: Settings, sock: socket.socket, report: Callable[[str], None]) 
     import torch
 
     from app.main import create_app
+    from app.traces import provider_of_environment
 
     report(f"Tandem starts: {address_of(sock)}")
     # More threads do not speed up networks this small; waiting for a busy core costs 0.3 s.
     torch.set_num_threads(1)
-    app = create_app(settings)
+    app = create_app(settings, provider_of_environment())
     reported = False
 
     async def report_readiness() -> None:

@@ -6,6 +6,7 @@ base_world       Base class of live worlds: clock, people, robot, decisions of t
 command_checks   Checks of a command against the work cell and the state of its world
 commands         Commands to a live world: one message each, in Python and as JSON
 factory          Live world of a cell: sorting, reaching or pick-and-place, by its stations
+lateness         Histogram of the lateness of a live world's ticks
 playback         Playback of a recorded motion in a cell, in real time
 read_model       Base class and array types of snapshots, the JSON of the HTTP API
 snapshot         Immutable state of a live world at one tick, for any thread and as JSON of the

@@ -139,6 +139,18 @@ def set_alias(store: Store, name: str, sha256: str) -> None:
         connection.execute(sa.insert(aliases).values(values))
 
 
+def remove_alias(store: Store, name: str) -> None:
+    """Remove an alias; its checkpoint stays.
+
+    Raises:
+        NotFound: There is no such alias.
+    """
+    with store.writing() as connection:
+        removed = connection.execute(sa.delete(aliases).where(aliases.c.name == name))
+    if removed.rowcount == 0:
+        raise NotFound("alias", name, tuple(list_aliases(store)))
+
+
 def list_aliases(store: Store) -> dict[str, str]:
     """Return the SHA-256 of every alias."""
     query = sa.select(aliases.c.name, aliases.c.sha256).order_by(aliases.c.name)

@@ -44,7 +44,7 @@ def names(client: TestClient) -> Iterator[dict[str, str]]:
     training = {"kind": "train", "preset": "pick-td3", "priority": -100}
     job = client.post("/v1/jobs", json=training).json()["id"]
     client.post(f"/v1/jobs/{job}/cancel")
-    yield {"tracker_id": tracker, "world_id": "main", "job_id": job}
+    yield {"name": "line-2", "tracker_id": tracker, "world_id": "main", "job_id": job}
     client.delete(f"/v1/trackers/{tracker}")
 
 

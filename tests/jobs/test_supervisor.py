@@ -261,4 +261,4 @@ def test_log_of_a_job_carries_its_id_in_each_line(store: Store, tmp_path: Path) 
     while "succeeded" not in log.read_text() and time.monotonic() - started < 10:
         time.sleep(0.02)
     lines = log.read_text().splitlines()
-    assert lines and all(f"job={job_id} attempt=1" in line for line in lines)
+    assert lines and all(f"job_id={job_id} attempt=1" in line for line in lines)

@@ -4,7 +4,6 @@ Source: docs/method.md 2.
 """
 
 from dataclasses import replace
-from functools import partial
 
 from starlette.concurrency import run_in_threadpool
 
@@ -29,10 +28,14 @@ async def answer(request: MotionRequest, services: Services) -> MotionAnswer:
     cell = await services.known_cell(request.cell)
     decider = await _decider(request.checkpoint, services)
     require_cell(cell, decider.actor.cell, decider.actor.cell_sha256)
-    decided = partial(decide, request, cell, decider, services.trackers)
+
+    def decided() -> MotionAnswer:
+        with services.tracer.start_as_current_span("decision"):
+            return decide(request, cell, decider, services.trackers)
+
     # A decision takes less time than a change of thread usually does, on the event loop.
     found = await run_in_threadpool(decided) if take_time(request.people) else decided()
-    services.count_outside(PATH, found.outside, found.state_outside)
+    services.metrics.count_outside(PATH, found.outside, found.state_outside)
     return found
 
 

@@ -152,11 +152,15 @@ class MotionSocket:
         self._superseded = 0
         left_out = [name for name, share in SHARES if waited_s > share * self._deadline_s]
 
-        def use(left_out: list[LeftOut]) -> StreamUse:
+        def use(left_out: list[LeftOut], status: int) -> StreamUse:
             spent_s = time.perf_counter() - request.at
+            missed = spent_s > self._deadline_s
+            self._services.metrics.count_message(
+                PATH, status, waited_s, spent_s, missed=missed, left=superseded
+            )
             return StreamUse(
                 waited_ms=1e3 * waited_s,
-                missed_deadline=spent_s > self._deadline_s,
+                missed_deadline=missed,
                 superseded=superseded,
                 left_out=left_out,
             )
@@ -167,11 +171,13 @@ class MotionSocket:
             if refused is None:
                 asked, left_out = _reduced(MotionRequest.model_validate(body), left_out)
                 found = await answer(asked, self._services)
-                return found.model_copy(update={"stream": use(left_out)}).model_dump_json()
+                return found.model_copy(update={"stream": use(left_out, 200)}).model_dump_json()
         except Exception as error:
             refused = _problem(error)
         content: dict[str, object] = json.loads(bytes(refused.body))
-        return json.dumps({**content, "stream": use([]).model_dump(), **_stamp_of(body)})
+        return json.dumps(
+            {**content, "stream": use([], refused.status_code).model_dump(), **_stamp_of(body)}
+        )
 
 
 def _reduced(

@@ -1,9 +1,11 @@
 """One router per resource.
 
+aliases         Aliases: names that point to checkpoints
 cells           Work cells as data, shipped ones and the user's own
-checkpoints     Trained policies: list, read, download
+checkpoints     Trained policies: list, read, download, upload
 health          Liveness and readiness, for monitors
 jobs            Training and evaluation as jobs: post, list, cancel, follow
+metrics         Metrics for Prometheus
 motion          Motion decisions: the next trajectory segment toward a goal (thesis chapter
                 4)
 plan            Next move of a sorting task with its motion, by the pick policy's critic

@@ -1,16 +1,35 @@
-"""Trained policies: list, read, download."""
+"""Trained policies: list, read, download, upload."""
 
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Query
+from fastapi import APIRouter, Query, Request
+from starlette.concurrency import run_in_threadpool
 from starlette.responses import Response
 
+from app.api.bodies import FILE_TYPES
+from app.api.description import CREATED
+from app.api.registry import PolicyRegistry
 from app.api.schemas.checkpoints import CheckpointList, CheckpointPublic
-from app.api.services import ServicesDep
+from app.api.services import MAX_UPLOADS, Services, ServicesDep
+from app.errors import InvalidInput, NotFound, NotReady
+from app.policies.checkpoints.checkpoint import CHOOSING, REACHING, SORTING, purpose_of
+from app.policies.checkpoints.upload import MAX_FILE, read_upload
 from app.store import checkpoints
+from app.store.records import NewCheckpoint
 from jobs.checkpoints import read_sound
 
 router = APIRouter(prefix="/v1/checkpoints", tags=["checkpoints"])
+FILES = {router.prefix: MAX_FILE}
+"""Route that takes a file, and the largest one [bytes]."""
+BODY: dict[str, Any] = {
+    "requestBody": {
+        "required": True,
+        "description": "the manifest in one line of JSON, followed by the safetensors file",
+        "content": {
+            kind: {"schema": {"type": "string", "format": "binary"}} for kind in FILE_TYPES
+        },
+    }
+}
 
 
 @router.get("", summary="List the checkpoints")
@@ -25,6 +44,69 @@ def list_checkpoints(
         services.store, job_id=job_id, cursor=cursor, limit=limit
     )
     return CheckpointList.from_domain(page)
+
+
+@router.post(
+    "",
+    status_code=201,
+    summary="Upload a checkpoint",
+    openapi_extra=BODY,
+    responses={
+        200: {
+            "model": CheckpointPublic,
+            "description": "The same checkpoint is stored already",
+            **CREATED,
+        },
+        201: CREATED,
+        409: {"description": "Its format, layout or tensors are not of this version"},
+        507: {},
+    },
+)
+async def upload_checkpoint(
+    request: Request,
+    services: ServicesDep,
+    response: Response,
+    sha256: Annotated[
+        str | None, Query(description="its expected id; refused where it has another")
+    ] = None,
+) -> CheckpointPublic:
+    """Check a policy completely and store it; the same one again answers 200."""
+    services.readiness.require()
+    if not services.uploads.acquire(blocking=False):
+        raise NotReady(f"{MAX_UPLOADS} files are being read: post again in a moment")
+    try:
+        found = await run_in_threadpool(_store, await request.body(), sha256, services)
+    finally:
+        services.uploads.release()
+    checkpoint, new = found
+    if not new:
+        response.status_code = 200
+    response.headers["Location"] = f"{router.prefix}/{checkpoint.sha256}"
+    return checkpoint
+
+
+def _store(
+    content: bytes, sha256: str | None, services: Services
+) -> tuple[CheckpointPublic, bool]:
+    """Check an upload and store it; return whether it is new."""
+    found = read_upload(content)
+    if sha256 not in (None, found.sha256):
+        rule = f"is not the id of the uploaded checkpoint, {found.sha256}"
+        raise InvalidInput("sha256", sha256, rule)
+    registries: dict[str, PolicyRegistry[Any]] = {
+        CHOOSING: services.task_policies,
+        REACHING: services.reach_policies,
+        SORTING: services.sorting_policies,
+    }
+    registries[purpose_of(found.manifest)].check(found.manifest, found.tensors)
+    try:
+        checkpoints.get_checkpoint(services.store, found.sha256)
+        new = False
+    except NotFound:
+        new = True
+    entry = NewCheckpoint(sha256=found.sha256, manifest=found.manifest, tensors=found.tensors)
+    record = checkpoints.put_checkpoint(services.store, entry)
+    return CheckpointPublic.from_domain(record), new
 
 
 @router.get("/{reference}", summary="One checkpoint, by SHA-256 or alias")

@@ -46,7 +46,7 @@ async def plan_move(request: PlanRequest, services: ServicesDep) -> PlanAnswer:
             found = SortingPlanner(policy, cell).plan(query)
         if found.decision is not None:
             decision = people.in_request(found.decision)
-            services.count_outside(router.prefix, decision.outside)
+            services.metrics.count_outside(router.prefix, decision.outside)
             found = replace(found, decision=decision)
         uses = people.uses(None if found.decision is None else found.decision.seen)
         return PlanAnswer.from_domain(found, query, request, names, uses)

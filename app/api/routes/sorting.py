@@ -47,7 +47,7 @@ async def choose_sorting_move(request: SortingRequest, services: ServicesDep) ->
     long = takes_time(names.shape)
     decision = await run_in_threadpool(choose) if long else choose()
     outside = outside_of(decision, state, names, policy, own)
-    services.count_outside(router.prefix, outside)
+    services.metrics.count_outside(router.prefix, outside)
     return SortingAnswer.from_domain(decision, state, request, names, outside)
 
 

@@ -45,9 +45,12 @@ async def select_task(request: TaskSelectionRequest, services: ServicesDep) -> T
 
     def answer() -> TaskSelection:
         people = people_for_policy(request.people, cell, services.trackers, q)
-        with request.robot.faults_in_place():
+        span = services.tracer.start_as_current_span("decision")
+        with span, request.robot.faults_in_place():
             decision = people.in_request(decide(people.people))
-        services.count_outside(router.prefix, decision.outside, *decision.outside_candidates)
+        services.metrics.count_outside(
+            router.prefix, decision.outside, *decision.outside_candidates
+        )
         uses = people.uses(decision.seen)
         return TaskSelection.from_domain(decision, candidates, uses, request.stamp)
 

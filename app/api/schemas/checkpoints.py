@@ -5,7 +5,9 @@ from typing import Any, Self
 
 from pydantic import Field
 
-from app.api.schemas.numbers import Answer
+from app.api.schemas.examples import shows
+from app.api.schemas.numbers import Answer, Body
+from app.policies.checkpoints import pretrained
 from app.policies.checkpoints.checkpoint import purpose_of
 from app.store.records import CheckpointRecord, Page
 
@@ -57,3 +59,30 @@ class CheckpointList(Answer):
         """Return the schema of a page."""
         items = [CheckpointPublic.from_domain(one) for one in page.items]
         return cls(items=items, next_cursor=page.next_cursor)
+
+
+class AliasTarget(Body):
+    """The checkpoint of an alias."""
+
+    model_config = shows({"checkpoint": "reach"})
+
+    checkpoint: str = Field(description="SHA-256 or another alias", min_length=1, max_length=64)
+
+
+class Alias(Answer):
+    """A name that points to a checkpoint."""
+
+    name: str
+    checkpoint: str = Field(description="SHA-256 of the checkpoint")
+    shipped: bool = Field(description="whether it belongs to a shipped checkpoint")
+
+    @classmethod
+    def of(cls, name: str, sha256: str) -> Self:
+        """Return the schema of an alias."""
+        return cls(name=name, checkpoint=sha256, shipped=name in pretrained.ALIASES)
+
+
+class AliasList(Answer):
+    """All aliases."""
+
+    items: list[Alias]

@@ -4,6 +4,7 @@ controllers           Controllers of the robot made of one trained policy, by in
 live_reach_policy     A reach policy in the live cell, with all its inference modes
 motion_decision       Next trajectory segment toward a goal beside people
 moved_person          People of a cell with one of them in other postures
+onnx_export           Export of a pick or reach policy as an ONNX model (extra ``onnx``)
 reach_policy          A trained policy of the reach scenario, for inference
 rollout               Rollout policy improvement of a trained reach policy
 sorting_plan          Next move of a sorting task together with its motion (docs/method.md 3.1)

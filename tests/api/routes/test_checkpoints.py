@@ -1,7 +1,15 @@
-from fastapi.testclient import TestClient
-from safetensors.numpy import load
+import json
+from collections.abc import Iterator
+from typing import Any
 
-from app.policies.checkpoints import checkpoint
+import numpy as np
+import pytest
+from fastapi.testclient import TestClient
+from safetensors.numpy import load, save
+
+from app.policies.checkpoints import checkpoint, pretrained
+from app.policies.checkpoints.upload import MAX_FILE, MAX_MANIFEST
+from tests.api.routes.test_motion import TASK
 
 
 def test_shipped_checkpoint_is_listed_with_its_alias(client: TestClient) -> None:
@@ -26,3 +34,110 @@ def test_unknown_checkpoint_is_not_found(client: TestClient) -> None:
     for path in ("", "/tensors", "/manifest"):
         answer = client.get(f"/v1/checkpoints/{'0' * 64}{path}")
         assert answer.status_code == 404
+
+
+FILE = {"Content-Type": "application/octet-stream"}
+
+
+def uploaded(manifest: dict[str, Any], tensors: bytes) -> bytes:
+    return json.dumps(manifest).encode() + b"\n" + tensors
+
+
+def changed(change: dict[str, Any]) -> bytes:
+    """Return the upload of a shipped checkpoint with other manifest fields."""
+    shipped = pretrained.load("reach")
+    return uploaded({**shipped.manifest, **change}, shipped.tensors)
+
+
+def with_tensor(name: str, values: Any) -> bytes:
+    shipped = pretrained.load("reach")
+    return uploaded(shipped.manifest, save({**shipped.arrays(), name: values}))
+
+
+@pytest.fixture
+def alias(client: TestClient) -> Iterator[str]:
+    client.put("/v1/aliases/line-2", json={"checkpoint": "reach"})
+    yield "line-2"
+    client.delete("/v1/aliases/line-2")
+
+
+def test_uploaded_checkpoint_decides_by_its_id(client: TestClient) -> None:
+    body = changed({"seed": 77})
+    answer = client.post("/v1/checkpoints", content=body, headers=FILE)
+    assert answer.status_code == 201, answer.text
+    sha256 = answer.json()["sha256"]
+    assert answer.headers["location"] == f"/v1/checkpoints/{sha256}"
+    assert client.post("/v1/checkpoints", content=body, headers=FILE).status_code == 200
+    moved = client.post("/v1/motion", json={**TASK, "checkpoint": sha256})
+    assert moved.json()["checkpoint"] == sha256
+
+
+def test_upload_with_another_id_than_expected_is_refused(client: TestClient) -> None:
+    body = changed({"seed": 78})
+    answer = client.post("/v1/checkpoints?sha256=" + "0" * 64, content=body, headers=FILE)
+    assert (answer.status_code, answer.json()["field"]) == (422, "sha256")
+
+
+NAN = np.full(6, np.nan, dtype=np.float32)
+WRONG = [
+    (b"", "body"),
+    (b"{" * 99 + b"\n", "manifest"),
+    (b"\x80\x04K\x01.\n", "manifest"),
+    (b'{"seed": NaN}\nx', "manifest"),
+    (b" " * (MAX_MANIFEST + 1) + b"\n", "body"),
+    (changed({"kind": "resume"}), "manifest.kind"),
+    (changed({"trained_range": {"q": {"low": [0], "high": []}}}), "manifest.trained_range.q"),
+    (uploaded(pretrained.load("reach").manifest, b""), "tensors"),
+    (uploaded(pretrained.load("reach").manifest, b"\x80\x04K\x01."), "tensors"),
+    (with_tensor("actor.net.4.bias", NAN), "tensors.actor.net.4.bias"),
+    (
+        changed({"preset": {"networks": {"width": 4096, "layers": 4}}}),
+        "manifest.preset.networks.width",
+    ),
+]
+
+
+@pytest.mark.parametrize(("body", "field"), WRONG, ids=[one[1] for one in WRONG])
+def test_bad_upload_is_refused_by_field(client: TestClient, body: bytes, field: str) -> None:
+    answer = client.post("/v1/checkpoints", content=body, headers=FILE)
+    assert (answer.status_code, answer.json()["field"]) == (422, field), answer.text
+
+
+def test_upload_whose_tensors_do_not_fit_is_refused(client: TestClient) -> None:
+    body = with_tensor("actor.net.4.bias", np.zeros(5, dtype=np.float32))
+    answer = client.post("/v1/checkpoints", content=body, headers=FILE)
+    assert (answer.status_code, answer.json()["field"]) == (409, "tensors.actor.net.4")
+
+
+def test_upload_over_the_limit_is_refused(client: TestClient) -> None:
+    answer = client.post("/v1/checkpoints", content=b"{}\n" + bytes(MAX_FILE), headers=FILE)
+    assert answer.status_code == 413
+
+
+def test_alias_can_be_used_where_a_checkpoint_is_named(client: TestClient, alias: str) -> None:
+    sha256 = pretrained.SHA256["reach"]
+    assert client.get(f"/v1/checkpoints/{alias}").json()["sha256"] == sha256
+    moved = client.post("/v1/motion", json={**TASK, "checkpoint": alias})
+    assert moved.json()["checkpoint"] == sha256
+    listed = client.get("/v1/aliases").json()["items"]
+    assert {"name": alias, "checkpoint": sha256, "shipped": False} in listed
+
+
+def test_alias_points_to_another_checkpoint_in_one_step(client: TestClient, alias: str) -> None:
+    answer = client.put(f"/v1/aliases/{alias}", json={"checkpoint": "pick"})
+    assert (answer.status_code, answer.json()["checkpoint"]) == (200, pretrained.SHA256["pick"])
+    refused = client.post("/v1/motion", json={**TASK, "checkpoint": alias})
+    assert refused.status_code == 409
+
+
+def test_alias_of_a_shipped_checkpoint_stays(client: TestClient) -> None:
+    assert client.put("/v1/aliases/pick", json={"checkpoint": "reach"}).status_code == 409
+    assert client.delete("/v1/aliases/pick").status_code == 409
+
+
+def test_unknown_alias_and_checkpoint_are_named(client: TestClient) -> None:
+    assert client.delete("/v1/aliases/nothing").status_code == 404
+    answer = client.put("/v1/aliases/mine", json={"checkpoint": "nothing"})
+    assert (answer.status_code, answer.json()["field"]) == (422, "checkpoint")
+    answer = client.put("/v1/aliases/MINE", json={"checkpoint": "reach"})
+    assert (answer.status_code, answer.json()["field"]) == (422, "alias")

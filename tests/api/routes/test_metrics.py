@@ -72,13 +72,12 @@ def test_tracker_has_an_age_until_it_is_deleted(client: TestClient) -> None:
 
 
 def test_jobs_are_counted_by_state(client: TestClient) -> None:
-    before = value(client, "tandem_jobs", state="cancelled")
     body = {"kind": "train", "preset": "sorting-e0-dqn", "seed": 1}
     job = client.post("/v1/jobs", json=body).json()
     client.post(f"/v1/jobs/{job['id']}/cancel")
-    total = sum(value(client, "tandem_jobs", state=s) for s in ("cancelled", "cancelling"))
-    assert total >= before + 1
-    assert value(client, "tandem_jobs", state="failed") == 0.0
+    found = {one.labels["state"]: one.value for one in scrape(client)["tandem_jobs"].samples}
+    assert found["cancelled"] + found["cancelling"] >= 1.0
+    assert found["failed"] == 0.0
     assert value(client, "tandem_database_up") == 1.0
 
 
@@ -129,3 +128,15 @@ def test_handshake_of_a_socket_has_the_request_id(client: TestClient) -> None:
     with client.websocket_connect(SOCKET, headers=headers) as socket:
         accepted = dict(socket.extra_headers or [])
         assert accepted[b"x-request-id"] == b"socket-1"
+
+
+def test_messages_on_a_socket_are_counted_with_their_wait(client: TestClient) -> None:
+    name = "tandem_request_duration_seconds_count"
+    labels = {"method": "MESSAGE", "endpoint": "/v1/motion/stream"}
+    before = value(client, name, **labels, status="422")
+    waits = value(client, "tandem_socket_wait_seconds_count")
+    with client.websocket_connect(SOCKET) as socket:
+        socket.send_json({"cell": "nothing"})
+        assert socket.receive_json()["status"] == 422
+    assert value(client, name, **labels, status="422") == before + 1
+    assert value(client, "tandem_socket_wait_seconds_count") == waits + 1

@@ -1,0 +1,78 @@
+"""Checkpoints from outside: one line of JSON, the manifest, followed by a safetensors file.
+
+Nothing is unpickled or executed. ``check`` is called before anything is stored; that the
+tensors fit the networks of the manifest is checked by loading the policy.
+"""
+
+import json
+
+from app.digests import digest
+from app.errors import InvalidInput
+from app.policies.checkpoints.checkpoint import MAX_BYTES, Checkpoint, load
+
+MAX_MANIFEST = 1 << 18
+"""Longest manifest [bytes]."""
+MAX_FILE = MAX_MANIFEST + 1 + MAX_BYTES
+"""Largest file [bytes]."""
+MAX_DEPTH = 16
+"""Largest depth of nested lists and objects in a manifest."""
+_BYTES_PER_WEIGHT = 4
+
+
+def read_upload(content: bytes) -> Checkpoint:
+    """Return the checkpoint of a file.
+
+    Args:
+        content: The manifest in one line, and the bytes of the safetensors file.
+
+    Raises:
+        InvalidInput: A part is missing, too large, or not what it must be.
+        CheckpointMismatch: The format is another one.
+    """
+    line, separator, tensors = content[: MAX_MANIFEST + 1].partition(b"\n")
+    if not separator:
+        rule = f"must begin with a line of JSON, the manifest, of at most {MAX_MANIFEST} bytes"
+        raise InvalidInput("body", f"{len(content)} bytes", rule)
+    checkpoint = load(_manifest(line), content[len(line) + 1 :])
+    if (kind := checkpoint.manifest["kind"]) != "policy":
+        raise InvalidInput("manifest.kind", kind, "cannot be uploaded", ("policy",))
+    if not tensors:
+        raise InvalidInput("tensors", "nothing", "must follow the manifest's line")
+    checkpoint.arrays()
+    _check_size(checkpoint)
+    return checkpoint
+
+
+def _manifest(line: bytes) -> object:
+    if line.count(b"[") + line.count(b"{") > MAX_DEPTH:
+        steps = {ord("["): 1, ord("{"): 1, ord("]"): -1, ord("}"): -1}
+        depth = most = 0
+        for byte in line:
+            depth += steps.get(byte, 0)
+            most = max(most, depth)
+        if most > MAX_DEPTH:
+            rule = f"must be nested at most {MAX_DEPTH} deep"
+            raise InvalidInput("manifest", f"{most} levels", rule)
+    try:
+        manifest = json.loads(line.decode())
+        digest(manifest)
+    except (ValueError, RecursionError) as error:
+        rule = "must be JSON in UTF-8, in one line, with finite numbers"
+        raise InvalidInput("manifest", str(error), rule) from None
+    return manifest
+
+
+def _check_size(checkpoint: Checkpoint) -> None:
+    """Check that the networks of the manifest are not larger than the tensors.
+
+    They are allocated before the tensors are loaded into them.
+    """
+    networks = checkpoint.manifest["preset"].get("networks")
+    sizes = networks if isinstance(networks, dict) else {}
+    width, layers = sizes.get("width"), sizes.get("layers", 2)
+    if not isinstance(width, int) or not isinstance(layers, int):
+        return  # refused with the preset's rules
+    least = _BYTES_PER_WEIGHT * width**2 * max(layers - 1, 0)
+    if least > len(checkpoint.tensors):
+        rule = f"means at least {least} bytes of tensors; there are {len(checkpoint.tensors)}"
+        raise InvalidInput("manifest.preset.networks.width", width, rule)

@@ -1,0 +1,87 @@
+import json
+
+import numpy as np
+import onnx
+import onnxruntime
+import pytest
+
+from app.errors import InvalidInput
+from app.policies.checkpoints import pretrained
+from app.policies.checkpoints.checkpoint import Checkpoint, pack
+from app.policies.checkpoints.model_state import weights_of
+from app.policies.inference.onnx_export import LIMITS, export
+from app.policies.inference.reach_policy import LAYOUTS, PEOPLE_SET, ReachPolicy
+from app.policies.inference.value_networks import ValueNetworks
+from app.policies.networks.actor_critic import ResidualActor
+from app.sim.core.arrays import Vec
+from app.sim.reach.batch import N_ACT
+from app.sim.reach.kernels.observation import BASE_START
+
+TOLERANCE = 1e-5
+
+
+def played(checkpoint: Checkpoint, obs: Vec) -> list[Vec]:
+    """Return the outputs of the exported model."""
+    session = onnxruntime.InferenceSession(export(checkpoint))
+    feeds, first = {}, 0
+    for name, size in checkpoint.manifest["layout"]:
+        feeds[name] = obs[:, first : first + size]
+        first += size
+    found: list[Vec] = session.run(None, feeds)
+    return found
+
+
+def observations(checkpoint: Checkpoint) -> Vec:
+    n_obs = sum(size for _, size in checkpoint.manifest["layout"])
+    return np.random.default_rng(5).normal(size=(64, n_obs)).astype(np.float32)
+
+
+def with_people_set() -> Checkpoint:
+    """Return an untrained reach policy that observes a set of people."""
+    shipped = pretrained.load("reach").manifest
+    layout = LAYOUTS["people-set"]
+    episode = {**shipped["preset"]["episode"], "observation": "people-set"}
+    manifest = {
+        **shipped,
+        "layout": layout,
+        "preset": {**shipped["preset"], "episode": episode},
+    }
+    n_obs = sum(size for _, size in layout)
+    actor = ResidualActor(32, n_obs, N_ACT, BASE_START, crowd=PEOPLE_SET)
+    return pack(manifest, weights_of({"actor": actor}))
+
+
+def test_exported_pick_policy_acts_and_values_as_the_checkpoint() -> None:
+    checkpoint = pretrained.load("pick")
+    obs = observations(checkpoint)
+    act, value = played(checkpoint, obs)
+    expected = ValueNetworks(checkpoint).act_and_value(obs)
+    np.testing.assert_allclose(act, expected[0], atol=TOLERANCE)
+    np.testing.assert_allclose(value[:, 0], expected[1], atol=TOLERANCE)
+
+
+def test_exported_reach_policy_acts_as_the_checkpoint() -> None:
+    for checkpoint in (pretrained.load("reach"), with_people_set()):
+        obs = observations(checkpoint)
+        (act,) = played(checkpoint, obs)
+        np.testing.assert_allclose(act, ReachPolicy(checkpoint).acts(obs), atol=TOLERANCE)
+
+
+@pytest.mark.parametrize("alias", ["pick", "reach"])
+def test_exported_model_describes_its_inputs_and_limits(alias: str) -> None:
+    checkpoint = pretrained.load(alias)
+    model = onnx.load_from_string(export(checkpoint))
+    inputs = [
+        (one.name, one.type.tensor_type.shape.dim[1].dim_value) for one in model.graph.input
+    ]
+    assert inputs == [tuple(group) for group in checkpoint.manifest["layout"]]
+    assert all(one.doc_string for one in (*model.graph.input, *model.graph.output))
+    metadata = {one.key: one.value for one in model.metadata_props}
+    assert metadata["checkpoint"] == checkpoint.sha256
+    assert metadata["limits"] == LIMITS
+    assert json.loads(metadata["trained_range"]) == checkpoint.manifest["trained_range"]
+
+
+def test_sorting_policy_is_not_exported() -> None:
+    with pytest.raises(InvalidInput, match="/v1/sorting"):
+        export(pretrained.load("sorting-e0"))
