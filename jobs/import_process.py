@@ -1,8 +1,8 @@
 """Import of a file in its own process: ``python -m jobs.import_process``.
 
 Parsing tens of megabytes holds Python's global lock for a second at a time, which would stall
-the live cell in the server's process. The import process has a lower priority, and running out
-of memory ends only itself. It reads one file; without its server it ends after that file.
+the live cell in the server's process. The import process has a lower priority and limits of
+memory and processor time. It reads one file, and ends with its server.
 
 Input and output are a JSON head, preceded by its length, and bytes.
 """
@@ -10,12 +10,14 @@ Input and output are a JSON head, preceded by its length, and bytes.
 import json
 import logging
 import os
+import resource
 import signal
 import subprocess
 import sys
 import threading
 from collections.abc import Mapping
 from dataclasses import asdict, fields
+from pathlib import Path
 from typing import Any
 
 from app.errors import BadRecording, Fault, InvalidInput, NotReady, SimulationError
@@ -24,11 +26,17 @@ from app.sim.mocap.read_options import NOTHING_STATED, ReadOptions
 from app.store.records import NewRecording
 from jobs.executor import PROJECT_ROOT, search_path
 from jobs.recording_format import packed
+from jobs.start import child_command
 
 logger = logging.getLogger(__name__)
 
-MAX_IMPORT_S = 120.0
+MAX_IMPORT_S = 180.0
 """Longest time for an import [s]; the largest file takes about a tenth of it."""
+MAX_CPU_S = 120
+"""Longest processor time for an import [s]."""
+MAX_MEMORY_BYTES = 1 << 30
+"""Largest memory for an import, beyond that of the imported libraries (Linux); the largest file
+takes about 0.5 GB [bytes]."""
 NICENESS = 10
 """Niceness of the process, below the priority of the live cell."""
 _LENGTH = 8
@@ -61,7 +69,7 @@ class ImportProcess:
 
         Raises:
             BadRecording: It is unsound; each fault names line or column and rule.
-            InvalidInput: It takes too long.
+            InvalidInput: It takes too long or too much memory.
             NotReady: The server stops.
             SimulationError: The process ended without an answer.
         """
@@ -81,6 +89,9 @@ class ImportProcess:
             self._end(process)
         if self._stopped:
             raise NotReady("stopping")
+        if process.returncode in (-signal.SIGXCPU, -signal.SIGKILL):
+            rule = f"takes more than {MAX_CPU_S} s of processor time or all memory to import"
+            raise InvalidInput("file", f"<{len(content)} bytes>", f"{rule}: cut it into parts")
         if process.returncode != 0:
             logger.error("an import ended: %s", log.decode(errors="replace")[-4000:].strip())
             raise SimulationError(
@@ -101,9 +112,14 @@ class ImportProcess:
             if self._stopped:
                 raise NotReady("stopping")
             process = subprocess.Popen(
-                (sys.executable, "-m", "jobs.import_process"),
+                child_command("jobs.import_process"),
                 cwd=PROJECT_ROOT,
-                env={**os.environ, "PYTHONPATH": search_path(os.environ)},
+                env={
+                    **os.environ,
+                    "PYTHONPATH": search_path(os.environ),
+                    "OMP_NUM_THREADS": "1",
+                    "OPENBLAS_NUM_THREADS": "1",
+                },
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 stderr=subprocess.PIPE,
@@ -140,16 +156,30 @@ def main() -> None:
     """Import the file on standard input; write the answer to standard output."""
     os.nice(NICENESS)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    request, content = _unframed(sys.stdin.buffer.read())
-    request["options"] = ReadOptions(**request["options"])
+    _limit()
     try:
+        request, content = _unframed(sys.stdin.buffer.read())
+        request["options"] = ReadOptions(**request["options"])
         new = import_here(content, **request)
     except BadRecording as error:
         answer = _framed({"faults": [asdict(fault) for fault in error.faults]}, b"")
+    except MemoryError:
+        rule = f"takes more than {MAX_MEMORY_BYTES >> 20} MiB of memory to import"
+        fault = Fault(place="file", value="", rule=rule, hint="cut it into parts")
+        answer = _framed({"faults": [asdict(fault)]}, b"")
     else:
         members = {entry.name: getattr(new, entry.name) for entry in fields(NewRecording)}
         answer = _framed({"recording": members}, members.pop("tensors"))
     sys.stdout.buffer.write(answer)
+
+
+def _limit() -> None:
+    """Limit processor time and, on Linux, memory of this process."""
+    resource.setrlimit(resource.RLIMIT_CPU, (MAX_CPU_S, MAX_CPU_S + 5))
+    if sys.platform == "linux":
+        pages = int(Path("/proc/self/statm").read_text().split()[0])
+        limit = pages * resource.getpagesize() + MAX_MEMORY_BYTES
+        resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
 
 
 def _answered(output: bytes) -> NewRecording:

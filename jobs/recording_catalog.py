@@ -10,7 +10,7 @@ from dataclasses import replace
 from pathlib import PurePath
 
 from app.errors import Conflict, InvalidInput, NotFound
-from app.sim.mocap.importer import Motion
+from app.sim.mocap.importer import Motion, format_of
 from app.sim.mocap.read_options import NOTHING_STATED, ReadOptions
 from app.store import recordings as stored
 from app.store.engine import Store
@@ -129,10 +129,9 @@ class RecordingCatalog:
             Conflict: Another file, or this one with other options, has that name, or the limits
                 are reached.
         """
-        file_name = checked_file_name(file_name)
-        name = recording_name(file_name) if name is None else checked_name(name)
+        file_name, name = checked_names(file_name, name)
         sha256 = hashlib.sha256(content).hexdigest()
-        suffix = PurePath(file_name).suffix.lower()
+        suffix = format_of(file_name)
         if stored.find_same(self._store, name, sha256) is not None:
             same, _ = stored.read_runs(self._store, name)
             if suffix == f".{same.summary['format']}":
@@ -162,6 +161,22 @@ class RecordingCatalog:
             yield
         except NotFound:
             raise NotFound("recording", name, self.names()) from None
+
+
+def checked_names(file_name: str, name: str | None) -> tuple[str, str]:
+    """Return a file's name without folders, and the name of its recording.
+
+    Args:
+        file_name: Name of the file; its suffix gives the format.
+        name: Name of the recording; made from the file's name if None.
+
+    Raises:
+        BadRecording: The suffix is that of no supported format.
+        InvalidInput: A name is invalid.
+    """
+    file_name = checked_file_name(file_name)
+    format_of(file_name)
+    return file_name, recording_name(file_name) if name is None else checked_name(name)
 
 
 def checked_file_name(file_name: str) -> str:

@@ -21,6 +21,8 @@ BODY_S = 10.0
 """Period in which a body must progress by BODY_BYTES or end [s]."""
 BODY_BYTES = 5000
 """Minimum progress of a body in BODY_S [bytes]."""
+BODY_TOTAL_S = 300.0
+"""Time limit of a whole body; the largest file needs 0.9 Mbit/s [s]."""
 UNREAD_BYTES = 1 << 20
 """Limit of the data read after an answer or a refusal [bytes]."""
 DRAIN_S = 60.0
@@ -48,6 +50,8 @@ class LimitedHttp(HttpToolsProtocol):
     """Length of the parsed part of the head [bytes]."""
     _pending = 0
     """Data since the last complete header or part of a body [bytes]."""
+    _body_since = 0.0
+    """Time at which the body began [s]."""
     _progress = 0
     """Data of the body since the timer was set [bytes]."""
     _unread = 0
@@ -111,7 +115,7 @@ class LimitedHttp(HttpToolsProtocol):
             self._refusal = 503, "too-many-requests-at-once", "too many pipelined requests"
             raise ValueError(self._refusal)
         super().on_headers_complete()
-        self._in_body = True
+        self._in_body, self._body_since = True, self.loop.time()
 
     def on_body(self, body: bytes) -> None:
         """Count the progress of the body."""
@@ -188,11 +192,14 @@ class LimitedHttp(HttpToolsProtocol):
 
     def _body_is_due(self) -> None:
         is_ours = self.flow.read_paused or self.cycle.waiting_for_100_continue
-        if is_ours or self._progress >= BODY_BYTES:
+        is_late = self.loop.time() - self._body_since > BODY_TOTAL_S
+        if is_ours or (self._progress >= BODY_BYTES and not is_late):
             self._progress = 0
             self._set_timer(BODY_S, self._body_is_due)
             return
         detail = f"the body progressed by less than {BODY_BYTES} bytes in {BODY_S:g} s"
+        if is_late:
+            detail = f"the body was not complete after {BODY_TOTAL_S:g} s"
         self._refuse(408, "request-too-slow", detail)
 
     def _refuse(self, status: int, kind: str, detail: str) -> None:

@@ -243,6 +243,14 @@ def test_what_is_too_slow_ends(strict: Small) -> None:
     assert status_of(strict.ask(NAME + LAST)) == 200
 
 
+def test_body_that_never_ends_is_refused_although_it_progresses() -> None:
+    with serving(BODY_S=0.5, BODY_BYTES=0, BODY_TOTAL_S=1.0) as one, one.connect() as client:
+        client.sendall(POST + b"Content-Length: 1000000\r\n\r\n")
+        answer = drip(client, b"a")
+    assert status_of(answer) == 408
+    assert b"the body was not complete after 1 s" in answer
+
+
 def test_a_slow_answer_and_an_idle_socket_are_not_taken_for_slow_clients(strict: Small) -> None:
     with connect(
         f"ws://127.0.0.1:{strict.port}/echo",

@@ -1,3 +1,4 @@
+import sys
 import threading
 import time
 
@@ -37,6 +38,35 @@ def test_import_that_takes_too_long_is_ended_and_named(monkeypatch: pytest.Monke
     monkeypatch.setattr(import_process, "MAX_IMPORT_S", 0.05)
     with pytest.raises(InvalidInput, match=r"takes more than 0\.05 s to import"):
         ImportProcess()(CLIP, *ASKED)
+
+
+LIMITED = """
+import sys
+from jobs import import_process
+import_process.MAX_CPU_S, import_process.MAX_MEMORY_BYTES = int(sys.argv[1]), int(sys.argv[2])
+import_process.main()
+"""
+
+
+@pytest.mark.parametrize(
+    ("cpu_s", "memory", "error", "text"),
+    [
+        (100, 1 << 24, BadRecording, "takes more than 16 MiB of memory to import"),
+        (1, 1 << 30, InvalidInput, r"takes more than 120 s of processor time .*cut it"),
+    ],
+)
+def test_import_beyond_a_limit_is_ended_and_named(
+    monkeypatch: pytest.MonkeyPatch,
+    cpu_s: int,
+    memory: int,
+    error: type[InvalidInput],
+    text: str,
+) -> None:
+    command = (sys.executable, "-c", LIMITED, str(cpu_s), str(memory))
+    monkeypatch.setattr(import_process, "child_command", lambda _module: command)
+    clip = csv_text(working(20_000)).encode()
+    with pytest.raises(error, match=text):
+        ImportProcess()(clip, *ASKED)
 
 
 def test_process_that_dies_is_reported_and_its_output_is_logged(

@@ -53,6 +53,19 @@ def test_record_says_what_was_found(catalog: RecordingCatalog) -> None:
     assert catalog.all() == (replace(record, detail=None),)
 
 
+@pytest.mark.parametrize("file_name", ["clip.pdf", "clip", "clip.bvh.zip", ".bvh"])
+def test_file_of_another_kind_is_refused_before_it_is_imported(
+    store: Store, file_name: str
+) -> None:
+    def never(*_: object) -> NewRecording:
+        raise AssertionError
+
+    with pytest.raises(
+        InvalidInput, match=r"must end with \.bvh|must be given|must name a file"
+    ):
+        RecordingCatalog(store, never).add(CLIP, file_name)
+
+
 def test_same_file_again_is_not_new_and_is_not_imported_again(
     store: Store,
 ) -> None:

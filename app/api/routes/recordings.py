@@ -13,6 +13,7 @@ from app.errors import NotReady
 from app.sim.mocap.importer import FORMATS, MAX_BYTES
 from app.sim.mocap.read_options import UNITS, UP_AXES, ReadOptions, name_map
 from app.store.records import StoredRecording
+from jobs.recording_catalog import checked_names
 
 router = APIRouter(prefix="/v1/recordings", tags=["recordings"])
 
@@ -123,7 +124,8 @@ async def _import(
     name: str | None,
     options: ReadOptions,
 ) -> tuple[StoredRecording, bool]:
-    """Import the body on a thread, a few at a time."""
+    """Import the body on a thread, a few at a time; names are checked before it is read."""
+    checked_names(file_name, name)
     if not services.uploads.acquire(blocking=False):
         raise NotReady(f"{MAX_UPLOADS} files are being imported: post again in a moment")
     try:

@@ -23,6 +23,8 @@ MAX_FRAMES = 200_000
 """Largest number of frames: half an hour at 100 Hz."""
 MAX_LINE_ENDS = 4 * MAX_FRAMES + 10_000
 """Largest number of line ends: two per line, and as many empty lines as frames."""
+CHUNK_FRAMES = 4096
+"""Frames converted at once: all joints of all frames would take more than 1 GB."""
 MAX_NUMBER = 1e9
 """Largest number in a file, in any unit."""
 MIN_DT, MAX_DT = 1e-3, 0.1
@@ -110,6 +112,13 @@ def forward(bvh: Bvh, wanted: Sequence[int]) -> Vec:
         wanted: Indices of the joints.
     """
     needed = _with_ancestors(bvh, wanted)
+    parts = range(0, len(bvh.values), CHUNK_FRAMES)
+    return np.concatenate(
+        [_forward(bvh, bvh.values[k : k + CHUNK_FRAMES], wanted, needed) for k in parts]
+    )
+
+
+def _forward(bvh: Bvh, values: Vec, wanted: Sequence[int], needed: set[int]) -> Vec:
     places: dict[int, Vec] = {}
     turns: dict[int, Vec] = {}
     column = 0
@@ -117,7 +126,7 @@ def forward(bvh: Bvh, wanted: Sequence[int]) -> Vec:
         first, column = column, column + len(joint.channels)
         if k not in needed:
             continue
-        local, turn = _local(joint, bvh.values[:, first:column])
+        local, turn = _local(joint, values[:, first:column])
         if joint.parent >= 0:
             above = turns[joint.parent]
             local = places[joint.parent] + np.einsum("nij,nj->ni", above, local)

@@ -139,9 +139,7 @@ def read_motion(
     Raises:
         BadRecording: The file is invalid; each fault names line or column and rule.
     """
-    ending = PurePath(file_name).suffix.lower()
-    if ending not in FORMATS:
-        raise bad("file name", repr(file_name[-60:]), f"must end with {', '.join(FORMATS)}")
+    ending = format_of(file_name)
     text = _text(content, ending)
     digest = hashlib.sha256(content).hexdigest()[:12]
     track, angles, reading = _read(text, ending, options)
@@ -177,6 +175,18 @@ def read_motion(
         fixed_body=joined.error((WRIST_R, WRIST_L), body=BodySize()),
         beyond_limits=beyond_limits(np.concatenate([q for q, _ in segments])),
     )
+
+
+def format_of(file_name: str) -> str:
+    """Return the extension of a file's name, in lower case.
+
+    Raises:
+        BadRecording: It is that of no supported format.
+    """
+    ending = PurePath(file_name).suffix.lower()
+    if ending not in FORMATS:
+        raise bad("file name", repr(file_name[-60:]), f"must end with {', '.join(FORMATS)}")
+    return ending
 
 
 def _read(
