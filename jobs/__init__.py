@@ -3,6 +3,8 @@
 attempt            One attempt of a job in its own process: arguments, logging, exit status
 cell_catalog       Work cells by name: the shipped ones, and the user's own from the database
 checkpoints        Reading of stored checkpoints; a damaged shipped one is restored
+comparison         Comparison of jobs: the fields that differ, and learning curves with a band
+                   over seeds
 executor           Executors of attempts: the interface, and one local process per attempt
 import_process     Import of a file in its own process: ``python -m jobs.import_process``
 recording_catalog  Stored recordings by name: files in, runs of the 18-DoF human model out

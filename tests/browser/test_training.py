@@ -1,6 +1,7 @@
 """A visitor starts a training job on the page and watches it learn."""
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -165,6 +166,53 @@ def test_ended_job_is_retried_cloned_and_named(
     assert patient_http.get(f"{server}/v1/jobs/{ended['id']}").status_code == 404
     for job in (clone, again):
         stop(server, job)
+
+
+TINY = {"total_steps": 1280, "n_envs": 128, "learning_starts": 0, "progress_steps": 128}
+"""A training of seconds with ten points."""
+
+
+def test_jobs_are_compared_with_a_band_over_seeds(
+    open_page: Callable[..., Page], server: str
+) -> None:
+    changes: tuple[tuple[int, dict[str, float]], ...] = ((1, {}), (2, {}), (1, {"gamma": 0.9}))
+    made = [
+        patient_http.post(
+            f"{server}/v1/jobs",
+            json={
+                "kind": "train",
+                "preset": "pick-td3",
+                "seed": seed,
+                "overrides": {"learning": {**TINY, **own}},
+            },
+        ).json()
+        for seed, own in changes
+    ]
+    for job in made:  # each stream ends with its job
+        patient_http.get(f"{server}/v1/jobs/{job['id']}/events")
+    page = open_page((1280, 900), scene=False)
+    page.click("#tab-training")
+    page.click('[data-action="compare"]')
+    expect(page.locator('[data-action="show-comparison"]')).to_be_disabled()
+    for job in made:
+        page.check(f'[data-job="{job["id"]}"] [data-role="compare"]')
+    page.click('[data-action="show-comparison"]')
+    dialog = page.locator('[data-role="comparison"]')
+    page.select_option('[data-role="quantity"]', "updates")
+    groups = dialog.locator('[data-role="groups"] li')
+    expect(groups).to_have_count(2)
+    expect(groups.first).to_contain_text("seeds 1, 2")
+    expect(groups.last).to_contain_text("gamma 0.9")
+    fields = dialog.locator('[data-role="differences"] tbody th')
+    expect(fields).to_have_text(["learning.gamma", "seed"])
+    with page.expect_download() as table:
+        dialog.get_by_text("CSV").click()
+    rows = Path(table.value.path()).read_text().splitlines()
+    assert len(rows) == 31 and rows[0].startswith("job,number,name,preset,seed,step,")
+    with page.expect_download() as picture:
+        dialog.locator('[data-action="png"]').click()
+    assert Path(picture.value.path()).read_bytes().startswith(b"\x89PNG")
+    assert page.problems == []  # type: ignore[attr-defined]
 
 
 def cancel(page: Page) -> None:

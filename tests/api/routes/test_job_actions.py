@@ -145,3 +145,18 @@ def services_of(client: TestClient) -> Services:
     app: Any = client.app
     services: Services = app.state.services
     return services
+
+
+def test_jobs_are_compared_by_what_differs(client: TestClient, ended: dict[str, Any]) -> None:
+    job = client.post(f"/v1/jobs/{ended['id']}/clone", json={"seed": 2}).json()
+    query = {"job": [ended["id"], job["id"]]}
+    found = client.get("/v1/comparison", params=query).json()
+    assert found["differences"] == [{"field": "seed", "values": [1, 2]}]
+    assert [group["jobs"] for group in found["groups"]] == [query["job"]]
+    table = client.get("/v1/comparison/csv", params=query)
+    assert table.headers["content-type"].startswith("text/csv")
+    assert table.text.startswith("job,number,name,preset,seed,step")
+    twice = client.get("/v1/comparison", params={"job": [job["id"]] * 2})
+    assert (twice.status_code, twice.json()["field"]) == (422, "job[1]")
+    assert client.get("/v1/comparison", params={"job": "gone"}).status_code == 404
+    cancelled(client, job)

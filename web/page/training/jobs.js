@@ -4,6 +4,7 @@ import { follow, get } from "../api.js";
 import * as format from "../format.js";
 import { Icon } from "../icons.js";
 import { CurvePlot } from "../plots.js";
+import { MAX_JOBS } from "./compare.js";
 import { JobActions, Labels, isActive } from "./jobactions.js";
 
 const POLL_MS = 2000;
@@ -74,10 +75,14 @@ export function JobList({ jobs, error, onNew, ...rest }) {
   </ul>`;
 }
 
-function Job({ job, jobs, open, ...rest }) {
+function Job({ job, jobs, open, chosen, onChoose, ...rest }) {
   const share = progress(job);
-  return html`<li class=${`job ${open ? "is-open" : ""}`} data-job=${job.id}
+  return html`<li class=${`job ${open ? "is-open" : ""} ${chosen ? "has-choice" : ""}`} data-job=${job.id}
     data-state=${job.state}>
+    ${chosen && html`<label class="job-choice"><input type="checkbox" checked=${chosen.includes(job.id)}
+      data-role="compare" aria-label=${`Compare ${title(job)}`}
+      disabled=${chosen.length >= MAX_JOBS && !chosen.includes(job.id)}
+      onChange=${() => onChoose(job.id)} /></label>`}
     <button type="button" class="job-head" aria-expanded=${String(open)}
       onClick=${() => rest.onOpen(open ? null : job.id)}>
       <${Icon} name="chevron" />
