@@ -11,6 +11,9 @@ from app.store import jobs
 from app.store.engine import Store
 from app.store.records import JobState
 from app.store.tables import jobs as table
+from tests.databases import SQLITE_ONLY
+
+pytestmark = SQLITE_ONLY  # query plans and counts of its virtual machine
 
 STATES = ("succeeded", "failed", "cancelled", "queued", "running")
 

@@ -1,0 +1,57 @@
+"""The compose file fits the settings and the image."""
+
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+from app.settings import Settings, check_access, load_settings
+
+ROOT = Path(__file__).parents[1]
+SECRETS = {"TANDEM_TOKEN": "0123456789abcdef", "POSTGRES_PASSWORD": "fedcba9876543210"}
+
+
+@pytest.fixture
+def services() -> dict[str, Any]:
+    text = (ROOT / "compose.yaml").read_text()
+    filled = re.sub(r"\$\{(\w+)[^}]*\}", lambda match: SECRETS[match[1]], text)
+    found: dict[str, Any] = yaml.safe_load(filled)
+    named = {
+        mount.partition(":")[0]
+        for one in found["services"].values()
+        for mount in one["volumes"]
+    }
+    assert named == set(found["volumes"])
+    return dict(found["services"])
+
+
+def settings_of(service: dict[str, Any], monkeypatch: pytest.MonkeyPatch) -> Settings:
+    image = re.findall(
+        r"\b(TANDEM_\w+)=(\S+)", (ROOT / "Dockerfile").read_text().split("ENV ")[1]
+    )
+    for name, value in [*image, *service["environment"].items()]:
+        monkeypatch.setenv(name, value)
+    return load_settings()
+
+
+def test_its_variables_are_settings_that_protect_the_service(
+    services: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    settings = settings_of(services["tandem"], monkeypatch)
+    check_access(settings)
+    assert settings.secret == SECRETS["TANDEM_TOKEN"] and not settings.is_loopback
+    assert services["tandem"]["ports"] == [f"127.0.0.1:8000:{settings.port}"]
+    assert services["tandem"]["volumes"] == [f"data:{settings.data}"]
+
+
+def test_its_database_is_the_one_that_it_starts(
+    services: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    settings = settings_of(services["tandem"], monkeypatch)
+    database = services["database"]["environment"]
+    user, name = database["POSTGRES_USER"], database["POSTGRES_DB"]
+    password = database["POSTGRES_PASSWORD"]
+    assert settings.database == f"postgresql://{user}:{password}@database/{name}"
+    assert set(services["tandem"]["depends_on"]) == {"database"}
