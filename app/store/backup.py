@@ -30,7 +30,17 @@ from app.store.schema import REVISION
 HEAD, HEAD_DIGEST = "backup.json", "backup.json.sha256"
 DATABASE = "tandem.db"
 FORMAT = 1
-NOT_KEPT = ("kernels", "logs", "server.lock", ".backup-*", "*.db", "*.db-*", "*.db.*", "*.part")
+NOT_KEPT = (
+    "kernels",
+    "logs",
+    "server.lock",
+    ".backup-*",
+    "*.db",
+    "*.db-*",
+    "*.db.*",
+    "*.part",
+    "*.unfinished",
+)
 """Names in the data folder that no backup contains, as patterns."""
 CHUNK = 1 << 20
 

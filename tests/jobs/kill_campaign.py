@@ -1,0 +1,236 @@
+"""Kill campaign: ``python -m tests.jobs.kill_campaign FOLDER --kills 1000 --minutes 120``.
+
+Kills, stops and terminates servers and workers at random moments, also during start, migration,
+post and cancel, and checks after every SERIES kills that nothing acknowledged is lost. The
+folder has the progress: the same command goes on after an interruption. ``report.json`` in it
+counts kills, jobs and their ends.
+"""
+
+import argparse
+import json
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from collections import Counter
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import sqlalchemy as sa
+
+from app.store import checkpoints, events, jobs, metrics
+from app.store.engine import Store
+from app.store.records import FINAL_STATES, JobRecord
+from jobs.executor import PROJECT_ROOT
+from tests.jobs.counting_worker import CHECKPOINT_EVERY, FACTOR, GRID, MODULUS
+from tests.jobs.machinery import WAIT_S, worker_pids
+
+SERIES = 25
+"""Kills of one database, below the number that ends a job."""
+LONGEST_S = 2.0
+"""Longest time from the start of a server, its readiness or the last kill to a kill [s]."""
+SHARE_IN_START = 0.25
+"""Share of the servers that are killed before they are ready, wherever they are then."""
+KILLS = {
+    "SIGKILL server": 8,
+    "SIGTERM server": 2,
+    "SIGSTOP server, SIGKILL": 2,
+    "SIGSTOP server, SIGCONT": 1,
+    "SIGKILL worker": 2,
+    "SIGTERM worker": 2,
+    "SIGSTOP worker, SIGKILL server": 2,
+}
+"""Ways of killing, each with its weight."""
+
+
+@dataclass(slots=True)
+class Series:
+    """Jobs of one database, as its servers acknowledged them."""
+
+    url: str
+    folder: Path
+    posted: dict[str, tuple[int, int]] = field(default_factory=dict)
+    asked_to_cancel: set[str] = field(default_factory=set)
+    server: "subprocess.Popen[str] | None" = None
+
+    def start(self, seed: int) -> "subprocess.Popen[str]":
+        command = [sys.executable, "-m", "tests.jobs.campaign_server", self.url]
+        with (self.folder / "server.log").open("a") as log:
+            self.server = subprocess.Popen(
+                [*command, str(self.folder), str(seed)],
+                cwd=PROJECT_ROOT,
+                stdout=subprocess.PIPE,
+                stderr=log,
+                text=True,
+            )
+        return self.server
+
+    def wait_until_ready(self) -> None:
+        """Wait for the first line of the server, or its end."""
+        assert self.server is not None and self.server.stdout is not None
+        self.server.stdout.readline()
+
+    def collect(self) -> None:
+        """Wait for the end of the server and its workers; read what it acknowledged."""
+        assert self.server is not None and self.server.stdout is not None
+        output, _ = self.server.communicate(timeout=WAIT_S)
+        for line in output.splitlines():
+            if not line.endswith("}"):
+                continue  # cut off by the kill
+            words = json.loads(line)
+            if "posted" in words:
+                self.posted[words["posted"]] = (words["seed"], words["steps"])
+            self.asked_to_cancel |= {words.get("asked_to_cancel", "")}
+        self.server = None
+
+
+def kill(series: Series, how: str, chance: random.Random) -> bool:
+    """Kill once; returns whether there was something to kill."""
+    server = series.server
+    assert server is not None
+    workers = worker_pids(server.pid)
+    if "worker" in how and not workers:
+        return False
+    first, _, then = how.partition(", ")
+    name, target = first.split()
+    _send(workers[0] if target == "worker" else server.pid, name)
+    if then:
+        time.sleep(chance.uniform(0.0, 0.5))
+        _send(server.pid, then.split()[0])
+    if then == "SIGCONT" or (target == "worker" and not then):
+        return True
+    series.collect()
+    deadline = time.monotonic() + WAIT_S
+    while any(Path(f"/proc/{pid}").exists() for pid in workers):
+        assert time.monotonic() < deadline, "a worker outlives its server"
+        time.sleep(0.01)
+    return True
+
+
+def _send(pid: int, name: str) -> None:
+    try:
+        os.kill(pid, signal.Signals[name])
+    except ProcessLookupError:
+        pass  # it has just ended
+
+
+def run_series(url: str, folder: Path, n_kills: int, seed: int) -> dict[str, Any]:
+    """Kill ``n_kills`` times, let the jobs end, and check them; returns the counts."""
+    chance, series, kills = random.Random(seed), Series(url, folder), Counter[str]()
+    try:
+        while kills.total() < n_kills:
+            if series.server is None or series.server.poll() is not None:
+                if series.server is not None:
+                    series.collect()
+                series.start(chance.getrandbits(31))
+                if chance.random() > SHARE_IN_START:
+                    series.wait_until_ready()
+            time.sleep(chance.uniform(0.0, LONGEST_S))
+            (how,) = chance.choices(list(KILLS), list(KILLS.values()))
+            kills[how] += kill(series, how, chance)
+        if series.server is not None:
+            _send(series.server.pid, "SIGTERM")
+            series.collect()
+        assert series.start(-1).wait(timeout=WAIT_S) == 0
+        series.collect()
+    finally:
+        if series.server is not None:
+            series.server.kill()
+            series.server.communicate()
+    return {"kills": dict(kills), **check(series)}
+
+
+def check(series: Series) -> dict[str, Any]:
+    """Check that nothing acknowledged is lost, and that every job ended once and whole."""
+    store = Store(series.url)
+    ends: Counter[str] = Counter()
+    with store.reading() as connection:
+        stored = set(connection.execute(sa.text("SELECT id FROM jobs")).scalars())
+        if store.sqlite_path is not None:
+            found = connection.execute(sa.text("PRAGMA integrity_check")).scalars().all()
+            assert found == ["ok"], found
+            assert not connection.execute(sa.text("PRAGMA foreign_key_check")).all()
+    lost = series.posted.keys() - stored
+    assert not lost, f"acknowledged jobs are lost: {lost}"
+    for job_id in stored:
+        job = jobs.get_job(store, job_id)
+        news = events.list_events(store, job_id, limit=100_000)
+        ended = [one for one in news if one.data.get("state") in FINAL_STATES]
+        assert job.is_final and len(ended) == 1, (job, ended)
+        assert ended[0] is news[-1] and news[-1].id == job.last_event
+        if job.state == "succeeded":
+            check_whole(store, job)
+        elif job.state == "cancelled":
+            assert job_id in series.asked_to_cancel, job
+        else:
+            assert job.error is not None and job.error.startswith("Failed after 3"), job
+        ends[job.state] += 1
+        ends["attempts"] += job.attempt
+    assert all(error is None for error in checkpoints.find_damaged(store))
+    store.close()
+    return {"posted": len(series.posted), "jobs": len(stored), **ends}
+
+
+def check_whole(store: Store, job: JobRecord) -> None:
+    """Check the curve, the checkpoints and the result of a counting job.
+
+    A worker that is terminated stores a checkpoint between those of the grid.
+    """
+    value, steps, expected = 1 + job.seed, job.overrides["steps"], {}
+    for step in range(1, steps + 1):
+        value = value * FACTOR % MODULUS
+        expected[step] = value
+    curve = {row.step: row.values["value"] for row in metrics.list_metrics(store, job.id)}
+    assert curve == {step: expected[step] for step in range(GRID, steps + 1, GRID)}
+    made = checkpoints.list_checkpoints(store, job_id=job.id, limit=200).items
+    stored = {one.step: one.sha256 for one in made}
+    assert len(stored) == len(made) and max(stored) == steps
+    assert stored.keys() >= set(range(CHECKPOINT_EVERY, steps + 1, CHECKPOINT_EVERY))
+    for step, sha256 in stored.items():
+        assert step is not None
+        assert checkpoints.read_checkpoint(store, sha256)[1] == expected[step].to_bytes(
+            8, "big"
+        )
+    assert job.result == {"value": value}
+
+
+def campaign(folder: Path, n_kills: int, minutes: float) -> dict[str, Any]:
+    """Run series until there were ``n_kills`` kills or the time is over; returns the report."""
+    progress = folder / "report.json"
+    folder.mkdir(parents=True, exist_ok=True)
+    done: dict[str, Any] = {"series": 0, "kills": {}, "seconds": 0.0}
+    if progress.exists():
+        done = json.loads(progress.read_text())
+    deadline = time.monotonic() + 60.0 * minutes
+    while (left := n_kills - sum(done["kills"].values())) > 0 and time.monotonic() < deadline:
+        started, number = time.monotonic(), int(done["series"])
+        here = folder / f"series-{number}-{os.getpid()}"
+        here.mkdir()
+        url = f"sqlite:///{here}/tandem.db"
+        found = run_series(url, here, min(left, SERIES), number)
+        done["kills"] = dict(Counter(done["kills"]) + Counter(found.pop("kills")))
+        for name, count in found.items():
+            done[name] = done.get(name, 0) + count
+        done["series"] = number + 1
+        done["seconds"] = round(done["seconds"] + time.monotonic() - started, 1)
+        part = progress.with_suffix(".part")
+        part.write_text(json.dumps(done, indent=1))
+        part.replace(progress)
+        print(json.dumps(done), flush=True)
+    return done
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--kills", type=int, default=1000)
+    parser.add_argument("--minutes", type=float, default=120.0)
+    options = parser.parse_args()
+    campaign(options.folder, options.kills, options.minutes)
+
+
+if __name__ == "__main__":
+    main()
