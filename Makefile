@@ -60,7 +60,7 @@ test-browser: $(VENV)/dev.stamp ## the page in a real Chromium
 	@$(PY) -m pytest -m browser
 
 test-postgres: $(VENV)/dev.stamp ## store and supervisor on a PostgreSQL server of the tests
-	@$(PY) -m pytest -m 'postgres and not slow' tests/store tests/jobs
+	@$(PY) -m pytest -m 'postgres and not slow' $(SIDE_BY_SIDE) tests/store tests/jobs
 
 test-slow: $(VENV)/dev.stamp ## tests that train
 	@$(PY) -m pytest -m slow

@@ -71,6 +71,9 @@ _PRAGMAS = (
 
 
 _FULL = ("disk is full", "no space left", "disk full", "quota exceeded")
+_NO_RIGHTS = "42501"
+_LOST = ("25P03", "25006")
+"""SQLSTATE of a transaction that was ended in a pause, and of a write to a replica."""
 _DAMAGED = ("malformed", "not a database")
 
 
@@ -90,7 +93,7 @@ class Store:
             self.engine = _create_engine(self._url)
         except (NoSuchModuleError, ModuleNotFoundError) as error:
             rule = (
-                f"needs a driver that is not installed ({error}): pip install tandem[postgres]"
+                f"needs a driver that is not installed ({error}): install the extra 'postgres'"
             )
             raise InvalidInput("database_url", self.shown_url, rule) from error
         self._fence: Callable[[sa.Connection], object] | None = None
@@ -185,7 +188,11 @@ class Store:
         if isinstance(error, DataError) and "NUL" in reason:
             rule = "must not contain the character NUL, which PostgreSQL cannot store"
             return InvalidInput("text", "\\0", rule)
-        lost = error.connection_invalidated or "idle-in-transaction" in reason
+        sqlstate = getattr(error.orig, "sqlstate", None)
+        if sqlstate == _NO_RIGHTS:
+            rule = f"must name the owner of the database ({reason})"
+            return InvalidInput("database_url", self.shown_url, rule)
+        lost = error.connection_invalidated or sqlstate in _LOST
         if lost or isinstance(error, OperationalError):
             return StorageUnavailable(self.shown_url, reason)
         return None

@@ -5,7 +5,6 @@ from pathlib import Path
 import pytest
 import sqlalchemy as sa
 from sqlalchemy import event
-from sqlalchemy.exc import DBAPIError
 
 from app.errors import InvalidInput, StorageFull, StorageUnavailable
 from app.store import attempts, completion, jobs, metrics
@@ -54,6 +53,7 @@ def test_sqlite_is_durable_and_checks_references(store: Store) -> None:
     [
         ("nonsense", "must be a database URL"),
         ("mysql://localhost/x", "must name a database that Tandem knows"),
+        ("postgresql+pg8000://host/x", "driver that is not installed.*the extra 'postgres'"),
         ("sqlite://", "must name a file"),
         ("sqlite:///:memory:", "must name a file"),
         ("sqlite:////no/such/folder/x.db", "there is no /no/such/folder"),
@@ -165,7 +165,7 @@ def test_reader_sees_one_state_and_writes_nothing(store: Store) -> None:
         before = connection.execute(count).scalar()
         jobs.create_job(store, NewJob(kind="count", spec={}))
         assert connection.execute(count).scalar() == before
-    with pytest.raises(DBAPIError, match="read-only"), store.reading() as connection:
+    with pytest.raises(StorageUnavailable, match="read-only"), store.reading() as connection:
         connection.execute(sa.text("DELETE FROM jobs"))
 
 
@@ -202,6 +202,16 @@ def test_paused_writer_loses_its_transaction_to_the_next(
             jobs.create_job(store, NewJob(kind="count", spec={}))
             connection.execute(sa.text("SELECT 1"))
     paused.close()
+
+
+@POSTGRESQL_ONLY
+def test_user_without_rights_is_named(store: Store, postgresql: PostgresqlServer) -> None:
+    postgresql.execute("DROP ROLE IF EXISTS guest")
+    postgresql.execute("CREATE ROLE guest LOGIN")
+    guest = Store(store.url.replace("tandem@", "guest@"))
+    with pytest.raises(InvalidInput, match=r"guest@.* must name the owner of the database"):
+        jobs.list_jobs(guest)
+    guest.close()
 
 
 @POSTGRESQL_ONLY
