@@ -9,6 +9,8 @@ executor           Executors of attempts: the interface, and one local process p
 import_process     Import of a file in its own process: ``python -m jobs.import_process``
 recording_catalog  Stored recordings by name: files in, runs of the 18-DoF human model out
 recording_format   The stored form of a recording
+resume_files       Files that trainings need to resume: the transitions of their replay
+                   memories
 retention          Retention of ended jobs: how many are kept, and what is removed with a job
 run                Entry point of a job's process: ``python -m jobs.run --job ID --attempt N``
 spec               Job specs: the body of ``POST /v1/jobs``, stored unchanged with the job

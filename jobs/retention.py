@@ -7,13 +7,14 @@ from pathlib import Path
 
 from app.store import retention
 from app.store.engine import Store
+from jobs import resume_files
 
 logger = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Retention:
-    """Removes ended jobs with their output."""
+    """Removes ended jobs with their output and their files to resume from."""
 
     store: Store
     """The database."""
@@ -35,7 +36,7 @@ class Retention:
             StorageFull: No room is left.
         """
         removed = retention.delete_job(self.store, job_id, self.acting())
-        self._remove_log(job_id)
+        self._remove_files(job_id)
         return removed
 
     def apply(self) -> None:
@@ -48,7 +49,8 @@ class Retention:
         )
         for job_id in gone:
             logger.info("job %s is deleted: the newest %d are kept", job_id, self.keep_jobs)
-            self._remove_log(job_id)
+            self._remove_files(job_id)
 
-    def _remove_log(self, job_id: str) -> None:
+    def _remove_files(self, job_id: str) -> None:
         (self.logs / f"{job_id}.log").unlink(missing_ok=True)
+        resume_files.remove(resume_files.folder_of(self.logs.parent, job_id))

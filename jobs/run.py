@@ -4,23 +4,30 @@ Executors start it. Settings come from the environment, the spec from the job's 
 only module of ``jobs`` that imports learning libraries.
 """
 
+import logging
 import sys
 from collections.abc import Mapping
 from dataclasses import asdict
+from functools import partial
 from typing import Any
 
 import torch
 
+from app.errors import CheckpointMismatch, Damaged, InvalidInput
 from app.policies.checkpoints import checkpoint as formats
 from app.policies.checkpoints.checkpoint import Checkpoint
 from app.policies.configs import presets
 from app.policies.evaluation.registry import evaluate as run_protocol
 from app.policies.evaluation.rows import Row
+from app.policies.training import state as states
+from app.policies.training.memory_files import MemoryFiles
 from app.policies.training.progress import Progress
+from app.policies.training.state import TrainingState
 from app.policies.training.train import train as train_policy
 from app.settings import load_settings
 from app.store.engine import Store
 from app.store.records import NewCheckpoint, ResumeState
+from jobs import resume_files
 from jobs.attempt import main
 from jobs.cell_catalog import CellCatalog
 from jobs.checkpoints import read_sound
@@ -28,13 +35,18 @@ from jobs.recording_catalog import RecordingCatalog
 from jobs.spec import EvaluateSpec, parse_spec
 from jobs.worker import JobWorker, Runner
 
+logger = logging.getLogger(__name__)
+
 
 def train(worker: JobWorker) -> dict[str, Any]:
     """Train the job's preset, from the start or from the last checkpoint."""
     job = worker.job
     assert job.preset is not None
-    state = worker.resume()
-    resume = None if state is None else formats.load(dict(state.manifest), state.tensors)
+    folder = resume_files.folder_of(load_settings().data, job.id)
+    worker.after_success = partial(resume_files.remove, folder)
+    memory = MemoryFiles(folder, worker.wait_to)
+    state = worker.resume(partial(_usable, memory))
+    resume = None if state is None else states.load(dict(state.manifest), state.tensors)
 
     def on_progress(progress: Progress) -> None:
         values = asdict(progress)
@@ -43,7 +55,8 @@ def train(worker: JobWorker) -> dict[str, Any]:
 
     saved: list[str] = []
 
-    def on_checkpoint(step: int, policy: Checkpoint, state: Checkpoint) -> None:
+    def on_checkpoint(step: int, policy: Checkpoint, state: TrainingState | None) -> None:
+        assert state is not None
         resume = ResumeState(step=step, manifest=state.manifest, tensors=state.tensors)
         worker.record_checkpoint(step, _new(policy), resume)
         saved.append(policy.sha256)
@@ -52,6 +65,7 @@ def train(worker: JobWorker) -> dict[str, Any]:
     result = train_policy(
         preset,
         seed=job.seed,
+        memory=memory,
         resume=resume,
         on_progress=on_progress,
         on_checkpoint=on_checkpoint,
@@ -62,6 +76,17 @@ def train(worker: JobWorker) -> dict[str, Any]:
         worker.record_checkpoint(result.step, _new(result.checkpoint), None)
         saved.append(result.checkpoint.sha256)
     return {"checkpoint": saved[-1], "step": result.step}
+
+
+def _usable(memory: MemoryFiles, stored: ResumeState) -> bool:
+    """Return whether a state is of this program's format and its files are undamaged."""
+    try:
+        state = states.load(dict(stored.manifest), stored.tensors)
+        memory.check(state.manifest["memory"])
+    except (CheckpointMismatch, Damaged, InvalidInput) as error:
+        logger.warning("the state at step %d cannot be used: %s", stored.step, error)
+        return False
+    return True
 
 
 def _new(policy: Checkpoint) -> NewCheckpoint:

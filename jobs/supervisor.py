@@ -38,6 +38,7 @@ from app.store.migrate import migrate
 from app.store.records import Claim
 from app.store.schema import check_schema
 from jobs.executor import Executor, Exit, Handle, LocalProcess
+from jobs.resume_files import remove_unneeded
 from jobs.retention import Retention
 
 logger = logging.getLogger(__name__)
@@ -180,6 +181,7 @@ class Supervisor:
         self._guarded(self._queue_orphans)  # where it fails, the thread repeats it
 
     def _run(self) -> None:
+        self._guarded(lambda: remove_unneeded(self._store, self._data_dir))
         while not self._stopping.is_set():
             if self._holds_lease:
                 self._guarded(self._lease.renew)
@@ -283,6 +285,7 @@ class Supervisor:
                 del self._workers[claim]
                 if self._retention is not None:
                     self._retention.apply()
+                remove_unneeded(self._store, self._data_dir)
 
     def _settle(self, claim: Claim, ended: Exit) -> None:
         """Record the end of an attempt, if its worker has not."""

@@ -63,10 +63,21 @@ class JobWorker:
         self._lost = threading.Event()
         self._stop_seen = False
         self._waiting: str | None = None
+        self.after_success: Callable[[], None] = lambda: None
+        """Called once the job has succeeded, to remove what only its attempts need."""
 
-    def resume(self) -> ResumeState | None:
-        """Return the state to resume from; None for a new start."""
-        return attempts.load_resume(self.store, self._claim.job_id)
+    def resume(
+        self, usable: Callable[[ResumeState], bool] = lambda _: True
+    ) -> ResumeState | None:
+        """Return the state to resume from; None for a new start.
+
+        Args:
+            usable: Whether what a state refers to is there, such as its files.
+        """
+        found = attempts.load_resume(self.store, self._claim.job_id, usable)
+        if self.job.step != (0 if found is None else found.step):
+            attempts.resume_earlier(self.store, self._claim, found)
+        return found
 
     def record_progress(
         self, step: int, values: Mapping[str, float | None], *, total_steps: int | None = None
@@ -85,7 +96,7 @@ class JobWorker:
                 self.store, self._claim, step, values, total_steps=total_steps
             )
 
-        self._wait_to(write)
+        self.wait_to(write)
 
     def record_checkpoint(
         self, step: int, policy: NewCheckpoint, resume: ResumeState | None
@@ -96,7 +107,7 @@ class JobWorker:
             StaleAttempt: The attempt no longer holds the job.
             StorageFull: No room is left, and the runner must stop.
         """
-        self._wait_to(
+        self.wait_to(
             lambda: attempts.record_checkpoint(self.store, self._claim, step, policy, resume)
         )
 
@@ -137,7 +148,7 @@ class JobWorker:
         return 0
 
     def _settle(self, result: Mapping[str, Any] | None) -> None:
-        self._wait_to(lambda: self._record_end(result))
+        self.wait_to(lambda: self._record_end(result))
 
     def _record_end(self, result: Mapping[str, Any] | None) -> None:
         cancelled = fencing.peek(self.store, self._claim).cancel_requested
@@ -149,6 +160,7 @@ class JobWorker:
             logger.info("interrupted: the job resumes with the next attempt")
         else:
             completion.finish(self.store, self._claim, result=result)
+            self.after_success()
             logger.info("succeeded")
 
     def _fail(self, message: str) -> int:
@@ -165,8 +177,13 @@ class JobWorker:
         rows = metrics.list_metrics(self.store, self._claim.job_id, after_step=step - 1)
         return any(row.step == step for row in rows)
 
-    def _wait_to(self, write: Callable[[], None]) -> None:
-        """Write; where the database takes no writes, repeat it until the runner must stop."""
+    def wait_to(self, write: Callable[[], None]) -> None:
+        """Write; where database or disk take no writes, repeat it until the runner must stop.
+
+        Raises:
+            StorageFull: No room is left, and the runner must stop.
+            StorageUnavailable: The same for a database that does not answer.
+        """
         while True:
             try:
                 write()

@@ -2,21 +2,32 @@
 
 import json
 import logging
-from collections.abc import Sequence
+import signal
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import asdict
 from pathlib import Path
+from threading import Event
+from types import FrameType
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from app.cli.options import Json, prepared_settings
 from app.cli.output import print_result
-from app.errors import InvalidInput
+from app.errors import CheckpointMismatch, InvalidInput
 
 if TYPE_CHECKING:
     from app.policies.checkpoints.checkpoint import Checkpoint
+    from app.policies.configs.presets import Preset
     from app.policies.training.progress import Progress
+    from app.policies.training.state import TrainingState
+    from app.sim.cells.cell import Cell
 
 logger = logging.getLogger("app.train")
+
+INTERRUPTED = 130
+"""Exit status of a command that was interrupted."""
 
 
 def train(
@@ -29,34 +40,90 @@ def train(
     output: Annotated[Path, typer.Option(help="Folder of the result.")] = Path(),
     as_json: Json = False,
 ) -> None:
-    """Train a policy in this process, without a server."""
+    """Train a policy in this process, without a server.
+
+    The same command continues an interrupted training, with the same result as without the
+    interruption.
+    """
     settings = prepared_settings()
     import torch
 
     from app.cli.cells import named_cell
     from app.policies.configs import presets
     from app.policies.training import train as training
+    from app.policies.training.state_folder import StateFolder
 
     configuration = presets.resolve(preset, presets.nested(parse_overrides(sets or [])))
     cell = named_cell(configuration.cell, settings)
-    output.mkdir(parents=True, exist_ok=True)
     torch.set_num_threads(1)
-    path = output / "policy.safetensors"
+    path, states = output / "policy.safetensors", StateFolder(output / "resume")
+    resume = states.newest()
+    if resume is not None:
+        require_same(resume, configuration, seed, cell, output)
+        total = configuration.learning.total_steps
+        logger.info("continues at step %d of %d from %s", resume.step, total, output)
+    output.mkdir(parents=True, exist_ok=True)
+    curve = output / "curve.jsonl"
+    cut_curve(curve, 0 if resume is None else resume.step)
 
-    def write(_step: int, policy: "Checkpoint", _resume: "Checkpoint") -> None:
+    def tell(progress: "Progress") -> None:
+        _log_progress(progress)
+        with curve.open("a", encoding="utf-8") as file:
+            file.write(json.dumps(asdict(progress)) + "\n")
+
+    def write(_step: int, policy: "Checkpoint", state: "TrainingState | None") -> None:
         path.write_bytes(policy.tensors)
         path.with_suffix(".json").write_text(json.dumps(policy.manifest, indent=1))
+        if state is not None:
+            states.write(state)
 
-    training.train(
-        configuration,
-        seed=seed,
-        resume=None,
-        on_progress=_log_progress,
-        on_checkpoint=write,
-        should_stop=lambda: False,
-        cell=cell,
-    )
+    with _stopped_by_signals() as stop:
+        result = training.train(
+            configuration,
+            seed=seed,
+            on_progress=tell,
+            on_checkpoint=write,
+            should_stop=stop.is_set,
+            cell=cell,
+            memory=states.memory,
+            resume=resume,
+        )
+    if result.stopped:
+        logger.warning(
+            "interrupted at step %d: the same command continues from %s", result.step, output
+        )
+        raise typer.Exit(INTERRUPTED)
+    states.remove()
     print_result(f"wrote {path}", {"checkpoint": str(path)}, as_json=as_json)
+
+
+def require_same(
+    state: "TrainingState", preset: "Preset", seed: int, cell: "Cell", folder: Path
+) -> None:
+    """Check that an interrupted training in a folder is the one that is asked for.
+
+    Raises:
+        InvalidInput: A field of the configuration, the seed or the cell differs.
+    """
+    from app.policies.training.state import require_origin
+
+    try:
+        require_origin(state, preset, seed, cell)
+    except CheckpointMismatch as error:
+        rule = (
+            f"differs from {error.actual!r} of the interrupted training in {folder}: continue "
+            f"that one with its value, choose another folder by --output, or delete "
+            f"{folder / 'resume'}"
+        )
+        raise InvalidInput(error.field, error.expected, rule) from error
+
+
+def cut_curve(path: Path, step: int) -> None:
+    """Delete the points of a learning curve beyond a step, which are measured again."""
+    if path.exists():
+        lines = path.read_text(encoding="utf-8").splitlines(keepends=True)
+        kept = [line for line in lines if line.endswith("\n")]
+        path.write_text("".join(one for one in kept if json.loads(one)["step"] <= step))
 
 
 def parse_overrides(sets: Sequence[str]) -> dict[str, Any]:
@@ -75,6 +142,29 @@ def parse_overrides(sets: Sequence[str]) -> dict[str, Any]:
         except ValueError:
             overrides[name] = text
     return overrides
+
+
+@contextmanager
+def _stopped_by_signals() -> Iterator[Event]:
+    """Set an event at the first Ctrl-C or SIGTERM; a second one ends the process at once."""
+    stop = Event()
+    known: dict[int, Any] = {}
+
+    def ask(_signal: int, _frame: FrameType | None) -> None:
+        stop.set()
+        logger.warning("stops after this step and writes its state")
+        restore()
+
+    def restore() -> None:
+        for number, handler in known.items():
+            signal.signal(number, handler)
+
+    for one in (signal.SIGINT, signal.SIGTERM):
+        known[one] = signal.signal(one, ask)
+    try:
+        yield stop
+    finally:
+        restore()
 
 
 def _log_progress(progress: "Progress") -> None:

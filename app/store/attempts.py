@@ -5,7 +5,7 @@ Every write is fenced (``app.store.fencing``). ``app.store.completion`` ends att
 
 import logging
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import Any
@@ -172,10 +172,41 @@ def record_checkpoint(
         append_event(connection, claim.job_id, event_id, "checkpoint", data=data, step=step)
 
 
-def load_resume(store: Store, job_id: str) -> ResumeState | None:
-    """Return the newest undamaged resume state of a job; None where there is none."""
+def load_resume(
+    store: Store, job_id: str, usable: Callable[[ResumeState], bool] = lambda _: True
+) -> ResumeState | None:
+    """Return the newest undamaged resume state of a job; None where there is none.
+
+    Args:
+        store: The database.
+        job_id: The job.
+        usable: Whether what a state refers to is there, such as its files.
+    """
     with store.reading() as connection:
-        return _newest_sound(connection, job_id)
+        return next(filter(usable, _sound_states(connection, job_id)), None)
+
+
+def has_resume(store: Store, job_id: str) -> bool:
+    """Return whether a job has a state to resume from, sound or not."""
+    query = sa.select(resume_states.c.step).where(resume_states.c.job_id == job_id)
+    with store.reading() as connection:
+        return connection.execute(query).first() is not None
+
+
+def resume_earlier(store: Store, claim: Claim, state: ResumeState | None) -> None:
+    """Let a claimed attempt start from an earlier state than its claim states.
+
+    The job's points and checkpoints beyond that state are deleted.
+
+    Raises:
+        StaleAttempt: The attempt no longer holds the job.
+    """
+    step = 0 if state is None else state.step
+    with store.writing() as connection:
+        fenced_update(connection, claim, {}, counts=False)
+        _forget_beyond(connection, claim.job_id, -1 if state is None else step)
+        data = {"attempt": claim.attempt, "resumed_from_step": step}
+        change_state(connection, claim.job_id, "running", {"step": step}, data)
 
 
 def running_jobs(store: Store) -> tuple[RunningJob, ...]:
@@ -196,8 +227,13 @@ def running_jobs(store: Store) -> tuple[RunningJob, ...]:
 
 def _forget_beyond_resume(connection: sa.Connection, job_id: str) -> int:
     """Delete the last attempt's writes after its resume state; return the state's step."""
-    found = _newest_sound(connection, job_id)
+    found = next(_sound_states(connection, job_id), None)
     step = -1 if found is None else found.step
+    _forget_beyond(connection, job_id, step)
+    return step
+
+
+def _forget_beyond(connection: sa.Connection, job_id: str, step: int) -> None:
     beyond = sa.and_(resume_states.c.job_id == job_id, resume_states.c.step > step)
     connection.execute(sa.delete(resume_states).where(beyond))
     connection.execute(
@@ -205,7 +241,6 @@ def _forget_beyond_resume(connection: sa.Connection, job_id: str) -> int:
     )
     connection.execute(sa.delete(events).where(events.c.job_id == job_id, events.c.step > step))
     drop_job_checkpoints(connection, job_id, beyond=step)
-    return step
 
 
 def _replace_resume(connection: sa.Connection, job_id: str, resume: ResumeState) -> None:
@@ -226,14 +261,15 @@ def _replace_resume(connection: sa.Connection, job_id: str, resume: ResumeState)
     connection.execute(sa.insert(resume_states).values(values))
 
 
-def _newest_sound(connection: sa.Connection, job_id: str) -> ResumeState | None:
+def _sound_states(connection: sa.Connection, job_id: str) -> Iterator[ResumeState]:
+    """Yield the undamaged resume states of a job, newest first."""
     mine = sa.select(resume_states).where(resume_states.c.job_id == job_id)
     for row in connection.execute(mine.order_by(resume_states.c.step.desc())):
         if has_digest(row.digest, {"manifest": row.manifest}, row.tensors):
-            return ResumeState(step=row.step, manifest=row.manifest, tensors=row.tensors)
+            yield ResumeState(step=row.step, manifest=row.manifest, tensors=row.tensors)
+            continue
         logger.warning(
             "job %s: its state at step %d is damaged, it resumes from an earlier one",
             job_id,
             row.step,
         )
-    return None

@@ -43,7 +43,7 @@ def ours(seed: int) -> tuple[ReachPreset, BaseAlgorithm]:
     """Return the model that the service trains, and its preset."""
     preset = presets.resolve(PRESET, {})
     assert isinstance(preset, ReachPreset)
-    run, _ = reach_training.start(preset, seed, None, load_cell(preset.cell))
+    run, _ = reach_training.start(preset, seed, load_cell(preset.cell))
     return preset, run.model
 
 

@@ -35,7 +35,7 @@ def ours(seed: int) -> tuple[SortingPreset, BaseAlgorithm]:
     """Return the model that the service trains, and its preset."""
     preset = presets.resolve(PRESET, {})
     assert isinstance(preset, SortingPreset)
-    return preset, sorting_training.start(preset, seed, None, load_cell(preset.cell))[1]
+    return preset, sorting_training.start(preset, seed, load_cell(preset.cell))[1]
 
 
 def main() -> None:

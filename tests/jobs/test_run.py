@@ -10,9 +10,9 @@ import pytest
 from app.policies.checkpoints import pretrained
 from app.policies.checkpoints.trained_cell import is_for
 from app.policies.configs.presets import nested
-from app.store import attempts, checkpoints, jobs, metrics
+from app.store import attempts, checkpoints, events, jobs, metrics
 from app.store.engine import Store
-from app.store.records import NewCheckpoint
+from app.store.records import CheckpointRecord, NewCheckpoint
 from jobs.cell_catalog import CellCatalog
 from jobs.recording_catalog import RecordingCatalog
 from jobs.spec import parse_spec
@@ -65,6 +65,55 @@ def test_training_stores_its_curve_and_policies(store: Store) -> None:
 
 @pytest.mark.usefixtures("supervisor")
 @SQLITE_ONLY
+def test_killed_training_ends_with_the_checkpoints_of_one_that_was_not(
+    store: Store, tmp_path: Path
+) -> None:
+    fields: dict[str, float | str] = {"learning.total_steps": 4096}
+    whole = wait_until_final(store, train(store, **fields))
+    killed_id = train(store, **fields)
+    wait_for(store, killed_id, lambda job: job.step >= 640)
+    (pid,) = worker_pids(os.getpid())
+    os.kill(pid, signal.SIGKILL)
+    assert any((tmp_path / "resume" / killed_id).iterdir())
+    killed = wait_until_final(store, killed_id)
+    assert (killed.state, killed.attempt) == ("succeeded", 2)
+    assert killed.result == whole.result
+    ids = [
+        [(one.step, one.sha256) for one in checkpoints_of(store, job.id)]
+        for job in (whole, killed)
+    ]
+    assert ids[0] == ids[1] and len(ids[0]) == 8
+    assert not (tmp_path / "resume" / killed_id).exists()
+
+
+def checkpoints_of(store: Store, job_id: str) -> tuple[CheckpointRecord, ...]:
+    return checkpoints.list_checkpoints(store, job_id=job_id).items
+
+
+@pytest.mark.usefixtures("supervisor")
+@SQLITE_ONLY
+def test_training_with_damaged_files_goes_on_from_an_earlier_state(
+    store: Store, tmp_path: Path
+) -> None:
+    job_id = train(store, **{"learning.total_steps": 4096})
+    wait_for(store, job_id, lambda job: job.step >= 1152)
+    (pid,) = worker_pids(os.getpid())
+    os.kill(pid, signal.SIGSTOP)
+    newest = attempts.load_resume(store, job_id)
+    assert newest is not None
+    last = newest.manifest["memory"][-1]["sha256"]
+    (tmp_path / "resume" / job_id / f"{last}.safetensors").write_bytes(b"torn")
+    os.kill(pid, signal.SIGKILL)
+    job = wait_until_final(store, job_id)
+    assert (job.state, job.error) == ("succeeded", None)
+    assert [m.step for m in metrics.list_metrics(store, job_id)] == list(range(128, 4097, 128))
+    resumed = [e.data.get("resumed_from_step") for e in events.list_events(store, job_id)]
+    assert newest.step - 512 in resumed
+    assert [c.step for c in checkpoints_of(store, job_id)] == list(range(4096, 0, -512))
+
+
+@pytest.mark.usefixtures("supervisor")
+@SQLITE_ONLY
 def test_training_in_a_cell_of_one_s_own_gives_a_policy_of_that_cell(store: Store) -> None:
     CellCatalog(store).add(workshop.cell())
     job = wait_until_final(
@@ -88,7 +137,7 @@ def test_training_in_a_cell_that_is_gone_fails_by_name(store: Store) -> None:
 @pytest.mark.usefixtures("supervisor")
 @SQLITE_ONLY
 def test_killed_training_goes_on_and_its_policy_can_be_evaluated(store: Store) -> None:
-    job_id = train(store, total_steps=8192)
+    job_id = train(store, **{"learning.total_steps": 8192})
     wait_for(store, job_id, lambda job: job.step >= 1152)
     (pid,) = worker_pids(os.getpid())
     os.kill(pid, signal.SIGKILL)

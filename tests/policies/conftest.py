@@ -5,6 +5,7 @@ import pytest
 from app.policies.configs import presets
 from app.policies.configs.pick import PickPreset
 from app.policies.configs.presets import Preset
+from app.policies.training.memory_files import MemoryFiles
 from app.policies.training.progress import Progress
 from app.policies.training.train import train
 
@@ -33,15 +34,16 @@ def preset_of(name: str, *fields: dict[str, object]) -> Preset:
 class Recorder:
     """Keeps what a training reports; stops it at a step if asked to."""
 
-    def __init__(self, stop_at: int | None = None) -> None:
+    def __init__(self, stop_at: int | None = None, memory: MemoryFiles | None = None) -> None:
         self.progress: list[Progress] = []
         self.checkpoints = []
-        self._stop_at = stop_at
+        self._stop_at, self._memory = stop_at, memory
 
     def run(self, preset: Preset, resume=None, seed: int = 3):
         return train(
             preset,
             seed=seed,
+            memory=self._memory,
             resume=resume,
             on_progress=self.progress.append,
             on_checkpoint=lambda step, policy, state: self.checkpoints.append(

@@ -139,6 +139,29 @@ def test_resume_state_is_replaced_by_each_checkpoint(store: Store, claim: Claim)
     assert attempts.load_resume(store, claim.job_id) == resume(20, b"second")
 
 
+def test_attempt_may_start_from_an_earlier_state_than_its_claim(
+    store: Store, claim: Claim
+) -> None:
+    for step in (10, 20):
+        record(store, claim, step - 5, step)
+        attempts.record_checkpoint(store, claim, step, policy(bytes([step])), resume(step))
+    second = claim_again(store)
+    assert jobs.get_job(store, claim.job_id).step == 20
+    earlier = attempts.load_resume(store, claim.job_id, lambda state: state.step < 20)
+    assert earlier == resume(10)
+    attempts.resume_earlier(store, second, earlier)
+    job, last = jobs.get_job(store, claim.job_id), events.list_events(store, claim.job_id)[-1]
+    assert (job.state, job.step, curve(store, claim)) == ("running", 10, [5, 10])
+    assert (last.kind, last.data["resumed_from_step"]) == ("state", 10)
+    assert [c.step for c in checkpoints.list_checkpoints(store).items] == [10]
+    record(store, second, 15)
+    attempts.resume_earlier(store, second, None)
+    assert (curve(store, claim), attempts.has_resume(store, claim.job_id)) == ([], False)
+    claim_again(store)
+    with pytest.raises(StaleAttempt):
+        attempts.resume_earlier(store, second, None)
+
+
 def test_checkpoint_of_the_same_step_replaces_the_earlier(store: Store, claim: Claim) -> None:
     attempts.record_checkpoint(store, claim, 10, policy(b"a"), resume(10))
     attempts.record_checkpoint(store, claim, 20, policy(b"b"), resume(20))

@@ -15,12 +15,14 @@ from pathlib import Path
 
 import torch
 
-from app.cli.train import parse_overrides
+from app.cli.train import cut_curve, parse_overrides
 from app.policies.checkpoints import checkpoint as formats
 from app.policies.checkpoints.checkpoint import Checkpoint
 from app.policies.configs import presets
 from app.policies.configs.presets import Preset
 from app.policies.training.progress import Progress
+from app.policies.training.state import TrainingState
+from app.policies.training.state_folder import StateFolder
 from app.policies.training.train import train
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -42,6 +44,9 @@ def main() -> None:
 def record(preset: Preset, seed: int, folder: Path) -> None:
     """Train a preset or resume; store curve and policies in a folder."""
     folder.mkdir(parents=True, exist_ok=True)
+    states = StateFolder(folder / "resume")
+    resume = states.newest()
+    cut_curve(folder / "curve.jsonl", 0 if resume is None else resume.step)
 
     def on_progress(point: Progress) -> None:
         with (folder / "curve.jsonl").open("a", encoding="utf-8") as file:
@@ -49,18 +54,21 @@ def record(preset: Preset, seed: int, folder: Path) -> None:
                 json.dumps({"preset": preset.name, "seed": seed, **asdict(point)}) + "\n"
             )
 
-    def on_checkpoint(step: int, policy: Checkpoint, state: Checkpoint) -> None:
+    def on_checkpoint(step: int, policy: Checkpoint, state: TrainingState | None) -> None:
         write(policy, folder / f"step-{step:09d}")
-        write(state, folder / "resume")
+        if state is not None:
+            states.write(state)
 
     train(
         preset,
         seed=seed,
-        resume=read_if_there(folder / "resume"),
         on_progress=on_progress,
         on_checkpoint=on_checkpoint,
         should_stop=lambda: False,
+        memory=states.memory,
+        resume=resume,
     )
+    states.remove()
 
 
 def write(checkpoint: Checkpoint, path: Path) -> None:

@@ -25,11 +25,12 @@ from torch import Tensor
 from torch.nn import functional
 
 from app.policies.algorithms.prioritized_replay import PrioritisedReplay
-from app.policies.algorithms.vecenv import BatchVecEnv
+from app.policies.algorithms.vecenv import COUNTERS, BatchVecEnv
 from app.policies.configs.sorting import SortingPreset
 from app.policies.networks.sorting_q import NETWORKS, NEVER, PrintedNetwork, SharedNetwork
 from app.sim.sorting.batch import SortingBatch
 from app.sim.sorting.state import SortingShape
+from app.state_dict import Stateful
 
 Expert = Callable[[NDArray[np.uint8]], NDArray[np.bool_]]
 """Marks the best moves of observations, shape (n, obs_size): shape (n, n_actions)."""
@@ -71,7 +72,7 @@ class SortingDQNPolicy(DQNPolicy):
         return made.to(self.device)
 
 
-class SortingDQN(DQN):
+class SortingDQN(DQN, Stateful):
     """Double, dueling, prioritised, masked DQN with optional expert labels.
 
     Args:
@@ -81,6 +82,8 @@ class SortingDQN(DQN):
         seed: Seed of networks, replay and exploration.
         expert: Marks optimal moves; needed where the preset uses labels.
     """
+
+    STATE = (*COUNTERS, "exploration_rate", "_random")
 
     def __init__(
         self,

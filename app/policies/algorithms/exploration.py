@@ -11,8 +11,8 @@ Ornstein-Uhlenbeck process (table 4.2), which is here too.
 """
 
 import math
-from collections.abc import Callable
-from typing import Protocol
+from collections.abc import Callable, Mapping
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,7 @@ from app.policies.configs.td3 import NoiseExploration
 from app.sim.core.arrays import Vec
 from app.sim.pick.batch import PickBatch
 from app.sim.scenario.kernels.person_observation import BASE_GAIN
+from app.state_dict import State, Stateful
 
 HOLD, HOME, NEARBY, ELSEWHERE = range(4)
 STRAIGHT_ON = 0.5
@@ -39,8 +40,14 @@ class Exploration(Protocol):
     def apply(self, act: NDArray[np.float32]) -> NDArray[np.float32]:
         """Return perturbed actions, shape (n_envs, n_act)."""
 
+    def state_dict(self) -> State:
+        """Return a copy of the state."""
 
-class PerEnvAR1Noise:
+    def load_state_dict(self, state: Mapping[str, Any]) -> None:
+        """Restore a state."""
+
+
+class PerEnvAR1Noise(Stateful):
     """AR(1) noise whose scale grows with the number of the environment.
 
     Args:
@@ -49,6 +56,8 @@ class PerEnvAR1Noise:
         config: Largest scale, correlation time and greedy share.
         rng: Random numbers.
     """
+
+    STATE = ("_noise", "_rng")
 
     def __init__(
         self,
@@ -72,7 +81,7 @@ class PerEnvAR1Noise:
         return np.clip(act + self._noise, -1.0, 1.0).astype(np.float32)
 
 
-class OUNoise:
+class OUNoise(Stateful):
     """Ornstein-Uhlenbeck noise: ``x += -theta x dt + sigma sqrt(dt) N(0, 1)`` per period.
 
     The process starts at 0 with every episode. The time step ``dt`` is one of the process, not
@@ -85,6 +94,7 @@ class OUNoise:
         rng: Random numbers.
     """
 
+    STATE = ("_noise", "_rng")
     n_greedy = 0
 
     def __init__(
@@ -107,7 +117,7 @@ class OUNoise:
         return np.clip(act + self._noise, -1.0, 1.0).astype(np.float32)
 
 
-class OptionExploration:
+class OptionExploration(Stateful):
     """AR(1) noise, and temporally extended options in every second noisy environment.
 
     Args:
@@ -117,6 +127,8 @@ class OptionExploration:
         rate: Probability per control cycle that an option starts.
         rng: Random numbers.
     """
+
+    STATE = ("_noise", "_rng", "_left", "_goal")
 
     def __init__(
         self,

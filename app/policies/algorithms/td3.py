@@ -24,10 +24,11 @@ from torch import Tensor, nn
 
 from app.policies.algorithms.exploration import Exploration
 from app.policies.algorithms.prioritized_replay import Ints, PrioritisedReplay
-from app.policies.algorithms.vecenv import BatchVecEnv
+from app.policies.algorithms.vecenv import COUNTERS, BatchVecEnv
 from app.policies.configs.td3 import TD3Learning
 from app.policies.networks.actor_critic import Critics
 from app.policies.networks.ddpg import RunningNormalisation
+from app.state_dict import Stateful
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -108,7 +109,7 @@ class OwnPolicy(TD3Policy):
         return _SB3Critic(**kwargs, networks=self._networks).to(self.device)
 
 
-class BatchTD3(TD3):
+class BatchTD3(TD3, Stateful):
     """TD3 with exploration per environment, a frozen start and an averaged actor.
 
     Args:
@@ -118,6 +119,8 @@ class BatchTD3(TD3):
         exploration: Perturbs the actions.
         networks: Factories of actor and critics.
     """
+
+    STATE = (*COUNTERS, "exploration")
 
     def __init__(
         self,

@@ -13,14 +13,20 @@ from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import VecEnv
 
 from app.sim.envs.tasks import SteppedTask
+from app.state_dict import Stateful
+
+COUNTERS = ("num_timesteps", "_n_updates", "_episode_num", "_current_progress_remaining")
+"""Counters of Stable-Baselines3's algorithms."""
 
 
-class BatchVecEnv(VecEnv):
+class BatchVecEnv(VecEnv, Stateful):
     """The environments of one batch.
 
     Args:
         task: The batch with its spaces.
     """
+
+    STATE = ("batch", "ended")
 
     def __init__(self, task: SteppedTask) -> None:
         self._task = task

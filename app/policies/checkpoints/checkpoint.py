@@ -1,9 +1,9 @@
 """Checkpoint format: tensors as safetensors, everything else as a JSON manifest.
 
-Loading never executes code, because nothing is unpickled. The kind ``policy`` contains actor
-and critics; ``resume`` also contains target networks and optimiser moments, to continue an
-interrupted training. The id of a checkpoint is the SHA-256 of its canonical manifest followed
-by its tensors.
+Loading never executes code, because nothing is unpickled. The id of a checkpoint is the SHA-256
+of its canonical manifest followed by its tensors. Both state what was learned and from what
+(configuration, seed, cell, step, commits and versions), nothing that differs between equal
+trainings: equal trainings give equal ids.
 """
 
 import math
@@ -24,8 +24,6 @@ from app.errors import CheckpointMismatch, InvalidInput
 FORMAT = "tandem-checkpoint/1"
 MAX_BYTES = 16 * 1024 * 1024
 """Maximum size of the tensors of a policy [bytes], stored in one database row."""
-MAX_RESUME_BYTES = 4 * MAX_BYTES
-"""Maximum size for ``resume``, with target networks and two moments."""
 CHOOSING, REACHING, SORTING = "choosing tasks", "reaching goals", "sorting"
 """Purposes of policies."""
 REQUIRED = {
@@ -96,14 +94,13 @@ def load(manifest: object, tensors: bytes) -> Checkpoint:
             )
     if manifest["format"] != FORMAT:
         raise CheckpointMismatch("format", FORMAT, manifest["format"])
-    if manifest["kind"] not in ("policy", "resume"):
-        raise InvalidInput("manifest.kind", manifest["kind"], "unknown", ("policy", "resume"))
+    if manifest["kind"] != "policy":
+        raise InvalidInput("manifest.kind", manifest["kind"], "must be policy")
     if not 1 <= manifest["width"] <= 4096:
         raise InvalidInput("manifest.width", manifest["width"], "must lie in [1, 4096] units")
     _check_ranges(manifest["trained_range"])
-    most = MAX_RESUME_BYTES if manifest["kind"] == "resume" else MAX_BYTES
-    if len(tensors) > most:
-        raise InvalidInput("tensors", len(tensors), f"must not exceed {most} bytes")
+    if len(tensors) > MAX_BYTES:
+        raise InvalidInput("tensors", len(tensors), f"must not exceed {MAX_BYTES} bytes")
     return Checkpoint(manifest, bytes(tensors))
 
 

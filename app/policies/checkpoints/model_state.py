@@ -40,7 +40,7 @@ def restore(
         state: dict[int, dict[str, torch.Tensor]] = {}
         for key, tensor in under(arrays, name).items():
             index, moment = key.split(".", 1)
-            state.setdefault(int(index), {})[moment] = tensor
+            state.setdefault(int(index), {})[moment] = tensor.clone()
         optimizer.load_state_dict({**optimizer.state_dict(), "state": state})
 
 

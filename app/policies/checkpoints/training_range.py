@@ -6,19 +6,24 @@ from typing import Any
 import numpy as np
 
 from app.sim.core.arrays import Vec
+from app.state_dict import State
 
 
 class Ranges:
-    """Minimum and maximum of every state variable in training.
+    """Minimum and maximum of every state variable in training."""
 
-    Args:
-        known: Ranges of an earlier attempt's manifest; None without one.
-    """
+    def __init__(self) -> None:
+        self._low: dict[str, Vec] = {}
+        self._high: dict[str, Vec] = {}
 
-    def __init__(self, known: Mapping[str, Any] | None) -> None:
-        known = known or {}
-        self._low = {name: np.array(entry["low"]) for name, entry in known.items()}
-        self._high = {name: np.array(entry["high"]) for name, entry in known.items()}
+    def state_dict(self) -> State:
+        """Return the ranges with all digits: minimum and maximum of each variable."""
+        return {name: np.stack([low, self._high[name]]) for name, low in self._low.items()}
+
+    def load_state_dict(self, state: Mapping[str, Any]) -> None:
+        """Restore the ranges."""
+        self._low = {name: one[0].copy() for name, one in state.items()}
+        self._high = {name: one[1].copy() for name, one in state.items()}
 
     def look(self, met: Mapping[str, Vec]) -> None:
         """Extend the ranges by visited states: rows of each variable, shape (n, size)."""
@@ -34,5 +39,5 @@ class Ranges:
                 "low": [round(float(value), 5) for value in self._low[name]],
                 "high": [round(float(value), 5) for value in self._high[name]],
             }
-            for name in self._low
+            for name in sorted(self._low)
         }

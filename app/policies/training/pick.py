@@ -1,5 +1,6 @@
 """Training on the pick scenario: settings, networks, exploration and learning curve."""
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,7 @@ from app.policies.networks.pick import LAYOUTS, actor_of, critics_for
 from app.policies.training.outcome import collect, fit
 from app.policies.training.reporter import Callbacks, Reporter
 from app.policies.training.run import TrainingRun
-from app.policies.training.td3 import TD3Scenario, TrainingMonitor, first_step, start_td3
+from app.policies.training.td3 import TD3Scenario, TrainingMonitor, start_td3
 from app.sim.cells.cell import Cell
 from app.sim.core.arrays import Vec
 from app.sim.envs.tasks import ArmTask
@@ -100,14 +101,11 @@ def batch_of(preset: PickPreset, cell: Cell, n_envs: int, seed: int) -> PickBatc
     return PickBatch(cell, n_envs, seed, settings)
 
 
-def start(
-    preset: PickPreset, seed: int, resume: Checkpoint | None, cell: Cell
-) -> tuple[TrainingRun, TrainingMonitor]:
+def start(preset: PickPreset, seed: int, cell: Cell) -> tuple[TrainingRun, TrainingMonitor]:
     """Return a training; see :func:`~app.policies.training.td3.start_td3`."""
-    first = seed + first_step(resume)
-    batch = batch_of(preset, cell, preset.learning.n_envs, first)
-    batch.set_collision_cost(collision_cost(preset, first_step(resume)))
-    rng, config = np.random.default_rng(first), preset.exploration
+    batch = batch_of(preset, cell, preset.learning.n_envs, seed)
+    batch.set_collision_cost(collision_cost(preset, 0))
+    rng, config = np.random.default_rng(seed), preset.exploration
     noise = PerEnvAR1Noise((batch.n_envs, CONTROLLED), batch.arm.dt, config, rng)
     stations = batch.world.station_q
     scenario = TD3Scenario(
@@ -122,7 +120,7 @@ def start(
         act_size=CONTROLLED,
         visited_states=lambda: visited_states(batch),
     )
-    return start_td3(preset, seed, resume, cell, scenario)
+    return start_td3(preset, seed, cell, scenario)
 
 
 def fit_outcomes(
@@ -175,6 +173,8 @@ class PickReporter(Reporter):
         monitor: Data behind the curve.
     """
 
+    STATE = (*Reporter.STATE, "_returns", "_counts", "_total_return")
+
     def __init__(
         self, run: TrainingRun, callbacks: Callbacks, monitor: TrainingMonitor
     ) -> None:
@@ -185,6 +185,11 @@ class PickReporter(Reporter):
         self._returns = np.zeros(run.preset.learning.n_envs)
         self._counts = np.zeros(len(OUTCOMES), dtype=np.int64)
         self._total_return = 0.0
+
+    def load_state_dict(self, state: Mapping[str, Any]) -> None:
+        """Restore a state and the collision cost of its step."""
+        super().load_state_dict(state)
+        self._batch.set_collision_cost(collision_cost(self._preset, self._attempt.step))
 
     def watch(self, rewards: NDArray[np.floating]) -> None:
         """Count the episodes that ended, and update the training range."""

@@ -14,14 +14,13 @@ from numpy.typing import NDArray
 from app.policies.algorithms.exploration import Exploration, OUNoise, PerEnvAR1Noise
 from app.policies.algorithms.quantiles import QuantileCritics
 from app.policies.algorithms.td3 import Networks
-from app.policies.checkpoints.checkpoint import Checkpoint
 from app.policies.configs.reach import ReachExploration, ReachPreset
 from app.policies.inference.reach_policy import LAYOUTS, PEOPLE_SET
 from app.policies.networks.actor_critic import Critics, PlainActor, ResidualActor
 from app.policies.networks.ddpg import DDPGActor, DDPGCritics, RunningNormalisation
 from app.policies.training.reporter import Callbacks, Reporter
 from app.policies.training.run import TrainingRun
-from app.policies.training.td3 import TD3Scenario, TrainingMonitor, first_step, start_td3
+from app.policies.training.td3 import TD3Scenario, TrainingMonitor, start_td3
 from app.sim.cells.cell import Cell
 from app.sim.core.arrays import Vec
 from app.sim.envs.tasks import ArmTask
@@ -115,27 +114,24 @@ def networks_of(preset: ReachPreset, n_obs: int) -> Networks:
     return Networks(actor=actor, critic=critic, width=width, norm=norm)
 
 
-def start(
-    preset: ReachPreset, seed: int, resume: Checkpoint | None, cell: Cell
-) -> tuple[TrainingRun, TrainingMonitor]:
+def start(preset: ReachPreset, seed: int, cell: Cell) -> tuple[TrainingRun, TrainingMonitor]:
     """Return a training; see :func:`~app.policies.training.td3.start_td3`.
 
     Raises:
         InvalidInput: The cell has no goal region.
     """
-    first = seed + first_step(resume)
-    batch = batch_of(preset, cell, preset.learning.n_envs, first)
+    batch = batch_of(preset, cell, preset.learning.n_envs, seed)
     episode = preset.episode
     ends = episode.observation != "state" or episode.timeout == "terminates"
     scenario = TD3Scenario(
         task=ArmTask(batch, sees_time=ends),
-        exploration=exploration_of(preset.exploration, batch, first),
+        exploration=exploration_of(preset.exploration, batch, seed),
         networks=networks_of(preset, batch.obs_size),
         layout=LAYOUTS[preset.episode.observation],
         act_size=N_ACT,
         visited_states=lambda: visited_states(batch),
     )
-    return start_td3(preset, seed, resume, cell, scenario)
+    return start_td3(preset, seed, cell, scenario)
 
 
 class ReachReporter(Reporter):

@@ -1,17 +1,18 @@
-"""Callback between two steps of a training: learning curve, checkpoints, stop."""
+"""Reports between two steps of a training: learning curve, checkpoints, stop."""
 
 import time
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from stable_baselines3.common.callbacks import BaseCallback
 
 from app.errors import SimulationError
-from app.policies.checkpoints.checkpoint import Checkpoint
 from app.policies.configs.presets import Preset
 from app.policies.training.progress import Progress
+from app.policies.training.run import OnCheckpoint
+from app.state_dict import Stateful
 
 
 class Run(Protocol):
@@ -37,8 +38,8 @@ class Run(Protocol):
     def cpu_s(self) -> float:
         """CPU time so far [s]."""
 
-    def checkpoints(self) -> tuple[Checkpoint, Checkpoint]:
-        """Return the ``policy`` and the ``resume`` checkpoint."""
+    def save(self, on_checkpoint: OnCheckpoint) -> None:
+        """Pass on policy and state."""
 
 
 class Callbacks(NamedTuple):
@@ -46,13 +47,13 @@ class Callbacks(NamedTuple):
 
     on_progress: Callable[[Progress], None]
     """Takes the points of the learning curve."""
-    on_checkpoint: Callable[[int, Checkpoint, Checkpoint], None]
-    """Takes the step, the ``policy`` and the ``resume`` checkpoint."""
+    on_checkpoint: OnCheckpoint
+    """Takes step, policy and state."""
     should_stop: Callable[[], bool]
     """Called after every step of the environments; whether the training stops."""
 
 
-class Reporter(BaseCallback, ABC):
+class Reporter(BaseCallback, Stateful, ABC):
     """Reports every ``progress_steps``; scenarios define the rates.
 
     Args:
@@ -62,9 +63,12 @@ class Reporter(BaseCallback, ABC):
 
     def __init__(self, run: Run, callbacks: Callbacks) -> None:
         super().__init__()
-        self.stopped = False
-        """Whether the training was asked to stop before its end."""
         self._attempt, self._callbacks = run, callbacks
+        self._begin_window()
+
+    def load_state_dict(self, state: Mapping[str, Any]) -> None:
+        """Restore a state; rates per second are measured from now on."""
+        super().load_state_dict(state)
         self._begin_window()
 
     @abstractmethod
@@ -86,14 +90,17 @@ class Reporter(BaseCallback, ABC):
                 f"non-finite reward at step {self.num_timesteps}, seed {self._attempt.seed}"
             )
         self.watch(rewards)
-        step, intervals = self.num_timesteps, self._attempt.preset.learning
+        return True
+
+    def report(self) -> bool:
+        """Report after a step and its updates; return whether the training continues."""
+        step, intervals = self._attempt.step, self._attempt.preset.learning
         if step % intervals.progress_steps == 0:
             self._callbacks.on_progress(self._point(step))
             self._begin_window()
             if step % intervals.checkpoint_steps == 0:
-                self._callbacks.on_checkpoint(step, *self._attempt.checkpoints())
-        self.stopped = self._callbacks.should_stop()
-        return not self.stopped
+                self._attempt.save(self._callbacks.on_checkpoint)
+        return not self._callbacks.should_stop()
 
     def _point(self, step: int) -> Progress:
         wall = max(1e-6, time.monotonic() - self._wall)

@@ -1,25 +1,54 @@
-"""One attempt at a training: its counters and its checkpoints, whatever is trained."""
+"""One attempt at a training: its counters, checkpoints and states, whatever is trained."""
 
+import logging
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
+import numpy as np
 import torch
-from stable_baselines3.common.off_policy_algorithm import OffPolicyAlgorithm
-from stable_baselines3.common.type_aliases import TrainFreq, TrainFrequencyUnit
-from stable_baselines3.common.vec_env import VecEnv
+from stable_baselines3.common.callbacks import BaseCallback
+from stable_baselines3.common.type_aliases import TrainFreq
 
-from app.errors import CheckpointMismatch
+from app.policies.algorithms.dqn import SortingDQN
+from app.policies.algorithms.prioritized_replay import PrioritisedReplay
+from app.policies.algorithms.td3 import BatchTD3
+from app.policies.algorithms.vecenv import BatchVecEnv
 from app.policies.checkpoints import checkpoint as formats
 from app.policies.checkpoints.checkpoint import Checkpoint
-from app.policies.checkpoints.model_state import moments_of, restore, versions, weights_of
-from app.policies.checkpoints.trained_cell import cell_of, manifest_fields
+from app.policies.checkpoints.model_state import versions, weights_of
+from app.policies.checkpoints.trained_cell import manifest_fields
 from app.policies.configs.presets import Preset
+from app.policies.training import state as states
+from app.policies.training.memory_files import MemoryFiles
+from app.policies.training.state import (
+    GlobalGenerators,
+    NetworkState,
+    Priorities,
+    TrainingState,
+)
+from app.provenance import describe
 from app.sim.cells.cell import Cell
+from app.state_dict import State, under
 
-REFILL_STEPS = 51_200
-"""Environment steps that refill the replay memory after an interruption."""
+logger = logging.getLogger(__name__)
+
+OnCheckpoint = Callable[[int, Checkpoint, TrainingState | None], None]
+"""Takes the step, the policy and, where states are kept, the state to resume from."""
+
+
+Algorithm = SortingDQN | BatchTD3
+
+
+class StatePart(Protocol):
+    """Part of a training that changes while it runs."""
+
+    def state_dict(self) -> State:
+        """Return a copy of the state: arrays and JSON values by name."""
+
+    def load_state_dict(self, state: Mapping[str, Any]) -> None:
+        """Restore a state."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,10 +79,6 @@ class TrainingRun:
         model: Stable-Baselines3's algorithm.
         env: The batched scenario.
         parts: What its checkpoints are made of.
-        resume: The last ``resume`` checkpoint of an interrupted attempt.
-
-    Raises:
-        CheckpointMismatch: ``resume`` belongs to another preset, cell or program.
     """
 
     def __init__(
@@ -61,17 +86,27 @@ class TrainingRun:
         preset: Preset,
         seed: int,
         cell: Cell,
-        model: OffPolicyAlgorithm,
-        env: VecEnv,
+        model: Algorithm,
+        env: BatchVecEnv,
         parts: Parts,
-        resume: Checkpoint | None,
     ) -> None:
         self.preset, self.seed, self.cell = preset, seed, cell
         self.model, self._env, self._parts = model, env, parts
         self._cpu_before, self._cpu_start = 0.0, time.process_time()
         self._untimed = 0.0
-        if resume is not None:
-            self._restore(resume)
+        self._commits: list[Any] = []
+        self._files: MemoryFiles | None = None
+        self._saved: Mapping[str, Any] | None = None
+        self.state_parts: dict[str, StatePart] = {
+            "networks": NetworkState({**parts.policy, **parts.targets}, parts.optimizers),
+            "model": model,
+            "env": env,
+            "generators": GlobalGenerators(),
+        }
+        """All that changes in a training besides the transitions of the replay memory, in the
+        order of restoring; scenarios add theirs."""
+        if isinstance(model.replay_buffer, PrioritisedReplay):
+            self.state_parts["memory"] = Priorities(model.replay_buffer)
 
     @property
     def step(self) -> int:
@@ -96,17 +131,47 @@ class TrainingRun:
         """Do not count CPU time that went into measuring, not into training [s]."""
         self._untimed += cpu_s
 
-    def checkpoints(self) -> tuple[Checkpoint, Checkpoint]:
-        """Return the policy and what resuming needs."""
-        parts, manifest = self._parts, self._manifest()
-        arrays = weights_of(parts.policy)
-        policy = formats.pack({**manifest, "kind": "policy"}, arrays)
-        more = weights_of(parts.targets) | moments_of(parts.optimizers)
-        return policy, formats.pack({**manifest, "kind": "resume"}, arrays | more)
+    def keep_states(self, files: MemoryFiles) -> None:
+        """Keep states to resume from; transitions go to files."""
+        self._files = files
 
-    def _manifest(self) -> dict[str, Any]:
-        return {
+    def learn(self, callback: BaseCallback, report: Callable[[], bool]) -> bool:
+        """Train to the end, or until a report stops it; return whether it was stopped.
+
+        Args:
+            callback: Called by Stable-Baselines3 in every step.
+            report: Called after each step and its updates; whether the training continues.
+
+        Deviates: Stable-Baselines3's ``learn`` can only be left before a transition is stored
+        and learned from; this loop reports and ends between two complete steps, so that a
+        state is the same whether the training was interrupted or not.
+        """
+        model, total = self.model, self.preset.learning.total_steps
+        left = total - self.step
+        if left <= 0:
+            return False
+        _, called = model._setup_learn(left, callback, self.step == 0)
+        memory, frequency = model.replay_buffer, model.train_freq
+        assert memory is not None and isinstance(frequency, TrainFreq)
+        while self.step < total:
+            model.collect_rollouts(
+                self._env,
+                called,
+                frequency,
+                memory,
+                learning_starts=model.learning_starts,
+            )
+            if self.step > model.learning_starts:
+                model.train(model.gradient_steps, model.batch_size)
+            if not report():
+                return True
+        return False
+
+    def policy(self) -> Checkpoint:
+        """Return the checkpoint of the present policy."""
+        manifest = {
             "format": formats.FORMAT,
+            "kind": "policy",
             "preset": self.preset.model_dump(),
             "seed": self.seed,
             **manifest_fields(self.cell),
@@ -115,36 +180,60 @@ class TrainingRun:
             "width": self.preset.networks.width,
             "step": self.step,
             "updates": self.updates,
-            "cpu_s": round(self.cpu_s, 1),
             "trained_range": self._parts.trained_range(),
-            "versions": versions(),
+            **self._provenance(),
         }
+        return formats.pack(manifest, weights_of(self._parts.policy))
 
-    def _restore(self, resume: Checkpoint) -> None:
-        manifest, parts = resume.manifest, self._parts
-        if manifest["kind"] != "resume":
-            raise CheckpointMismatch("kind", "resume", manifest["kind"])
-        if manifest["preset"] != self.preset.model_dump():
-            raise CheckpointMismatch("preset", self.preset.model_dump(), manifest["preset"])
-        if cell_of(manifest) != self.cell:
-            raise CheckpointMismatch("cell", self.cell.sha256, cell_of(manifest).sha256)
-        layout = [list(entry) for entry in parts.layout]
-        formats.expect_layout(resume, layout, parts.act_size)
-        restore(resume.arrays(), {**parts.policy, **parts.targets}, parts.optimizers)
-        self.model.num_timesteps = int(manifest["step"])
-        self.model._n_updates = int(manifest["updates"])
-        self._cpu_before = float(manifest.get("cpu_s", 0.0))
+    def save(self, on_checkpoint: OnCheckpoint) -> None:
+        """Pass on the policy and the state; then delete files of earlier states."""
+        state = None if self._files is None else self._state(self._files)
+        on_checkpoint(self.step, self.policy(), state)
+        if self._files is not None and state is not None:
+            self._files.keep([state.manifest, self._saved])
+            self._saved = state.manifest
 
-    def refill(self) -> None:
-        """Fill the replay memory with the restored policy; these steps are not counted."""
-        model, step, learning = self.model, self.step, self.preset.learning
-        _, silent = model._setup_learn(learning.total_steps, None, False)
-        n_steps = max(1, min(REFILL_STEPS, learning.buffer_size) // learning.n_envs)
-        assert model.replay_buffer is not None
-        model.collect_rollouts(
-            self._env,
-            callback=silent,
-            train_freq=TrainFreq(n_steps, TrainFrequencyUnit.STEP),
-            replay_buffer=model.replay_buffer,
-        )
-        model.num_timesteps = step
+    def restore(self, state: TrainingState) -> None:
+        """Continue from a state; :meth:`keep_states` must have been called.
+
+        Raises:
+            CheckpointMismatch: The state belongs to another training or program.
+            Damaged: A file of the replay memory is missing or changed.
+        """
+        states.require_origin(state, self.preset, self.seed, self.cell)
+        manifest, memory = state.manifest, self.model.replay_buffer
+        assert self._files is not None and memory is not None
+        self._files.read(memory, state.step // self._env.num_envs, manifest["memory"])
+        entries = state.entries()
+        for name, part in self.state_parts.items():
+            part.load_state_dict(under(entries, name))
+        self.model._last_obs = entries["last_obs"].copy()
+        self._cpu_before, self._saved = float(manifest["cpu_s"]), manifest
+        self._commits = list(manifest["commits"])
+        if manifest["versions"] != versions() or self._provenance()["commits"] != self._commits:
+            logger.warning(
+                "the training continues with another version of this program or of its "
+                "libraries: its end may differ from that of an uninterrupted training"
+            )
+
+    def _state(self, files: MemoryFiles) -> TrainingState:
+        memory, following = self.model.replay_buffer, self.model._last_obs
+        assert memory is not None and isinstance(following, np.ndarray)
+        entries: State = {"last_obs": following}
+        for name, part in self.state_parts.items():
+            entries |= {f"{name}.{key}": one for key, one in part.state_dict().items()}
+        manifest = {
+            **states.origin(self.preset, self.seed, self.cell),
+            "step": self.step,
+            "cpu_s": self.cpu_s,
+            "memory": files.write(memory, self.step // self._env.num_envs, following),
+            **self._provenance(),
+        }
+        return states.pack(manifest, entries)
+
+    def _provenance(self) -> dict[str, Any]:
+        """Return the commits of this program in all attempts, and versions of libraries."""
+        commit = describe()["commit"]
+        known = commit is None or commit in self._commits
+        commits = self._commits if known else [*self._commits, commit]
+        return {"commits": commits, "versions": versions()}

@@ -5,6 +5,7 @@ in training, the same ones at every point. The CPU time that takes is not counte
 """
 
 import time
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,6 @@ from numpy.typing import NDArray
 
 from app.policies.algorithms.dqn import Expert, SortingDQN
 from app.policies.algorithms.vecenv import BatchVecEnv
-from app.policies.checkpoints.checkpoint import Checkpoint
 from app.policies.configs.sorting import SortingPreset
 from app.policies.networks.sorting_q import layout_of
 from app.policies.training.reporter import Callbacks, Reporter
@@ -32,25 +32,21 @@ FADE_EVERY = 16
 """Steps of all tasks between two looks at the curriculum."""
 
 
-def start(
-    preset: SortingPreset, seed: int, resume: Checkpoint | None, cell: Cell
-) -> tuple[TrainingRun, SortingDQN]:
-    """Return a run of the preset, from the start or from a checkpoint, and its model.
+def start(preset: SortingPreset, seed: int, cell: Cell) -> tuple[TrainingRun, SortingDQN]:
+    """Return a run of the preset and its model.
 
     Args:
         preset: All hyper-parameters.
         seed: Seed of everything random.
-        resume: The last ``resume`` checkpoint of an interrupted attempt.
         cell: Work cell trained in.
 
     Raises:
         InvalidInput: There is nothing to sort in the cell.
     """
-    first = 0 if resume is None else int(resume.manifest["step"])
-    batch = batch_in(cell, preset.learning.n_envs, seed + first, preset.settings(0.0))
+    batch = batch_in(cell, preset.learning.n_envs, seed, preset.settings(0.0))
     env = BatchVecEnv(SortingTask(cell, batch))
     expert = expert_of(batch.shape) if preset.expert.share else None
-    model = SortingDQN(preset, env, batch, seed + first, expert)
+    model = SortingDQN(preset, env, batch, seed, expert)
     parts = Parts(
         policy={"q": model.q_net.q_net},
         targets={"q_target": model.q_net_target.q_net},
@@ -59,7 +55,7 @@ def start(
         act_size=batch.shape.n_actions,
         trained_range=dict,
     )
-    return TrainingRun(preset, seed, cell, model, env, parts, resume), model
+    return TrainingRun(preset, seed, cell, model, env, parts), model
 
 
 def expert_of(shape: SortingShape) -> Expert:
@@ -91,9 +87,12 @@ class SortingReporter(Reporter):
         trained: The model.
     """
 
+    STATE = (*Reporter.STATE, "_faded")
+
     def __init__(self, run: TrainingRun, callbacks: Callbacks, trained: SortingDQN) -> None:
         super().__init__(run, callbacks)
         self._run, self._trained, self._preset = run, trained, trained.preset
+        self._faded = 0.0
         settings = SortingSettings(
             horizon_factor=self._preset.episode.horizon_factor,
             weights=self._preset.reward.weights,
@@ -105,8 +104,13 @@ class SortingReporter(Reporter):
         """Let the curriculum fade with the steps."""
         if (self.num_timesteps // len(rewards)) % FADE_EVERY == 0:
             share = self._preset.episode.fade_share
-            done = self.num_timesteps / (share * self._preset.learning.total_steps)
-            self._trained.tasks.settings = self._preset.settings(done)
+            self._faded = self.num_timesteps / (share * self._preset.learning.total_steps)
+            self._trained.tasks.settings = self._preset.settings(self._faded)
+
+    def load_state_dict(self, state: Mapping[str, Any]) -> None:
+        """Restore a state and its curriculum."""
+        super().load_state_dict(state)
+        self._trained.tasks.settings = self._preset.settings(self._faded)
 
     def rates(self) -> dict[str, Any]:
         """Return how greedy episodes end now."""

@@ -9,7 +9,6 @@ import torch
 from app.policies.algorithms.exploration import Exploration
 from app.policies.algorithms.td3 import BatchTD3, Networks, critics_of
 from app.policies.algorithms.vecenv import BatchVecEnv
-from app.policies.checkpoints.checkpoint import Checkpoint
 from app.policies.checkpoints.training_range import Ranges
 from app.policies.configs.pick import PickPreset
 from app.policies.configs.reach import ReachPreset
@@ -61,24 +60,14 @@ class TrainingMonitor:
             self.ranges.look(self.visited_states())
 
 
-def first_step(resume: Checkpoint | None) -> int:
-    """Return the environment step at which an attempt starts; it offsets the seed."""
-    return 0 if resume is None else int(resume.manifest["step"])
-
-
 def start_td3(
-    preset: PickPreset | ReachPreset,
-    seed: int,
-    resume: Checkpoint | None,
-    cell: Cell,
-    scenario: TD3Scenario,
+    preset: PickPreset | ReachPreset, seed: int, cell: Cell, scenario: TD3Scenario
 ) -> tuple[TrainingRun, TrainingMonitor]:
-    """Return a training from the start or from a checkpoint, and its monitor.
+    """Return a training and its monitor.
 
     Args:
         preset: All hyper-parameters.
         seed: Seed of all random numbers.
-        resume: The last ``resume`` checkpoint of an interrupted attempt.
         cell: Work cell of the training.
         scenario: Environments, exploration and networks.
     """
@@ -86,7 +75,7 @@ def start_td3(
     model = BatchTD3(
         preset.learning,
         env,
-        seed + first_step(resume),
+        seed,
         exploration=scenario.exploration,
         networks=scenario.networks,
     )
@@ -96,7 +85,7 @@ def start_td3(
     }
     if model.ema_actor is not None:
         targets["actor_learned"] = model.actor.mu
-    ranges = Ranges(resume.manifest["trained_range"] if resume else None)
+    ranges = Ranges()
     parts = Parts(
         policy={"actor": model.evaluated_actor, "critic": critics_of(model.critic)},
         targets=targets,
@@ -108,7 +97,8 @@ def start_td3(
         act_size=scenario.act_size,
         trained_range=ranges.as_json,
     )
-    run = TrainingRun(preset, seed, cell, model, env, parts, resume)
+    run = TrainingRun(preset, seed, cell, model, env, parts)
+    run.state_parts["ranges"] = ranges
     monitor = TrainingMonitor(
         n_greedy=model.exploration.n_greedy,
         env=env,

@@ -1,9 +1,9 @@
 """The one training path: from a preset and a seed to checkpoints.
 
-Stable-Baselines3's ``learn`` runs the loop; a callback reports progress and checkpoints on a
-fixed grid of environment steps and stops the training. A resumed run first refills its replay
-buffer with the restored policy; these steps are not counted. Parts of the scenarios are in
-``pick.py``, ``reach.py`` and ``sorting.py``.
+Progress and checkpoints are reported on a fixed grid of environment steps, between two
+complete steps. A training that is resumed from its last state ends with the same bits as one
+that was not interrupted (``state.py``). Parts of the scenarios are in ``pick.py``, ``reach.py``
+and ``sorting.py``.
 """
 
 from collections.abc import Callable, Iterator
@@ -11,7 +11,6 @@ from contextlib import contextmanager, nullcontext
 
 import torch
 
-from app.policies.checkpoints.checkpoint import Checkpoint
 from app.policies.configs.pick import PickPreset
 from app.policies.configs.presets import Preset
 from app.policies.configs.reach import ReachPreset
@@ -25,8 +24,11 @@ from app.policies.training import (
 from app.policies.training import (
     sorting as sorting_training,
 )
+from app.policies.training.memory_files import MemoryFiles
 from app.policies.training.progress import Progress, TrainResult
 from app.policies.training.reporter import Callbacks, Reporter
+from app.policies.training.run import OnCheckpoint, TrainingRun
+from app.policies.training.state import TrainingState
 from app.sim.cells.cell import Cell, load_cell
 
 
@@ -50,53 +52,70 @@ def train(
     preset: Preset,
     *,
     seed: int,
-    resume: Checkpoint | None,
     on_progress: Callable[[Progress], None],
-    on_checkpoint: Callable[[int, Checkpoint, Checkpoint], None],
+    on_checkpoint: OnCheckpoint,
     should_stop: Callable[[], bool],
     cell: Cell | None = None,
+    memory: MemoryFiles | None = None,
+    resume: TrainingState | None = None,
 ) -> TrainResult:
     """Train a preset, from the start or from where an attempt was interrupted.
 
     Args:
         preset: All hyper-parameters.
         seed: Seed of everything random.
-        resume: The last ``resume`` checkpoint of an interrupted attempt.
         on_progress: Called every ``progress_steps``.
         on_checkpoint: Called every ``checkpoint_steps`` and at the end or stop with the step,
-            the policy and what resuming needs.
+            the policy and the state to resume from.
         should_stop: Asked after every step of the cells, so it must be cheap.
         cell: The work cell that the preset names; by default the shipped one of that name.
+        memory: Files of the replay memory; None if no states are wanted.
+        resume: The last state of an interrupted attempt; needs ``memory``.
 
     Raises:
-        CheckpointMismatch: ``resume`` belongs to another preset, cell or program.
+        CheckpointMismatch: ``resume`` belongs to another configuration, seed, cell or program.
+        Damaged: A file of ``memory`` is missing or changed.
         InvalidInput: The cell cannot be trained in.
         SimulationError: A reward was not finite.
     """
     torch.set_flush_denormal(True)  # Adam's moments of rare inputs fade into slow numbers
     place = cell or load_cell(preset.cell)
     calls = Callbacks(on_progress, on_checkpoint, should_stop)
+    run, reporter = start(preset, seed, place, calls)
+    if memory is not None:
+        run.keep_states(memory)
+    if resume is not None:
+        run.restore(resume)
+    with nullcontext() if _keeps_precision(preset) else _bfloat16_products():
+        stopped = run.learn(reporter, reporter.report)
+    if not stopped and isinstance(preset, PickPreset):
+        pick_training.add_outcomes(run, preset, seed, place, run.policy())
+        run.save(on_checkpoint)
+    elif run.step % preset.learning.checkpoint_steps:
+        run.save(on_checkpoint)
+    return TrainResult(checkpoint=run.policy(), step=run.step, stopped=stopped)
+
+
+def start(
+    preset: Preset, seed: int, cell: Cell, calls: Callbacks
+) -> tuple[TrainingRun, Reporter]:
+    """Return a training that has not started yet, with all parts of its state, and its reports.
+
+    Args:
+        preset: All hyper-parameters.
+        seed: Seed of everything random.
+        cell: Work cell trained in.
+        calls: Receivers of the reports.
+    """
     reporter: Reporter
     if isinstance(preset, SortingPreset):
-        run, model = sorting_training.start(preset, seed, resume, place)
+        run, model = sorting_training.start(preset, seed, cell)
         reporter = sorting_training.SortingReporter(run, calls, model)
     elif isinstance(preset, ReachPreset):
-        run, monitor = reach_training.start(preset, seed, resume, place)
+        run, monitor = reach_training.start(preset, seed, cell)
         reporter = reach_training.ReachReporter(run, calls, monitor)
     else:
-        run, monitor = pick_training.start(preset, seed, resume, place)
+        run, monitor = pick_training.start(preset, seed, cell)
         reporter = pick_training.PickReporter(run, calls, monitor)
-    with nullcontext() if _keeps_precision(preset) else _bfloat16_products():
-        if resume is not None:
-            run.refill()
-        left = preset.learning.total_steps - run.step
-        if left > 0:
-            run.model.learn(left, callback=reporter, reset_num_timesteps=resume is None)
-    policy, state = run.checkpoints()
-    if not reporter.stopped and isinstance(preset, PickPreset):
-        pick_training.add_outcomes(run, preset, seed, place, policy)
-        policy, _ = run.checkpoints()
-        on_checkpoint(run.step, policy, state)
-    elif run.step % preset.learning.checkpoint_steps:
-        on_checkpoint(run.step, policy, state)
-    return TrainResult(checkpoint=policy, step=run.step, stopped=reporter.stopped)
+    run.state_parts["reporter"] = reporter
+    return run, reporter

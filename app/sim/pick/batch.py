@@ -6,7 +6,7 @@ functions evaluate one state with the same kernels, for the live world and task 
 """
 
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -169,6 +169,7 @@ class PickBatch(EnvBatch):
             equal environments ``k`` and on of a batch that starts at 0, bit for bit.
     """
 
+    STATE: ClassVar[tuple[str, ...]] = (*EnvBatch.STATE, "_sight")
     _kernel = episode
     world: starts.PickCell
 

@@ -42,6 +42,8 @@ class MonitoredPickBatch(PickBatch):
         first_env: Number of the first environment.
     """
 
+    STATE = (*PickBatch.STATE, "_monitor")
+
     def __init__(
         self,
         cell: Cell,

@@ -6,7 +6,7 @@ Source: docs/method.md 2.1 to 2.3.
 
 import math
 from dataclasses import dataclass, field, replace
-from typing import Any, Literal, get_args
+from typing import Any, ClassVar, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -272,6 +272,7 @@ class ReachBatch(EnvBatch):
             equal environments ``k`` and on of a batch that starts at 0, bit for bit.
     """
 
+    STATE: ClassVar[tuple[str, ...]] = (*EnvBatch.STATE, "_sight")
     _kernel = episode
     world: episode.ReachCell
 

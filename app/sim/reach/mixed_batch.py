@@ -13,9 +13,10 @@ from app.errors import InvalidInput
 from app.sim.cells.cell import Cell
 from app.sim.reach.batch import N_ACT, ReachBatch, ReachSettings
 from app.sim.scenario.batch import StepResult
+from app.state_dict import Stateful
 
 
-class MixedReachBatch:
+class MixedReachBatch(Stateful):
     """One batch for each number of people.
 
     Args:
@@ -27,6 +28,8 @@ class MixedReachBatch:
     Raises:
         InvalidInput: There are no people, or fewer environments than people.
     """
+
+    STATE = ("parts",)
 
     def __init__(self, cell: Cell, n_envs: int, seed: int, settings: ReachSettings) -> None:
         people = settings.people or ()

@@ -9,7 +9,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
 from types import ModuleType
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +26,7 @@ from app.sim.scenario.kernels.episode import (
     new_step_workspace,
 )
 from app.sim.scene.scene import require_finite, require_shape
+from app.state_dict import Stateful
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -42,7 +43,7 @@ class StepResult:
     """Index into OUTCOMES of episodes that ended now, 0 elsewhere, (n_envs,)."""
 
 
-class EnvBatch(ABC):
+class EnvBatch(Stateful, ABC):
     """Resets and steps the environments of a scenario.
 
     Copies (``copy.deepcopy``, ``pickle``) continue bit by bit as the original would.
@@ -58,6 +59,15 @@ class EnvBatch(ABC):
         view: Contents and length of an observation.
     """
 
+    STATE: ClassVar[tuple[str, ...]] = (
+        "seed",
+        "state",
+        "_work",
+        "_obs",
+        "_last",
+        "_rew",
+        "_ended",
+    )
     _kernel: ModuleType
     """Kernels of the scenario: ``reset_rows`` and ``step_batch``."""
     cell: Cell

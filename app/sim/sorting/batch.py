@@ -28,6 +28,7 @@ from app.sim.sorting.state import (
     SortingState,
     check_state,
 )
+from app.state_dict import Stateful
 
 OUTCOMES = ("running", "success", "timeout")
 """Names of the outcomes in ``rows.outcome``."""
@@ -136,7 +137,7 @@ def _check_sizes(settings: SortingSettings, shape: SortingShape) -> None:
             raise InvalidInput(name, value, f"must lie in [0, {limit}]")
 
 
-class SortingBatch:
+class SortingBatch(Stateful):
     """Many sorting tasks, stepped together by one thread.
 
     Copies (``copy.deepcopy``, ``pickle``) go on bit by bit as the original would.
@@ -152,6 +153,8 @@ class SortingBatch:
     Raises:
         InvalidInput: The failure map or the fixed sizes do not fit the shape.
     """
+
+    STATE = ("seed", "rows", "_obs", "_last", "_masks", "_rew", "_ended")
 
     def __init__(
         self,

@@ -32,7 +32,6 @@ def checkpoint(client: TestClient) -> str:
     made = train(
         presets.resolve("pick-td3", presets.nested(TINY)),
         seed=2,
-        resume=None,
         on_progress=lambda _: None,
         on_checkpoint=lambda *_: None,
         should_stop=lambda: False,

@@ -38,7 +38,7 @@ def checkpoint(client: TestClient) -> str:
         "sorting-e0-dqn", {"networks": {"width": 16}, "learning": {"n_envs": 8}}
     )
     assert isinstance(preset, SortingPreset)
-    made, _ = start(preset, 4, None, load_cell("sorting-e0"))[0].checkpoints()
+    made = start(preset, 4, load_cell("sorting-e0"))[0].policy()
     new = NewCheckpoint(sha256=made.sha256, manifest=made.manifest, tensors=made.tensors)
     client.app.state.services.checkpoints.publish(ALIAS, new)  # type: ignore[attr-defined]
     return made.sha256

@@ -27,7 +27,7 @@ def model_of(run: TrainingRun) -> BatchTD3:
 @pytest.fixture
 def model(tiny_preset):
     cell = load_cell("pick-and-place")
-    run, _ = pick_training.start(tiny_preset, 5, None, cell)
+    run, _ = pick_training.start(tiny_preset, 5, cell)
     return model_of(run)
 
 
@@ -100,7 +100,7 @@ def ddpg() -> BatchTD3:
         "learning.batch_size": 16,
     }
     preset = preset_of("reach-ddpg-thesis", small)
-    run, _ = reach_training.start(preset, 3, None, load_cell("shared-workspace"))
+    run, _ = reach_training.start(preset, 3, load_cell("shared-workspace"))
     return model_of(run)
 
 

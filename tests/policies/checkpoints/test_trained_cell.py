@@ -20,7 +20,6 @@ def own_policy():
     return train(
         preset,
         seed=1,
-        resume=None,
         on_progress=lambda _: None,
         on_checkpoint=lambda *_: None,
         should_stop=lambda: False,
@@ -71,7 +70,6 @@ def test_cell_without_cubes_cannot_be_trained_in(tiny_preset):
         train(
             tiny_preset,
             seed=1,
-            resume=None,
             on_progress=lambda _: None,
             on_checkpoint=lambda *_: None,
             should_stop=lambda: False,

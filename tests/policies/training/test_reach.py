@@ -4,15 +4,17 @@ import numpy as np
 import pytest
 import torch
 
-from app.errors import CheckpointMismatch, InvalidInput
+from app.errors import InvalidInput
 from app.policies.algorithms.vecenv import BatchVecEnv
 from app.policies.configs import presets
 from app.policies.inference.reach_policy import ReachPolicy
+from app.policies.training.memory_files import MemoryFiles
 from app.policies.training.reach import batch_of, play, settings_of, start, visited_states
 from app.sim.cells.cell import load_cell
 from app.sim.envs.tasks import ArmTask
 from app.sim.reach.batch import ReachBatch, ReachSettings
 from app.sim.reach.monitored.batch import MonitoredReachBatch
+from app.state_dict import under
 from tests.policies.conftest import Recorder, preset_of
 
 TINY = {
@@ -51,21 +53,6 @@ def test_a_point_of_the_curve_plays_its_own_episodes(ran):
 def test_the_same_seed_trains_the_same_bits(preset, ran):
     again = Recorder().run(preset)
     assert again.checkpoint.tensors == ran.result.checkpoint.tensors
-
-
-def test_a_stopped_run_goes_on_where_it_was(preset, ran):
-    stopped = Recorder(stop_at=768)
-    assert stopped.run(preset).stopped
-    step, _, state = stopped.checkpoints[-1]
-    resumed = Recorder()
-    resumed.run(preset, resume=state)
-    steps = [point.step for point in stopped.progress + resumed.progress]
-    assert (step, steps) == (768, [point.step for point in ran.progress])
-
-
-def test_a_checkpoint_of_another_task_does_not_resume(preset, tiny_run):
-    with pytest.raises(CheckpointMismatch, match="preset"):
-        Recorder().run(preset, resume=tiny_run.checkpoints[0][2])
 
 
 def test_what_was_trained_decides_as_a_policy(preset, ran):
@@ -158,17 +145,20 @@ def test_the_recipes_of_the_thesis_and_of_its_authors(name, alpha, steps, walk):
 
 def test_a_time_out_ends_an_episode_of_the_recipe_for_good():
     preset = preset_of("reach-ddpg-authors", {**TINY, "networks.layers": 2})
-    run, monitor = start(preset, 1, None, load_cell("shared-workspace"))
+    _, monitor = start(preset, 1, load_cell("shared-workspace"))
     assert not monitor.env._task.cut(np.array([3])).any()
 
 
-def test_a_recipe_resumes_with_its_normalisation():
+def test_a_recipe_resumes_with_its_normalisation(tmp_path):
     preset = preset_of("reach-ddpg-authors", {**TINY, "networks.layers": 2})
-    recorder = Recorder(stop_at=512)
+    memory = MemoryFiles(tmp_path)
+    recorder = Recorder(stop_at=512, memory=memory)
     stopped = recorder.run(preset)
     counted = stopped.checkpoint.arrays()["actor.norm.count"][0]
     assert counted == pytest.approx(512.01)
-    run, _ = start(preset, 1, recorder.checkpoints[-1][2], load_cell("shared-workspace"))
+    run, _ = start(preset, 3, load_cell("shared-workspace"))
+    run.keep_states(memory)
+    run.restore(recorder.checkpoints[-1][2])
     assert run.model._norm.count.item() == pytest.approx(counted)
 
 
@@ -220,14 +210,11 @@ def test_every_option_trains_and_moves_the_actor(option):
     ReachPolicy(recorder.checkpoints[-1][1])
 
 
-def test_averaged_weights_are_what_is_shown_and_kept():
+def test_averaged_weights_are_what_is_shown_and_kept(tmp_path):
     preset = preset_of("reach-td3", {**TINY, "learning.ema": 0.99})
-    stopped = Recorder(stop_at=768)
+    stopped = Recorder(stop_at=768, memory=MemoryFiles(tmp_path))
     stopped.run(preset)
     _, policy, state = stopped.checkpoints[-1]
-    shown, arrays = policy.arrays()["actor.net.0.weight"], state.arrays()
-    assert np.array_equal(shown, arrays["actor.net.0.weight"])
-    assert not np.array_equal(shown, arrays["actor_learned.net.0.weight"])
-    resumed = Recorder()
-    resumed.run(preset, resume=state)
-    assert resumed.progress[-1].step == preset.learning.total_steps
+    shown, networks = policy.arrays()["actor.net.0.weight"], under(state.entries(), "networks")
+    assert np.array_equal(shown, networks["actor.net.0.weight"])
+    assert not np.array_equal(shown, networks["actor_learned.net.0.weight"])

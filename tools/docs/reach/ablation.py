@@ -14,7 +14,6 @@ success rate to the base preset (Welch's t).
 
 import argparse
 import json
-import shutil
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from statistics import median
@@ -30,6 +29,7 @@ from app.policies.configs import presets
 from app.policies.evaluation.reach.bench import ReachBench
 from app.provenance import describe
 from tools.docs.augmentation_study import over_seeds
+from tools.docs.learning_curves import lines
 from tools.docs.reach.curves import ENDS
 from tools.docs.training_curves import read_if_there, record
 
@@ -82,18 +82,17 @@ def train_missing(root: Path, names: Sequence[str], seeds: Sequence[int]) -> Non
         for name in names:
             folder = folder_of(root, name, seed)
             if policy_of(folder) is None:
-                shutil.rmtree(folder, ignore_errors=True)
                 preset = presets.resolve(BASE, presets.nested({**SHORT, **CHANGES[name]}))
                 record(preset, seed, folder)
 
 
-def evaluated(policy: Checkpoint, per_target: int) -> Json:
-    """Return rates of outcomes and training cost of a policy."""
+def evaluated(policy: Checkpoint, folder: Path, per_target: int) -> Json:
+    """Return rates of outcomes and training cost of the policy in a folder."""
     rates = ReachBench(policy, SEED).on_targets(per_target).rates()
     return {
         "rates": rates,
         "n": rates["n"],
-        "cpu_min": policy.manifest["cpu_s"] / 60.0,
+        "cpu_min": lines(folder / "curve.jsonl")[-1]["cpu_s"] / 60.0,
         "updates": policy.manifest["updates"],
     }
 
@@ -135,9 +134,9 @@ def measured(root: Path, seeds: Sequence[int], per_target: int) -> list[Json]:
     """
     runs = {
         name: [
-            evaluated(found, per_target)
-            for seed in seeds
-            if (found := policy_of(folder_of(root, name, seed))) is not None
+            evaluated(found, folder, per_target)
+            for folder in (folder_of(root, name, seed) for seed in seeds)
+            if (found := policy_of(folder)) is not None
         ]
         for name in CHANGES
     }

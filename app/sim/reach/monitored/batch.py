@@ -56,6 +56,8 @@ class MonitoredReachBatch(ReachBatch):
         SimulationError: A number of the tracks is NaN or infinite.
     """
 
+    STATE = (*ReachBatch.STATE, "_monitor")
+
     def __init__(
         self,
         cell: Cell,

@@ -1,0 +1,203 @@
+"""State of a training: all that it needs to continue as if it had not been interrupted.
+
+Networks, optimisers, environments, exploration, counters, random generators and the window of
+the learning curve are tensors (safetensors) and JSON values; transitions of the replay memory
+are in files that the manifest lists (``memory_files.py``). Nothing is pickled.
+"""
+
+import json
+import random
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import torch
+from safetensors import SafetensorError
+from safetensors.numpy import load as load_arrays
+from safetensors.numpy import save as save_arrays
+
+from app.digests import digest
+from app.errors import CheckpointMismatch, InvalidInput
+from app.policies.algorithms.prioritized_replay import PrioritisedReplay
+from app.policies.checkpoints.model_state import moments_of, restore, weights_of
+from app.policies.checkpoints.trained_cell import DEFINITION, manifest_fields
+from app.policies.configs.presets import Preset
+from app.sim.cells.cell import Cell
+from app.state_dict import State
+
+FORMAT = "tandem-training-state/1"
+MAX_BYTES = 256 * 1024 * 1024
+"""Maximum size of the tensors, which are stored in one database row [bytes]."""
+REQUIRED = {
+    "format": str,
+    "preset": dict,
+    "seed": int,
+    "cell": str,
+    "step": int,
+    "cpu_s": float,
+    "commits": list,
+    "versions": dict,
+    "values": dict,
+    "memory": list,
+}
+"""Fields every manifest has, with their JSON types."""
+
+
+@dataclass(frozen=True)
+class TrainingState:
+    """A manifest and its tensors."""
+
+    manifest: dict[str, Any]
+    """Configuration, values that are no arrays, and the files of the replay memory; JSON."""
+    tensors: bytes
+    """safetensors file."""
+
+    @property
+    def step(self) -> int:
+        """Environment steps so far."""
+        return int(self.manifest["step"])
+
+    @property
+    def sha256(self) -> str:
+        """Digest of both, 64 hexadecimal digits."""
+        return digest(self.manifest, self.tensors)
+
+    def entries(self) -> State:
+        """Return arrays and values by name.
+
+        Raises:
+            InvalidInput: The bytes are no safetensors file.
+        """
+        try:
+            return {**load_arrays(self.tensors), **self.manifest["values"]}
+        except SafetensorError as error:
+            raise InvalidInput("tensors", str(error), "must be a safetensors file") from error
+
+
+def pack(manifest: Mapping[str, Any], entries: State) -> TrainingState:
+    """Return a checked state; ``entries`` are arrays and JSON values by name."""
+    arrays = {
+        name: np.asarray(value, order="C")
+        for name, value in entries.items()
+        if isinstance(value, np.ndarray)
+    }
+    values = {name: value for name, value in entries.items() if name not in arrays}
+    return load({**manifest, "format": FORMAT, "values": values}, save_arrays(arrays))
+
+
+def load(manifest: object, tensors: bytes) -> TrainingState:
+    """Return a state from stored data.
+
+    Raises:
+        InvalidInput: A field is missing or of a wrong type, or the tensors are too large.
+        CheckpointMismatch: The format is another one.
+    """
+    fields = manifest if isinstance(manifest, dict) else {}
+    if fields.get("format") != FORMAT:
+        raise CheckpointMismatch("format", FORMAT, fields.get("format"))
+    for name, kind in REQUIRED.items():
+        if not isinstance(fields.get(name), kind):
+            raise InvalidInput(f"manifest.{name}", fields.get(name), f"must be {kind.__name__}")
+    if len(tensors) > MAX_BYTES:
+        raise InvalidInput("tensors", len(tensors), f"must not exceed {MAX_BYTES} bytes")
+    return TrainingState(fields, bytes(tensors))
+
+
+def origin(preset: Preset, seed: int, cell: Cell) -> dict[str, Any]:
+    """Return the manifest fields that determine a training."""
+    fields = {"preset": preset.model_dump(), "seed": seed, **manifest_fields(cell)}
+    return dict(json.loads(json.dumps(fields)))
+
+
+def require_origin(state: TrainingState, preset: Preset, seed: int, cell: Cell) -> None:
+    """Check that a state belongs to a training.
+
+    Raises:
+        CheckpointMismatch: A field of the configuration, the seed or the cell differs.
+    """
+    names = ("preset", "seed", "cell", DEFINITION)
+    wanted = dict(_leaves(origin(preset, seed, cell)))
+    found = dict(_leaves({name: state.manifest.get(name) for name in names}))
+    for name in sorted({*wanted, *found}):
+        if wanted.get(name) != found.get(name):
+            raise CheckpointMismatch(
+                name.removeprefix("preset."), wanted.get(name), found.get(name)
+            )
+
+
+def _leaves(tree: Mapping[str, Any], path: str = "") -> Iterator[tuple[str, Any]]:
+    for name, value in tree.items():
+        if isinstance(value, Mapping):
+            yield from _leaves(value, f"{path}{name}.")
+        else:
+            yield f"{path}{name}", value
+
+
+class NetworkState:
+    """Networks and optimisers as a part of a state.
+
+    Args:
+        modules: Networks by name.
+        optimizers: Optimisers by name.
+    """
+
+    def __init__(
+        self,
+        modules: Mapping[str, torch.nn.Module],
+        optimizers: Mapping[str, torch.optim.Optimizer],
+    ) -> None:
+        self._modules, self._optimizers = modules, optimizers
+
+    def state_dict(self) -> State:
+        """Return weights and moments."""
+        return {**weights_of(self._modules), **moments_of(self._optimizers)}
+
+    def load_state_dict(self, state: Mapping[str, Any]) -> None:
+        """Restore weights and moments."""
+        restore(state, self._modules, self._optimizers)
+
+
+class Priorities:
+    """Priorities and random generator of a replay memory as a part of a state.
+
+    Args:
+        memory: The replay memory.
+    """
+
+    def __init__(self, memory: PrioritisedReplay) -> None:
+        self._memory = memory
+
+    def state_dict(self) -> State:
+        """Return the sum tree, the greatest priority and the generator."""
+        memory = self._memory
+        arrays = {"tree": memory._tree.copy(), "rng": memory._rng.copy()}
+        return {**arrays, "greatest": memory._greatest}
+
+    def load_state_dict(self, state: Mapping[str, Any]) -> None:
+        """Restore them."""
+        self._memory._tree[:], self._memory._rng[:] = state["tree"], state["rng"]
+        self._memory._greatest = state["greatest"]
+
+
+class GlobalGenerators:
+    """Global random generators as a part of a state; Stable-Baselines3 uses them all."""
+
+    def state_dict(self) -> State:
+        """Return the states of the generators."""
+        name, key, *rest = np.random.get_state(legacy=True)  # noqa: NPY002
+        version, internal, gauss = random.getstate()
+        return {
+            "torch": torch.get_rng_state().numpy(),
+            "numpy": np.asarray(key),
+            "numpy_rest": [name, *rest],
+            "python": [version, list(internal), gauss],
+        }
+
+    def load_state_dict(self, state: Mapping[str, Any]) -> None:
+        """Restore the generators."""
+        name, *rest = state["numpy_rest"]
+        np.random.set_state((name, state["numpy"], *rest))  # noqa: NPY002
+        version, internal, gauss = state["python"]
+        random.setstate((version, tuple(internal), gauss))
+        torch.set_rng_state(torch.as_tensor(state["torch"].copy()))

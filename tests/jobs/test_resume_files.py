@@ -1,0 +1,40 @@
+"""Files that trainings need to resume are deleted when no job needs them any more."""
+
+from pathlib import Path
+
+from app.digests import digest
+from app.store import attempts, completion, jobs
+from app.store.engine import Store
+from app.store.records import NewCheckpoint, NewJob, ResumeState
+from jobs.resume_files import folder_of, remove_unneeded
+
+
+def with_file(data_dir: Path, job_id: str) -> Path:
+    path = folder_of(data_dir, job_id) / "transitions.safetensors"
+    path.parent.mkdir(parents=True)
+    path.write_bytes(b"rows")
+    return path
+
+
+def test_files_go_with_their_job_and_after_its_success(store: Store, tmp_path: Path) -> None:
+    policy = NewCheckpoint(sha256=digest({}, b"p"), manifest={}, tensors=b"p")
+    paths = {}
+    for name in ("succeeded", "running"):
+        jobs.create_job(store, NewJob(kind="count", spec={}))
+        found = attempts.claim_next(store)
+        assert found is not None
+        claim = found[0]
+        resume = ResumeState(step=10, manifest={}, tensors=b"r")
+        attempts.record_checkpoint(store, claim, 10, policy, resume)
+        if name == "succeeded":
+            completion.finish(store, claim, result={})
+        paths[name] = with_file(tmp_path, claim.job_id)
+    paths["queued"] = with_file(tmp_path, jobs.create_job(store, NewJob(kind="x", spec={})).id)
+    paths["gone"] = with_file(tmp_path, "gone")
+    remove_unneeded(store, tmp_path)
+    assert {name: path.exists() for name, path in paths.items()} == {
+        "succeeded": False,
+        "running": True,
+        "queued": True,
+        "gone": False,
+    }
