@@ -45,7 +45,7 @@ class Group:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Comparison:
+class JobComparison:
     """Several jobs side by side."""
 
     jobs: tuple[JobRecord, ...]
@@ -62,7 +62,7 @@ class Comparison:
     """The groups, trainings only."""
 
 
-def compare(store: Store, job_ids: Sequence[str], quantity: str | None = None) -> Comparison:
+def compare(store: Store, job_ids: Sequence[str], quantity: str | None = None) -> JobComparison:
     """Compare jobs.
 
     Args:
@@ -91,7 +91,7 @@ def compare(store: Store, job_ids: Sequence[str], quantity: str | None = None) -
     steps = sorted(
         {step for line in lines.values() for step, value in line if value is not None}
     )
-    return Comparison(
+    return JobComparison(
         jobs=found,
         differences=differing(fields),
         quantities=names,

@@ -7,7 +7,7 @@ from pydantic import Field
 
 from app.api.schemas.numbers import Answer
 from app.sim.core.arrays import Vec
-from jobs.comparison import Comparison, Group
+from jobs.comparison import JobComparison, Group
 
 
 class ComparedJob(Answer):
@@ -64,7 +64,7 @@ class ComparisonPublic(Answer):
     groups: list[CurveGroup] = Field(description="trainings, by their values but the seed")
 
     @classmethod
-    def from_domain(cls, found: Comparison) -> Self:
+    def from_domain(cls, found: JobComparison) -> Self:
         """Return the schema of a comparison."""
         names = ComparedJob.model_fields
         return cls(
