@@ -1,6 +1,9 @@
 from pathlib import Path
 
-from tests.jobs.kill_campaign import campaign
+import pytest
+
+from tests.jobs.kill_campaign import campaign, run_series
+from tests.postgresql_server import PostgresqlServer
 
 
 def test_nothing_acknowledged_is_lost_in_ten_kills(tmp_path: Path) -> None:
@@ -9,3 +12,13 @@ def test_nothing_acknowledged_is_lost_in_ten_kills(tmp_path: Path) -> None:
     assert report["jobs"] >= report["posted"] > 0
     again = campaign(tmp_path, 10, minutes=60.0)
     assert again == report
+
+
+@pytest.mark.postgres
+def test_nothing_acknowledged_is_lost_in_ten_kills_on_postgresql(
+    postgresql: PostgresqlServer, tmp_path: Path
+) -> None:
+    with postgresql.database() as url:
+        report = run_series(url, tmp_path, 10, seed=0)
+    assert sum(report["kills"].values()) == 10
+    assert report["jobs"] >= report["posted"] > 0
