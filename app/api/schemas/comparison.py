@@ -7,7 +7,7 @@ from pydantic import Field
 
 from app.api.schemas.numbers import Answer
 from app.sim.core.arrays import Vec
-from jobs.comparison import JobComparison, Group
+from jobs.comparison import Group, JobComparison
 
 
 class ComparedJob(Answer):
