@@ -75,6 +75,9 @@ def test_numbers_are_written_with_interval_deviation_or_unit():
     assert said == "30.0 % after 4.00 M steps, 2 seeds"
     one = Curve("x", "p", "reward", "points").value({"curves": curves[:1]})
     assert one == "-2.00 after 4.00 M steps, 1 seed"
+    still = {"curves": [{"name": "p", "played": [], "standing_still": -3.0}]}
+    assert Curve("x", "p", "standing_still").value(still) == "-3.00"
+    assert Curve("x", "p", "success").value(still) is None
     assert Curve("x", "q", "success").value({"curves": curves}) is None
     assert Config("reach-ddpg-thesis", "learning.lr_start", 10.0).value() == 1e-3
     assert Measure("a", "b").recipe == ""

@@ -2,7 +2,16 @@
 
 from typing import Literal
 
-from app.cli.report.parts import Curve, Item, Measure, StoredValue, configured, rates, trained
+from app.cli.report.parts import (
+    STANDING_STILL,
+    Curve,
+    Item,
+    Measure,
+    StoredValue,
+    configured,
+    rates,
+    trained,
+)
 
 MOTION = "Motion (chapter 4)"
 REACH = trained("reach-ddpg-authors", "thesis-reach")
@@ -73,18 +82,36 @@ MOTION_ITEMS = (
     Item(
         chapter=MOTION,
         title="Figure 4.4: learning curves",
-        measures=tuple(
+        measures=(
+            *(
+                Measure(
+                    f"{end} at the end",
+                    "a figure",
+                    Curve("thesis-reach", "reach-ddpg-authors", end),
+                    Curve("reach-curves", "reach-td3", end),
+                )
+                for end in ("success", "collision", "timeout")
+            ),
             Measure(
-                f"{end} at the end",
+                "return at the end",
                 "a figure",
-                Curve("thesis-reach", "reach-ddpg-authors", end),
-                Curve("reach-curves", "reach-td3", end),
-            )
-            for end in ("success", "collision", "timeout")
+                Curve("thesis-reach", "reach-ddpg-authors", "reward", "points"),
+                "another reward",
+            ),
+            Measure(
+                "return of standing still in the same episodes",
+                "",
+                Curve("thesis-reach", "reach-ddpg-authors", STANDING_STILL),
+            ),
         ),
         images=(("reach/curves.png", "Learning curves of reaching"),),
-        agreement="open. The curve `reach-ddpg-thesis` of this image is an earlier form of the"
-        " preset, not the recipe ([results](../results/reach.md#training)).",
+        agreement="no, with one seed. The actor of the recipe saturates within the first "
+        "1,663 updates: its actions are ±1 whatever the state, the gradient through "
+        "tanh is 0, and every test episode has contacts. The training was stopped "
+        "early, because nothing can change any more; other seeds and an ablation "
+        "are open ([notebook](../notebook/reach.md#the-recipe-of-the-authors)). The "
+        "curve `reach-ddpg-thesis` of this image is an earlier form of that preset, "
+        "not the recipe ([results](../results/reach.md#training)).",
         command=REACH,
     ),
     Item(

@@ -38,6 +38,10 @@ class StoredValue:
         return None if value is None else f"{value:.3g} {self.unit}".rstrip()
 
 
+STANDING_STILL = "standing_still"
+"""Key of the return of standing still in the episodes of a curve."""
+
+
 @dataclass(frozen=True, slots=True)
 class Curve(StoredValue):
     """The last point of a learning curve.
@@ -58,6 +62,9 @@ class Curve(StoredValue):
             for one in found.get("curves", ())
             if one["name"] == self.row and one.get("task", "") == self.task
         ]
+        if self.key == STANDING_STILL:
+            still = [one[self.key] for one in curves if self.key in one]
+            return f"{still[0]:.2f}" if still else None
         points = [one.get("pairs") or one.get("targets") or one["played"] for one in curves]
         ends = [point[-1] for point in points if point and point[-1].get(self.key) is not None]
         if not ends:

@@ -30,10 +30,11 @@ from app.sim.core.arrays import Vec
 from app.sim.core.jit import direct
 from app.sim.people.kernels.people import MAX_PEOPLE
 from app.sim.prediction.kernels.networks import Network
-from app.sim.reach.batch import N_ACT, GoalRule, ViewName, goal_region_of
+from app.sim.reach.batch import N_ACT, GoalRule, LimitRule, ViewName, goal_region_of
 from app.sim.reach.goal_sets import halton_targets
 from app.sim.reach.kernels import option_features, people_set
 from app.sim.reach.kernels.observation import BASE_START, N_FEATURES, SIZES, STATE_SIZES
+from app.sim.reach.recipe_rules import BlockedRules
 from app.sim.reach.rollout.kernels.actor import FEW, act_batch, new_compiled_actor
 from app.sim.robot.actions import ActionSettings
 
@@ -67,6 +68,14 @@ def is_reach(checkpoint: Checkpoint) -> bool:
     return task_of(checkpoint) == REACHING
 
 
+def blocked_rules_of(preset: ReachPreset) -> BlockedRules | None:
+    """Return the rules of an arm that contacts block; None where they do not."""
+    if preset.episode.collision != "blocks":
+        return None
+    alone = preset.reward.bonus == "alone"
+    return BlockedRules(command_cost=preset.reward.c_u, bonus_alone=alone)
+
+
 class ReachPolicy(TrainedPolicy):
     """Reach policy of a checkpoint; safe to call from several threads.
 
@@ -88,6 +97,10 @@ class ReachPolicy(TrainedPolicy):
         expect_layout(checkpoint, LAYOUTS[self.view], N_ACT)
         self.goals: GoalRule = preset.episode.goals
         """Set of the training goals."""
+        self.limits: LimitRule = preset.episode.limits
+        """Limits of the joints in training."""
+        self.blocked: BlockedRules | None = blocked_rules_of(preset)
+        """Rules of an arm that contacts block in training; None where they do not."""
         self.action: ActionSettings = preset.action.settings
         """Meaning of the actions (docs/method.md 2.2)."""
         self.targets: Vec | None = None

@@ -15,7 +15,7 @@ from app.policies.algorithms.exploration import Exploration, OUNoise, PerEnvAR1N
 from app.policies.algorithms.quantiles import QuantileCritics
 from app.policies.algorithms.td3 import Networks
 from app.policies.configs.reach import ReachExploration, ReachPreset
-from app.policies.inference.reach_policy import LAYOUTS, PEOPLE_SET
+from app.policies.inference.reach_policy import LAYOUTS, PEOPLE_SET, blocked_rules_of
 from app.policies.networks.actor_critic import Critics, PlainActor, ResidualActor
 from app.policies.networks.ddpg import DDPGActor, DDPGCritics, RunningNormalisation
 from app.policies.training.reporter import Callbacks, Reporter
@@ -26,8 +26,8 @@ from app.sim.core.arrays import Vec
 from app.sim.envs.tasks import ArmTask
 from app.sim.people.kernels.pedestrian import VX, VY, R, X, Y
 from app.sim.pick.batch import OUTCOMES
-from app.sim.reach.batch import N_ACT, ReachBatch, ReachSettings
-from app.sim.reach.blocked_batch import BlockedReachBatch
+from app.sim.reach.batch import N_ACT, ReachSettings
+from app.sim.reach.blocked_batch import new_reach_batch
 from app.sim.reach.kernels.observation import BASE_START
 from app.sim.reach.kernels.reward import ReachWeights
 from app.sim.reach.mixed_batch import MixedReachBatch, ReachEnvironments
@@ -52,8 +52,7 @@ def settings_of(preset: ReachPreset) -> ReachSettings:
         start_clearance_m=episode.start_clearance_m,
         collision_ends=episode.collision == "terminates",
         limits=episode.limits,
-        command_cost=preset.reward.c_u,
-        bonus_alone=preset.reward.bonus == "alone",
+        blocked=blocked_rules_of(preset),
         action=preset.action.settings,
         observation=episode.observation,
         weights=ReachWeights(**weights, gamma=1.0),
@@ -67,8 +66,7 @@ def batch_of(preset: ReachPreset, cell: Cell, n_envs: int, seed: int) -> ReachEn
         return MonitoredReachBatch(cell, n_envs, seed, settings, safety_settings(cell))
     if preset.people.count == "up-to":
         return MixedReachBatch(cell, n_envs, seed, settings)
-    kind = BlockedReachBatch if preset.episode.collision == "blocks" else ReachBatch
-    return kind(cell, n_envs, seed, settings)
+    return new_reach_batch(cell, n_envs, seed, settings)
 
 
 def exploration_of(

@@ -22,13 +22,13 @@ from app.sim.people.kernels.people import People
 from app.sim.people.pedestrian import AUTHORS_WALK, pedestrian_rules
 from app.sim.prediction.weights import new_motion_predictor
 from app.sim.reach.goal_sets import N_HALTON, halton_targets
-from app.sim.reach.joint_limits import with_authors_limits
 from app.sim.reach.kernels import episode, queries
 from app.sim.reach.kernels.observation import ALL_PEOPLE, N_FEATURES, N_STATE
 from app.sim.reach.kernels.observation_workspace import new_observation_workspace
 from app.sim.reach.kernels.option_features import N_OPTION_FEATURES
 from app.sim.reach.kernels.people_set import N_PEOPLE_SET
 from app.sim.reach.kernels.reward import ReachWeights
+from app.sim.reach.recipe_rules import BlockedRules, with_authors_limits
 from app.sim.robot.actions import ActionSettings
 from app.sim.scenario.batch import EnvBatch
 from app.sim.scenario.kernels.episode import FEATURES, FORECAST, PEOPLE_SET, PLAIN, Indices
@@ -99,11 +99,9 @@ class ReachSettings:
     """Whether a collision ends the episode. If not, the episode continues until success or
     timeout and then counts as a collision."""
     limits: LimitRule = "cell"
-    """Limits of the joints: the cell's, or those of the authors (``joint_limits.py``)."""
-    command_cost: float = 0.0
-    """Cost of the norm of the action; read by BlockedReachBatch."""
-    bonus_alone: bool = False
-    """Whether the success bonus replaces the other terms; read by BlockedReachBatch."""
+    """Limits of the joints: the cell's, or those of the authors (``recipe_rules.py``)."""
+    blocked: BlockedRules | None = None
+    """Reward where a contact blocks the arm, for ``new_reach_batch``; None: it does not."""
     work: HumanMotionConfig = field(default=REACHING)
     """Motion, body dimensions and yielding of the workers."""
     action: ActionSettings = field(default=DEFAULT_ACTION)
@@ -147,7 +145,7 @@ def stated_rules(cell: Cell, settings: ReachSettings) -> dict[str, Any]:
         "time_limit_s": settings.time_limit_s,
     }
     if settings.limits != "cell":
-        stated["limits"] = settings.limits
+        stated |= {"limits": settings.limits, "blocked": settings.blocked is not None}
     if settings.goals == "halton":
         stated["n_halton"] = settings.n_halton
     if settings.start == "clearance":

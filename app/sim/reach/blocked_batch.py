@@ -11,8 +11,10 @@ Source: docs/method.md 2.3; the reward (4.25)-(4.28), with the norm of the actio
 import numpy as np
 from numpy.typing import NDArray
 
-from app.sim.reach.batch import ReachBatch
+from app.sim.cells.cell import Cell
+from app.sim.reach.batch import ReachBatch, ReachSettings
 from app.sim.reach.kernels import queries
+from app.sim.reach.recipe_rules import BlockedRules
 from app.sim.scenario.kernels.episode import RUNNING, SUCCESS_DISTANCE
 
 CONTACT = 2e-3
@@ -74,10 +76,23 @@ class BlockedReachBatch(ReachBatch):
         self, act: NDArray[np.float32], contact: NDArray[np.bool_]
     ) -> NDArray[np.float64]:
         """Return the rewards of this period, shape (n_envs,)."""
-        settings, d = self.settings, self.state.distance
-        weights = settings.weights
+        weights, d = self.settings.weights, self.state.distance
+        rules = self.settings.blocked or BlockedRules()
         cost = weights.c_d * d + weights.c_c * contact
-        cost = cost + settings.command_cost * np.linalg.norm(act, axis=1)
+        cost = cost + rules.command_cost * np.linalg.norm(act, axis=1)
         reached = (self._ended != RUNNING) & (d < SUCCESS_DISTANCE) & ~contact
-        rest = 0.0 if settings.bonus_alone else cost
+        rest = 0.0 if rules.bonus_alone else cost
         return np.where(reached, weights.c_s - rest, -cost)
+
+
+def new_reach_batch(cell: Cell, n_envs: int, seed: int, settings: ReachSettings) -> ReachBatch:
+    """Return reach environments; contacts block the arm where the settings say so.
+
+    Args:
+        cell: Work cell with a goal region.
+        n_envs: Number of environments.
+        seed: Seed of the episodes.
+        settings: Settings of the scenario.
+    """
+    kind = ReachBatch if settings.blocked is None else BlockedReachBatch
+    return kind(cell, n_envs, seed, settings)

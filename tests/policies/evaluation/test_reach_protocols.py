@@ -9,12 +9,14 @@ import pytest
 from app.errors import InvalidInput
 from app.policies.checkpoints import pretrained
 from app.policies.evaluation.reach import episodes as reach_episodes
+from app.policies.evaluation.reach.bench import ReachBench
 from app.policies.evaluation.reach.people import SPEEDS, at_speed
 from app.policies.evaluation.reach.random_goals import RINGS
 from app.policies.evaluation.reach.targets import STARTS
 from app.policies.evaluation.reach.tracker import ROLLOUT_ROWS, ROWS
 from app.policies.evaluation.registry import OF_REACHING, evaluate
 from app.sim.cells.cell import load_cell
+from app.sim.scenario.kernels.episode import COLLISION
 from tests.policies.untrained import shipped_as, untrained_reach
 
 N = 24
@@ -45,6 +47,19 @@ def run(name: str) -> tuple[dict, list]:
         on_row=lambda *what: reported.append(what),
     )
     return result, reported
+
+
+def test_a_recipe_of_the_thesis_is_measured_by_the_rules_of_its_training() -> None:
+    recipe = {"actor": "ddpg", "critic": "ddpg", "normalisation": "running", "width": 16}
+    rules = {"collision": "blocks", "limits": "authors", "observation": "state"}
+    checkpoint = untrained_reach(**recipe, **rules, c_p=0.0, c_step=0.0)
+    bench = ReachBench(checkpoint, 5)
+    assert (bench.usual.limits, bench.usual.collision_ends) == ("authors", False)
+    episodes = bench.on_targets(1)
+    collided = episodes.outcome == COLLISION
+    assert len(episodes.outcome) == 54 and collided.any()
+    assert (episodes.duration_s[collided] > 0.02).all()
+    assert episodes.duration_s[collided].max() == pytest.approx(5.0)
 
 
 @pytest.mark.parametrize("name", MEASURED)

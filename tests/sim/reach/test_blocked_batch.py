@@ -7,7 +7,8 @@ from app.policies.configs import presets
 from app.policies.training.reach import batch_of
 from app.sim.cells.cell import load_cell
 from app.sim.reach.batch import ReachBatch, ReachSettings
-from app.sim.reach.blocked_batch import BlockedReachBatch
+from app.sim.reach.blocked_batch import BlockedReachBatch, new_reach_batch
+from app.sim.reach.recipe_rules import BlockedRules
 from app.sim.scenario.kernels.episode import COLLISION, RUNNING, SUCCESS, TIMEOUT
 
 DOWN = np.array([0.0, 1.0, 0.0, 0.0, 0.0, 0.0], dtype=np.float32)
@@ -80,6 +81,13 @@ def test_an_episode_with_a_contact_goes_on_and_counts_as_a_collision():
     envs = alone()
     outcomes = [envs.step(DOWN[None], auto_reset=False).ended[0] for _ in range(250)]
     assert outcomes[:-1] == [RUNNING] * 249 and outcomes[-1] == COLLISION
+
+
+def test_settings_say_whether_contacts_block():
+    cell = load_cell("shared-workspace")
+    made = new_reach_batch(cell, 1, 1, ReachSettings(blocked=BlockedRules()))
+    assert isinstance(made, BlockedReachBatch)
+    assert type(new_reach_batch(cell, 1, 1, ReachSettings())) is ReachBatch
 
 
 def test_where_nothing_touches_the_motion_is_that_of_other_environments():

@@ -111,10 +111,13 @@ class ReachBench:
 
     @property
     def usual(self) -> ReachSettings:
-        """Default rules: grid, start clearance 0.05 m, 5 s."""
+        """Default rules: grid, start clearance 0.05 m, 5 s; limits and contacts as trained."""
         return ReachSettings(
             action=self.actor.action,
             observation=self.actor.view,
+            limits=self.actor.limits,
+            blocked=self.actor.blocked,
+            collision_ends=self.actor.blocked is None,
             start="clearance",
             start_clearance_m=0.05,
             time_limit_s=5.0,

@@ -20,6 +20,7 @@ from app.policies.inference.controllers import Controller
 from app.sim.cells.cell import Cell
 from app.sim.core.arrays import Vec
 from app.sim.reach.batch import ReachBatch, ReachSettings, goal_region_of
+from app.sim.reach.blocked_batch import new_reach_batch
 from app.sim.scenario.kernels import episode as kernel
 
 Index = NDArray[np.int64]
@@ -166,7 +167,7 @@ def run_episodes(
         goals: Goal of each episode [m], shape (n, 3).
         seed: Seed of the episodes.
     """
-    batch = ReachBatch(cell, min(N_ENVS, len(goals)), seed, settings)
+    batch = new_reach_batch(cell, min(N_ENVS, len(goals)), seed, settings)
     return _Queue(batch, controller, goals).run()
 
 
@@ -201,7 +202,7 @@ def recheck_contacts(
     Arguments as :func:`run_episodes`.
     """
     n = min(len(goals), N_RECHECKED)
-    batch = ReachBatch(cell, n, seed, settings)
+    batch = new_reach_batch(cell, n, seed, settings)
     trace = Trace(batch, n, RECHECK_PARTS)
     batch.reset()
     batch.set_goals(np.arange(n), goals[:n])

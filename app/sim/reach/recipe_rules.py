@@ -1,6 +1,7 @@
-"""Joint limits of the thesis' authors (docs/method.md 2.5)."""
+"""Rules of the recipes of the thesis: blocked arms, and joint limits (docs/method.md 2.5)."""
 
 import math
+from dataclasses import dataclass
 
 from app.sim.cells.cell import Cell
 
@@ -12,6 +13,16 @@ AUTHORS_LIMITS = {
 }
 """Joint ranges of the authors' code [rad]; no limit of acceleration: at 1 rad/s and 50 Hz any
 speed is reached within a period [rad/s^2]."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BlockedRules:
+    """Reward where a contact blocks the arm (``blocked_batch.py``)."""
+
+    command_cost: float = 0.0
+    """Cost of the norm of the action."""
+    bonus_alone: bool = False
+    """Whether the success bonus replaces the other terms."""
 
 
 def with_authors_limits(cell: Cell) -> Cell:
