@@ -30,7 +30,14 @@ from app.api.registry import (
 )
 from app.api.service_state import ServiceState
 from app.api.services import LiveWorld, Services
-from app.errors import Damaged, ServiceError
+from app.errors import (
+    Damaged,
+    NotReady,
+    ServiceError,
+    StorageDamaged,
+    StorageFull,
+    StorageUnavailable,
+)
 from app.live.reach.interfaces import LiveReachPolicy
 from app.policies.checkpoints import pretrained
 from app.policies.checkpoints.checkpoint import CHOOSING, SORTING, load, require_purpose
@@ -61,6 +68,8 @@ WORLD_ID = "main"
 LIVE_CELL = "pick-and-place"
 STOP_S = 5.0
 """Time for the compilation of kernels to end when the service stops [s]."""
+RETRY_S = 1.0
+"""Time from a failed write of the start to its repetition [s]."""
 STATIC = Path(web.__file__).parent / "page"
 
 
@@ -173,7 +182,7 @@ class Service:
         readiness = self.parts.readiness
         try:
             readiness.reason = "warming up: loading the shipped checkpoints"
-            publish_shipped(self.parts.checkpoints)
+            self._store_shipped()
             readiness.reason = "warming up: compiling the simulator's kernels"
             policy = self.parts.task_policies.load(DEFAULT_ALIAS)
             warm_up(load_cell(LIVE_CELL))
@@ -198,6 +207,20 @@ class Service:
         except Exception as error:
             readiness.failed, readiness.reason = True, f"the start failed: {error}"
             logger.exception("the live cell could not start")
+
+    def _store_shipped(self) -> None:
+        """Store the shipped checkpoints; waits while the database takes no writes."""
+        while not self.parts.stopping.is_set():
+            try:
+                publish_shipped(self.parts.checkpoints)
+            except StorageDamaged:
+                raise
+            except (StorageFull, StorageUnavailable) as error:
+                self.parts.readiness.reason = f"warming up: waiting, {error.short}"
+                self.parts.stopping.wait(RETRY_S)
+            else:
+                return
+        raise NotReady("stopping")
 
     def _look_for_damage(self) -> None:
         """Record the damaged checkpoints of the store."""

@@ -58,6 +58,8 @@ class Timeouts:
     """Time from a renewal of the lease until another server may take it [s]."""
     shutdown_s: float = 8.0
     """Time for the workers' last checkpoints when the server stops [s]."""
+    late_s: float = 15.0
+    """Time without a heartbeat until the database is checked for a lock [s]."""
     lock_s: float = 30.0
     """Time for the heartbeat of a silent worker once the database takes writes again [s]."""
     retry_s: float = 5.0
@@ -325,13 +327,15 @@ class Supervisor:
         leaving = worker.leaving_since
         if leaving is not None and now - leaving > self._timeouts.cancel_s:
             return True
-        if now - worker.heartbeat_seen <= self._timeouts.silence_s:
+        silence = now - worker.heartbeat_seen
+        if silence <= min(self._timeouts.late_s, self._timeouts.silence_s):
             worker.writable_since = None
             return False
         if worker.writable_since is None:  # no heartbeat reaches a database without writes
             self._store.check_writable()
             worker.writable_since = time.monotonic()
-        return now - worker.writable_since > self._timeouts.lock_s
+        is_dead = now - worker.writable_since > self._timeouts.lock_s
+        return is_dead and silence > self._timeouts.silence_s
 
     def _shut_down(self) -> None:
         deadline = time.monotonic() + self._timeouts.shutdown_s

@@ -1,4 +1,6 @@
+import sqlite3
 import time
+from pathlib import Path
 
 import pytest
 from fastapi.testclient import TestClient
@@ -45,3 +47,31 @@ def test_app_can_be_started_again_after_it_was_closed(cold_app_settings: Setting
     for _ in range(2):
         with TestClient(create_app(cold_app_settings), base_url=ADDRESS) as one:
             assert one.get("/v1/jobs").status_code == 200
+
+
+def test_list_of_jobs_says_that_the_database_is_locked_and_the_start_waits(
+    tmp_path: Path,
+) -> None:
+    file = tmp_path / "tandem.db"
+    settings = Settings(data=tmp_path, database_url=f"sqlite:///{file}?timeout=0.2")
+    with TestClient(create_app(settings), base_url=ADDRESS) as cold:
+        body = {"kind": "train", "preset": "pick-td3"}
+        posted = cold.post("/v1/jobs", json=body, headers={"Idempotency-Key": "first"}).json()
+        other = sqlite3.connect(file, isolation_level=None, timeout=60.0)
+        other.execute("BEGIN IMMEDIATE")
+
+        def wait_for(waiting: str | None) -> None:
+            give_up = time.monotonic() + 300.0
+            while cold.get("/v1/jobs").json()["waiting"] != waiting:
+                assert time.monotonic() < give_up
+                time.sleep(0.05)
+
+        wait_for("database locked")
+        refused = cold.post("/v1/jobs", json=body)
+        assert (refused.status_code, refused.headers["retry-after"]) == (503, "2")
+        assert refused.json()["type"] == "urn:tandem:problem:storage-unavailable"
+        other.execute("ROLLBACK")
+        other.close()
+        wait_for(None)
+        (job,) = cold.get("/v1/jobs").json()["items"]
+        assert (job["id"], job["state"], job["failures"]) == (posted["id"], "running", 0)
