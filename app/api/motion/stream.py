@@ -12,6 +12,7 @@ import logging
 import time
 from collections import deque
 from collections.abc import Awaitable, Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -196,7 +197,7 @@ def _reduced(
 
 
 def _malformed(text: str | None) -> tuple[ProblemResponse | None, object]:
-    """Return the problem of a message that is no JSON, or None, and its data.
+    """Return the problem of a message that is no JSON, or None, and its request or data.
 
     Raises:
         ValueError: It is no JSON.
@@ -205,11 +206,12 @@ def _malformed(text: str | None) -> tuple[ProblemResponse | None, object]:
     if text is None or len(text) > MAX_MESSAGE:
         rule = f"a message must be JSON text of at most {MAX_MESSAGE} characters"
         return problem(413 if text else 400, rule, instance=PATH), None
-    body = json.loads(text)
     fault = fault_in_json(text.encode())
     if fault is None:
-        return None, body
-    return member_problem(422, "invalid-input", fault, PATH), body
+        with suppress(ValidationError):
+            return None, MotionRequest.model_validate_json(text)
+    body = json.loads(text)
+    return None if fault is None else member_problem(422, "invalid-input", fault, PATH), body
 
 
 def _problem(error: Exception) -> ProblemResponse:
@@ -231,7 +233,7 @@ def _problem(error: Exception) -> ProblemResponse:
 
 def _stamp_of(body: object) -> dict[str, object]:
     """Return the stamp of a request, which identifies a problem on a socket."""
-    stamp = body.get("stamp") if isinstance(body, dict) else None
+    stamp = body.get("stamp") if isinstance(body, dict) else getattr(body, "stamp", None)
     is_text = isinstance(stamp, str) and len(stamp) <= MAX_STAMP
     is_time = isinstance(stamp, int | float) and -MAX_TIME < stamp < MAX_TIME
     return {"stamp": stamp} if is_text or is_time else {}
