@@ -11,7 +11,7 @@ actions on ended jobs in ``.job_actions``.
 """
 
 import uuid
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from datetime import UTC, datetime
 from typing import Any, get_args
@@ -98,12 +98,45 @@ def list_jobs(
     Raises:
         InvalidInput: The cursor or limit is invalid.
     """
+    return _page(store, cursor, limit, [] if state is None else [_in_state(state)])
+
+
+def list_evaluations(
+    store: Store,
+    *,
+    protocol: str | None = None,
+    checkpoint: str | None = None,
+    cursor: str | None = None,
+    limit: int = 50,
+) -> Page[JobRecord]:
+    """Return one page of the succeeded evaluations, newest first.
+
+    Args:
+        store: The database.
+        protocol: Only of this protocol.
+        checkpoint: Only of the checkpoint with this SHA-256.
+        cursor: ``next_cursor`` of the page before; None for the first.
+        limit: Length of the page, 1 to 200.
+
+    Raises:
+        InvalidInput: The cursor or limit is invalid.
+    """
+    where = [jobs.c.state == "succeeded", jobs.c.kind == "evaluate", jobs.c.result.is_not(None)]
+    for name, value in (("protocol", protocol), ("checkpoint", checkpoint)):
+        if value is not None:
+            where.append(jobs.c.result[name].as_string() == value)
+    return _page(store, cursor, limit, where)
+
+
+def _page(
+    store: Store, cursor: str | None, limit: int, where: Sequence[sa.ColumnElement[bool]]
+) -> Page[JobRecord]:
+    """Return one page of the jobs that meet all conditions, newest first."""
     query = sa.select(jobs).order_by(jobs.c.number.desc()).limit(check_limit(limit) + 1)
     below = decode_cursor(cursor)
     if below is not None:
         query = query.where(jobs.c.number < below)
-    if state is not None:
-        query = query.where(_in_state(state))
+    query = query.where(*where)
     with store.reading() as connection:
         rows = connection.execute(query).mappings().all()
     items = tuple(job_from_row(row) for row in rows[:limit])

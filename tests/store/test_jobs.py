@@ -114,3 +114,23 @@ def test_finished_job_cannot_be_cancelled(store: Store, claim: Claim) -> None:
     completion.finish(store, claim)
     with pytest.raises(Conflict, match="'succeeded' is final: job 1"):
         jobs.request_cancel(store, claim.job_id)
+
+
+def test_succeeded_evaluations_are_selected_by_protocol_and_checkpoint(store: Store) -> None:
+    made = []
+    for protocol, checkpoint in (("a", "1"), ("b", "1"), ("b", "2")):
+        jobs.create_job(store, NewJob(kind="evaluate", spec={"protocol": protocol}))
+        found = attempts.claim_next(store)
+        assert found is not None
+        result = {"protocol": protocol, "checkpoint": checkpoint}
+        completion.finish(store, found[0], result=result)
+        made.append(found[0].job_id)
+    queue(store, 1)
+
+    def listed(**query: str) -> list[str]:
+        return [job.id for job in jobs.list_evaluations(store, **query).items]
+
+    assert listed() == made[::-1]
+    assert listed(protocol="b") == made[:0:-1]
+    assert listed(protocol="b", checkpoint="1") == [made[1]]
+    assert listed(checkpoint="3") == []

@@ -1,11 +1,15 @@
-"""Comparison of jobs: fields that differ, curves with a band over seeds, CSV."""
+"""Results of jobs: evaluations; comparison of fields and curves with a band over seeds, CSV."""
 
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Query, Response
 
 from app.api.schemas.comparison import ComparisonPublic
+from app.api.schemas.evaluations import EvaluationList, EvaluationPublic
 from app.api.services import ServicesDep
+from app.errors import InvalidInput, NotFound
+from app.policies.evaluation.registry import PROTOCOLS
+from app.store.jobs import get_job, list_evaluations
 from jobs.comparison import MAX_JOBS, compare, curves_as_csv
 
 JobIds = Annotated[
@@ -13,10 +17,10 @@ JobIds = Annotated[
 ]
 NO_JOB: dict[int | str, dict[str, Any]] = {404: {"description": "There is no such job"}}
 
-router = APIRouter(prefix="/v1/comparison", tags=["jobs"])
+router = APIRouter(prefix="/v1", tags=["results"])
 
 
-@router.get("", summary="Compare jobs", responses=NO_JOB)
+@router.get("/comparison", summary="Compare jobs", responses=NO_JOB)
 def get_comparison(
     services: ServicesDep,
     job: JobIds,
@@ -32,7 +36,7 @@ def get_comparison(
 
 
 @router.get(
-    "/csv",
+    "/comparison/csv",
     summary="Download the curves of jobs",
     response_class=Response,
     responses={**NO_JOB, 200: {"content": {"text/csv": {}}, "description": "points by job"}},
@@ -44,3 +48,32 @@ def get_comparison_csv(services: ServicesDep, job: JobIds) -> Response:
         media_type="text/csv",
         headers={"Content-Disposition": 'attachment; filename="jobs.csv"'},
     )
+
+
+@router.get("/evaluations", summary="List the evaluations")
+def list_all_evaluations(
+    services: ServicesDep,
+    protocol: Annotated[str | None, Query(description="only of this protocol")] = None,
+    checkpoint: Annotated[
+        str | None, Query(description="only of this checkpoint, by SHA-256 or alias")
+    ] = None,
+    cursor: Annotated[str | None, Query(description="next_cursor of the page before")] = None,
+    limit: Annotated[int, Query(description="length of the page, 1 to 200")] = 50,
+) -> EvaluationList:
+    """Return one page of the results of succeeded evaluations, newest first."""
+    if protocol is not None and protocol not in PROTOCOLS:
+        raise InvalidInput("protocol", protocol, "is no protocol", tuple(PROTOCOLS))
+    sha256 = services.checkpoints.aliases.get(checkpoint or "", checkpoint)
+    page = list_evaluations(
+        services.store, protocol=protocol, checkpoint=sha256, cursor=cursor, limit=limit
+    )
+    return EvaluationList.from_domain(page)
+
+
+@router.get("/evaluations/{job_id}", summary="One evaluation")
+def get_evaluation(job_id: str, services: ServicesDep) -> EvaluationPublic:
+    """Return the result of a succeeded evaluation, by the id of its job."""
+    job = get_job(services.store, job_id)
+    if job.kind != "evaluate" or job.result is None:
+        raise NotFound("evaluation", job_id)
+    return EvaluationPublic.from_domain(job)
