@@ -1,7 +1,10 @@
-from collections.abc import Iterator
+import re
+from collections.abc import Iterator, Sequence
+from typing import Any
 
 import pytest
 from fastapi.testclient import TestClient
+from starlette.routing import Mount, Route, WebSocketRoute
 from starlette.websockets import WebSocketDisconnect
 
 from app.errors import InvalidInput
@@ -9,7 +12,19 @@ from app.main import create_app
 from app.settings import Settings
 
 TOKEN = "a-token-of-some-length"
-OPEN = {"/session", "/healthz", "/readyz"}
+OPEN_FOR = {
+    "/session": ["POST"],
+    "/healthz": ["GET", "HEAD"],
+    "/readyz": ["GET", "HEAD"],
+    "/favicon.ico": ["GET", "HEAD"],
+}
+"""Paths that docs/setup.md names as open, with their methods."""
+OPEN = set(OPEN_FOR)
+BESIDE = ("/nothing", "/healthz/", "//healthz", "/HEALTHZ", "/static/../healthz/x", "/session/")
+"""Paths that no route has."""
+MOUNTED = ("", "/", "/index.html", "/app.js", "/nothing.js")
+"""Files of a mounted folder."""
+METHODS = "GET HEAD POST PUT PATCH DELETE OPTIONS TRACE CONNECT PROPFIND".split()
 
 
 @pytest.fixture(scope="module")
@@ -75,19 +90,72 @@ def test_other_address_without_token_is_refused() -> None:
         create_app(Settings(host="0.0.0.0"))
 
 
-def test_every_route_asks_for_the_token(guarded: TestClient) -> None:
-    paths = set(guarded.get("/openapi.json", headers=bearer()).json()["paths"])
-    paths |= {"/", "/static/index.html", "/docs", "/openapi.json", "/viewer/main/", "/nothing"}
-    for path in paths - OPEN:
-        for method in ("GET", "POST"):
-            answer = guarded.request(method, path)
-            assert answer.status_code == 401, (method, path)
-            assert answer.headers["www-authenticate"] == "Bearer"
+def walk(routes: Sequence[Any], prefix: str = "") -> Iterator[tuple[str, bool]]:
+    """Yield the path of every route, and whether it is a socket; of mounts, files too."""
+    for route in routes:
+        if (included := getattr(route, "original_router", None)) is not None:
+            yield from walk(included.routes, prefix)
+        elif isinstance(route, Mount):
+            yield from walk(route.routes or (), prefix + route.path)
+            yield from ((prefix + route.path + file, False) for file in MOUNTED)
+        else:
+            assert isinstance(route, Route | WebSocketRoute), f"{route} is of an unknown kind"
+            path = re.sub(r"\{(world_id)\}", "main", prefix + route.path)
+            yield re.sub(r"\{\w+\}", "pick", path), isinstance(route, WebSocketRoute)
 
 
-def test_viewer_socket_asks_for_the_token(guarded: TestClient) -> None:
-    with pytest.raises(WebSocketDisconnect), guarded.websocket_connect("/viewer/main/"):
-        pass
+def every_path(guarded: TestClient) -> dict[str, bool]:
+    """The paths of the application, of which some are sockets, too."""
+    found: dict[str, bool] = {}
+    for path, is_socket in walk(guarded.app.routes):  # type: ignore[attr-defined]
+        found[path] = found.get(path, False) or is_socket
+    described = set(guarded.get("/openapi.json", headers=bearer()).json()["paths"])
+    assert len(found) > len(described) >= 20
+    assert sum(found.values()) >= 3
+    return found
+
+
+def test_walk_reaches_what_is_served(guarded: TestClient) -> None:
+    paths = every_path(guarded)
+    known = ("/", "/openapi.json", "/docs", "/static/app.js", "/viewer/main/", "/v1/jobs")
+    assert set(known) | OPEN <= set(paths)
+    assert paths["/viewer/main/"] and paths["/v1/motion/stream"]
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_every_route_asks_for_the_token(guarded: TestClient, method: str) -> None:
+    for path in set(every_path(guarded)) - OPEN | set(BESIDE):
+        answer = guarded.request(method, path, follow_redirects=False)
+        assert answer.status_code == 401, (method, path)
+        assert answer.headers["www-authenticate"] == "Bearer"
+        assert answer.headers["content-type"] == "application/problem+json"
+        assert not answer.content if method == "HEAD" else "token" in answer.text
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_open_path_answers_only_what_it_is_open_for(guarded: TestClient, method: str) -> None:
+    for path, methods in OPEN_FOR.items():
+        answer = guarded.request(method, path, json={}, follow_redirects=False)
+        if method in methods:
+            assert answer.status_code in (200, 422, 503), (method, path)
+        else:
+            assert answer.status_code == 405, (method, path)
+
+
+def test_every_socket_asks_for_the_token(guarded: TestClient) -> None:
+    for path in every_path(guarded).keys() - OPEN:
+        with (
+            pytest.raises(WebSocketDisconnect) as refused,
+            guarded.websocket_connect(path, subprotocols=["viser-v1.1.1"]),
+        ):
+            pass
+        assert (refused.value.code, refused.value.reason) == (1008, "token-needed"), path
+
+
+def test_open_path_is_no_socket(guarded: TestClient) -> None:
+    for path in OPEN:
+        with pytest.raises(WebSocketDisconnect), guarded.websocket_connect(path):
+            pass
 
 
 @pytest.mark.parametrize("given", ["", "Bearer", "Bearer wrong", f"Basic {TOKEN}", TOKEN])

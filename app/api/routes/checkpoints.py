@@ -37,7 +37,7 @@ def list_checkpoints(
     services: ServicesDep,
     job_id: Annotated[str | None, Query(description="only those this job made")] = None,
     cursor: Annotated[str | None, Query(description="next_cursor of the page before")] = None,
-    limit: Annotated[int, Query(description="length of the page, 1 to 200")] = 50,
+    limit: Annotated[int, Query(ge=1, le=200, description="length of the page")] = 50,
 ) -> CheckpointList:
     """Return one page, newest first, shipped ones included."""
     page = checkpoints.list_checkpoints(

@@ -55,7 +55,7 @@ def create_job(
 def list_jobs(
     services: ServicesDep,
     cursor: Annotated[str | None, Query(description="next_cursor of the page before")] = None,
-    limit: Annotated[int, Query(description="length of the page, 1 to 200")] = 50,
+    limit: Annotated[int, Query(ge=1, le=200, description="length of the page")] = 50,
     state: Annotated[JobState | None, Query(description="only jobs in this state")] = None,
 ) -> JobList:
     """Return one page, newest first."""

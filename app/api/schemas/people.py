@@ -42,6 +42,7 @@ Coordinate = Annotated[
 ]
 """A number, or missing; NaN also as text, which JSON has no number for."""
 Keypoint = Annotated[list[Coordinate], Field(max_length=8)] | None
+KeypointName = Annotated[str, Field(json_schema_extra={"enum": list(BODY_25)})]
 Lengths = Annotated[list[Finite], Field(min_length=N_SIZE, max_length=N_SIZE)]
 ORDER = ", ".join(BODY_25)
 UNUSABLE = (
@@ -66,10 +67,14 @@ def _in_order(value: object) -> object:
     return [value.get(name) for name in BODY_25]
 
 
+_ListOfKeypoints = Annotated[
+    list[Keypoint], Field(min_length=N_KEYPOINTS, max_length=N_KEYPOINTS)
+]
 OfKeypoints = Annotated[
-    list[Keypoint],
-    Field(min_length=N_KEYPOINTS, max_length=N_KEYPOINTS),
-    BeforeValidator(_in_order),
+    _ListOfKeypoints,
+    BeforeValidator(
+        _in_order, json_schema_input_type=_ListOfKeypoints | dict[KeypointName, Keypoint]
+    ),
 ]
 """A list in the order of BODY_25, or a mapping of some of its names."""
 
