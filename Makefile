@@ -43,7 +43,7 @@ SAY := @printf '==> %s\n'
 
 export PYTHONUNBUFFERED = 1
 
-.PHONY: help run setup test test-browser test-postgres test-slow check format bench tables world docs lock clean
+.PHONY: help run setup test test-browser test-postgres test-slow check format bench tables world docs client lock clean
 
 help: ## list the targets
 	@grep -E '^[a-z-]+:.*## ' Makefile | sed -E 's/:.*## /\t/' | expand -t 16
@@ -88,6 +88,9 @@ tables: $(VENV)/dev.stamp ## write the tables of README, docs and model cards fr
 
 world: $(VENV)/dev.stamp ## measure, draw and write docs/world.md
 	@$(PY) -m tools.docs.world.page
+
+client: $(VENV)/dev.stamp ## write app/client/operations.py from the OpenAPI document
+	@$(PY) -m tools.generate_client
 
 lock: $(VENV)/dev.stamp ## resolve the lock files (UPGRADE=--upgrade: newest versions)
 	@$(PIP) install --quiet uv==$(UV)

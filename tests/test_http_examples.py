@@ -32,6 +32,7 @@ DECISIONS = [
     for text in re.findall(r"```sh\n(.*?)```", page.read_text("utf-8"), re.DOTALL)
     if DECIDES.search(text)
 ]
+PYTHON = re.findall(r"```python\n(.*?)```", TEXT, re.DOTALL)
 SAMPLES = [json.loads(one) for one in re.findall(r"```json\n(.*?)```", TEXT, re.DOTALL)]
 
 
@@ -88,6 +89,17 @@ def test_documented_request_is_answered_without_a_flag(text: str, address: str) 
     output = shell(text.replace("curl -s ", "curl -sf "), address)
     answer = json.loads(output)
     assert flagged(answer) == []
+
+
+@pytest.mark.parametrize("text", PYTHON)
+def test_python_example_runs(
+    text: str, address: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    exec(compile(text.replace("http://127.0.0.1:8000", address), "example", "exec"), {})
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0].startswith("cube")
+    assert lines[-2] == "end {'state': 'cancelled'}"
+    assert lines[-1].startswith("preset is no preset ['pick-td3'")
 
 
 def test_what_is_flagged_is_found_wherever_it_is() -> None:

@@ -1,0 +1,10 @@
+"""Python client of a running server; ``pip install tandem[client]``.
+
+operations  One method per operation of the OpenAPI document; written by ``make client``
+transport   Requests, problems and event streams over HTTP
+"""
+
+from app.client.operations import Client
+from app.client.transport import Refused, StreamEvent
+
+__all__ = ["Client", "Refused", "StreamEvent"]

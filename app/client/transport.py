@@ -1,0 +1,158 @@
+"""Requests, problems and event streams over HTTP, for the operations of the client."""
+
+import json
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any, Literal, Self, TypeVar, get_args, get_origin
+
+import httpx
+from pydantic import BaseModel
+
+from app.api.problems import Problem
+
+TIMEOUT_S = 30.0
+"""Default time limit of an answer [s]."""
+M = TypeVar("M", bound=BaseModel)
+Json = Mapping[str, Any]
+
+
+class Refused(Exception):
+    """The server answered a problem.
+
+    Args:
+        problem: The problem, with status, detail and, for bad input, field and rule.
+        retry_after: Time after which to ask again [s]; None where not stated.
+    """
+
+    def __init__(self, problem: Problem, retry_after: float | None) -> None:
+        super().__init__(f"{problem.status} {problem.title}: {problem.detail}")
+        self.problem, self.retry_after = problem, retry_after
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StreamEvent:
+    """One event of a stream."""
+
+    event: str
+    """its kind"""
+    id: str
+    """id to go on after; empty where the stream cannot be resumed"""
+    data: dict[str, Any]
+    """its content"""
+
+
+class Transport:
+    """A connection to one server; close it, or use it in ``with``.
+
+    Args:
+        address: Address of the server, with the path of a reverse proxy.
+        token: The server's token; None on loopback.
+        timeout_s: Time limit of an answer [s].
+    """
+
+    def __init__(
+        self,
+        address: str = "http://127.0.0.1:8000",
+        *,
+        token: str | None = None,
+        timeout_s: float = TIMEOUT_S,
+    ) -> None:
+        headers = {} if token is None else {"Authorization": f"Bearer {token}"}
+        self._timeout_s = timeout_s
+        self._http = httpx.Client(base_url=address, headers=headers, timeout=timeout_s)
+
+    def close(self) -> None:
+        """Close the connection."""
+        self._http.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def _send(
+        self,
+        method: str,
+        path: str,
+        *,
+        query: Json | None = None,
+        headers: Json | None = None,
+        body: BaseModel | Json | None = None,
+        content: bytes | None = None,
+    ) -> httpx.Response:
+        """Return an answer.
+
+        Raises:
+            Refused: The server answered a problem.
+        """
+        answer = self._http.request(
+            method,
+            path,
+            params=_given(query),
+            headers=_texts(headers),
+            json=_json_of(body) if isinstance(body, BaseModel) else body,
+            content=content,
+        )
+        _raise_problem(answer)
+        return answer
+
+    def _parsed(self, model: type[M], answer: httpx.Response) -> M:
+        """Return the content of an answer as its schema."""
+        return model.model_validate_json(answer.content)
+
+    def _events(self, path: str, *, headers: Json | None = None) -> Iterator[StreamEvent]:
+        """Yield the events of a stream until it ends.
+
+        Raises:
+            Refused: The server answered a problem.
+        """
+        pauses = httpx.Timeout(self._timeout_s, read=None)  # between events
+        with self._http.stream("GET", path, headers=_texts(headers), timeout=pauses) as answer:
+            if answer.is_error:
+                answer.read()
+                _raise_problem(answer)
+            fields: dict[str, str] = {}
+            for line in answer.iter_lines():
+                name, _, value = line.partition(": ")
+                if name:
+                    fields[name] = fields[name] + "\n" + value if name in fields else value
+                    continue
+                if "data" in fields:
+                    yield StreamEvent(
+                        event=fields.get("event", "message"),
+                        id=fields.get("id", ""),
+                        data=json.loads(fields["data"]),
+                    )
+                fields = {}
+
+
+def _raise_problem(answer: httpx.Response) -> None:
+    if not answer.is_error:
+        return
+    try:
+        problem = Problem.model_validate_json(answer.content)
+    except ValueError:  # of a proxy in between
+        answer.raise_for_status()
+        raise
+    after = answer.headers.get("retry-after")
+    raise Refused(problem, None if after is None else float(after))
+
+
+def _given(values: Json | None) -> dict[str, Any]:
+    """Return the parameters that are not left to their default."""
+    return {name: value for name, value in (values or {}).items() if value is not None}
+
+
+def _texts(values: Json | None) -> dict[str, str]:
+    return {name: str(value) for name, value in _given(values).items()}
+
+
+def _json_of(body: BaseModel) -> dict[str, Any]:
+    """Return the fields that were set, and the tag of one of several kinds."""
+    tags = {
+        name: field.default
+        for name, field in type(body).model_fields.items()
+        if get_origin(field.annotation) is Literal and len(get_args(field.annotation)) == 1
+    }
+    return {**tags, **body.model_dump(mode="json", exclude_unset=True)}

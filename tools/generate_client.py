@@ -1,0 +1,198 @@
+"""Writes ``app/client/operations.py`` from the OpenAPI document: ``make client``."""
+
+import subprocess
+import sys
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from pydantic import BaseModel
+
+from app.main import create_app
+from app.settings import Settings
+
+TARGET = Path(__file__).parents[1] / "app" / "client" / "operations.py"
+MAX_VARIANTS = 4
+"""Kinds of a body up to which each is named; above, their common base class."""
+PLAIN = {"integer": "int", "number": "float", "boolean": "bool", "string": "str"}
+HEAD = '''"""One method per operation of the OpenAPI document; written by ``make client``.
+
+Bodies are the service's own schemas, or mappings of their JSON. A problem raises ``Refused``.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, Literal
+from urllib.parse import quote
+
+{imports}
+
+class Client(Transport):
+    """The operations of a server."""
+
+'''
+
+Node = Mapping[str, Any]
+
+
+def models() -> dict[str, type[BaseModel]]:
+    """Return the models of the service by name; a class name exists once."""
+
+    def below(model: type[BaseModel]) -> Iterator[type[BaseModel]]:
+        for one in model.__subclasses__():
+            yield one
+            yield from below(one)
+
+    return {
+        one.__name__: one
+        for one in below(BaseModel)
+        if one.__module__.startswith(("app.", "jobs."))
+    }
+
+
+class Writer:
+    """Writes methods, and collects the models that they name.
+
+    Args:
+        document: The OpenAPI document.
+    """
+
+    def __init__(self, document: Node) -> None:
+        self._document = document
+        self._models = models()
+        self._used: set[type] = set()
+
+    def module(self) -> str:
+        """Return the whole module."""
+        methods = [
+            self._method(method, path, operation)
+            for path, operations in self._document["paths"].items()
+            for method, operation in operations.items()
+        ]
+        imports = "\n".join(
+            f"from {one.__module__} import {one.__name__}"
+            for one in sorted(self._used, key=lambda one: (one.__module__, one.__name__))
+        )
+        imports += "\nfrom app.client.transport import StreamEvent, Transport\n"
+        return _formatted(HEAD.replace("{imports}", imports) + "\n".join(methods))
+
+    def _method(self, method: str, path: str, operation: Node) -> str:
+        parameters = operation.get("parameters", [])
+        of_path = [one["name"] for one in parameters if one["in"] == "path"]
+        named = [one for one in parameters if one["in"] != "path"]
+        arguments = ["self", *(f"{name}: str" for name in of_path)]
+        parts = []
+        if (body := operation.get("requestBody")) is not None:
+            media = body["content"].get("application/json")
+            arguments.append(
+                "content: bytes" if media is None else f"body: {self._body(media)}"
+            )
+            parts.append("content=content" if media is None else "body=body")
+        if named:
+            arguments.append("*")
+            ordered = sorted(named, key=lambda one: not one.get("required", False))
+            arguments += [self._argument(one) for one in ordered]
+        for place, word in (("query", "query"), ("header", "headers")):
+            pairs = [f'"{one["name"]}": {_name(one)}' for one in named if one["in"] == place]
+            if pairs:
+                parts.append(f"{word}={{{', '.join(pairs)}}}")
+        for name in of_path:
+            path = path.replace(f"{{{name}}}", f"{{quote({name}, safe='')}}")
+        address = f'f"{path}"' if of_path else f'"{path}"'
+        kind, ending = self._answer(operation, f'"{method.upper()}"', address, parts)
+        return (
+            f"    def {operation['operationId']}({', '.join(arguments)}) -> {kind}:\n"
+            f'        """{operation["summary"]}."""\n        {ending}\n'
+        )
+
+    def _answer(
+        self, operation: Node, method: str, address: str, parts: list[str]
+    ) -> tuple[str, str]:
+        """Return the type of an answer, and the statement that returns it."""
+        send = f"self._send({', '.join([method, address, *parts])})"
+        status = next(one for one in operation["responses"] if one.startswith("2"))
+        content = operation["responses"][status].get("content", {})
+        if "text/event-stream" in content:
+            return (
+                "Iterator[StreamEvent]",
+                f"return self._events({', '.join([address, *parts])})",
+            )
+        if not content:
+            return "None", send
+        if "application/json" not in content:
+            is_text = next(iter(content)).startswith("text/")
+            return (
+                ("str", f"return {send}.text")
+                if is_text
+                else ("bytes", f"return {send}.content")
+            )
+        model = self._model(content["application/json"]["schema"])
+        if model is None:
+            return "dict[str, Any]", f"return dict({send}.json())"
+        return model, f"return self._parsed({model}, {send})"
+
+    def _body(self, media: Node) -> str:
+        """Return the type of a JSON body."""
+        schema = media["schema"]
+        names = [one for one in map(self._model, schema.get("oneOf", [schema])) if one]
+        if len(names) > MAX_VARIANTS:
+            lines = [self._models[name].__mro__ for name in names]
+            base = next(one for one in lines[0] if all(one in line for line in lines))
+            self._used -= {self._models[name] for name in names}
+            self._used.add(base)
+            names = [base.__name__]
+        return " | ".join([*names, "Mapping[str, Any]"])
+
+    def _model(self, schema: Node) -> str | None:
+        name = str(schema.get("$ref", "")).rpartition("/")[2]
+        name = name.removesuffix("-Input").removesuffix("-Output")
+        if name not in self._models:
+            return None
+        self._used.add(self._models[name])
+        return name
+
+    def _argument(self, parameter: Node) -> str:
+        kind, default = _type(parameter["schema"]), ""
+        if not parameter.get("required", False):
+            default = " = None"
+            kind = kind if kind.endswith("None") else f"{kind} | None"
+        return f"{_name(parameter)}: {kind}{default}"
+
+
+def _name(parameter: Node) -> str:
+    return str(parameter["name"]).replace("-", "_")
+
+
+def _type(schema: Node) -> str:
+    """Return the type of a parameter."""
+    if "anyOf" in schema:
+        return " | ".join(_type(one) for one in schema["anyOf"])
+    if "enum" in schema:
+        return f"Literal[{', '.join(map(repr, schema['enum']))}]"
+    if schema.get("type") == "array":
+        return f"Sequence[{_type(schema['items'])}]"
+    return PLAIN.get(schema.get("type", ""), "None")
+
+
+def _formatted(text: str) -> str:
+    """Return a module as ``ruff`` formats it, without unused imports."""
+    name = ["--stdin-filename", str(TARGET), "-"]
+    for command in (["check", "--quiet", "--fix-only"], ["format", "--quiet"]):
+        done = subprocess.run(
+            [sys.executable, "-m", "ruff", *command, *name],
+            input=text,
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        text = done.stdout
+    return text
+
+
+def render() -> str:
+    """Return the module of the present service."""
+    return Writer(create_app(Settings.model_validate({"data": "nowhere"})).openapi()).module()
+
+
+if __name__ == "__main__":
+    TARGET.write_text(render(), "utf-8")
+    print(f"wrote {TARGET}: {len(TARGET.read_text('utf-8').splitlines())} lines")
