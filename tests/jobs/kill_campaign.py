@@ -2,7 +2,7 @@
 
 Kills, stops and terminates servers and workers at random moments, also during start, migration,
 post and cancel, and checks after every SERIES kills that nothing acknowledged is lost. The
-folder has the progress: the same command goes on after an interruption. ``report.json`` in it
+folder has the progress: the same command goes on after an interruption. Its file *report.json*
 counts kills, jobs and their ends.
 """
 
