@@ -30,14 +30,7 @@ from app.api.registry import (
 )
 from app.api.service_state import ServiceState
 from app.api.services import LiveWorld, Services
-from app.errors import (
-    Damaged,
-    NotReady,
-    ServiceError,
-    StorageDamaged,
-    StorageFull,
-    StorageUnavailable,
-)
+from app.errors import Damaged, NotReady, ServiceError
 from app.live.reach.interfaces import LiveReachPolicy
 from app.policies.checkpoints import pretrained
 from app.policies.checkpoints.checkpoint import CHOOSING, SORTING, load, require_purpose
@@ -51,6 +44,7 @@ from app.sim.cells.cell import Cell, load_cell
 from app.sim.pick.task_policy import TaskPolicy
 from app.sim.sorting.decision import warm_up as warm_up_sorting
 from app.sim.sorting.sorting_values import SortingValues
+from app.storage_errors import StorageDamaged, StorageFull, StorageUnavailable
 from app.store.checkpoints import find_damaged
 from app.store.engine import Store
 from jobs.cell_catalog import CellCatalog

@@ -12,7 +12,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from app import logs
-from app.errors import InvalidInput, ServiceError, StorageFull, StorageUnavailable
+from app.errors import InvalidInput, ServiceError
+from app.storage_errors import StorageFull, StorageUnavailable
 from app.store.engine import Store
 from app.store.records import Claim
 from app.store.schema import check_schema

@@ -22,14 +22,8 @@ from pathlib import Path
 from opentelemetry.context import Context
 from opentelemetry.trace import NoOpTracer, Span, StatusCode, Tracer
 
-from app.errors import (
-    Conflict,
-    LeaseLost,
-    NotFound,
-    StaleAttempt,
-    StorageFull,
-    StorageUnavailable,
-)
+from app.errors import Conflict, NotFound
+from app.storage_errors import LeaseLost, StaleAttempt, StorageFull, StorageUnavailable
 from app.store import attempts, completion, reserve
 from app.store.engine import Store
 from app.store.lease import LEASE_S, Lease

@@ -14,13 +14,8 @@ from collections.abc import Callable, Mapping
 from types import FrameType
 from typing import Any
 
-from app.errors import (
-    ServiceError,
-    StaleAttempt,
-    StorageDamaged,
-    StorageFull,
-    StorageUnavailable,
-)
+from app.errors import ServiceError
+from app.storage_errors import StaleAttempt, StorageDamaged, StorageFull, StorageUnavailable
 from app.store import attempts, completion, fencing, metrics
 from app.store.engine import Store
 from app.store.jobs import get_job

@@ -39,11 +39,9 @@ from app.errors import (
     NotReady,
     ServiceError,
     SimulationError,
-    StorageDamaged,
-    StorageFull,
-    StorageUnavailable,
 )
 from app.logs import REQUEST_ID
+from app.storage_errors import StorageDamaged, StorageFull, StorageUnavailable
 
 logger = logging.getLogger(__name__)
 

@@ -9,8 +9,8 @@ from prometheus_client.registry import Collector
 
 from app.api.motion.load import MAX_SOCKETS
 from app.api.services import MAX_VIEWERS, Services
-from app.errors import StorageFull, StorageUnavailable
 from app.live.snapshot import WorldSnapshot
+from app.storage_errors import StorageFull, StorageUnavailable
 from app.store.jobs import count_jobs, list_jobs
 
 Labelled = Iterable[tuple[tuple[str, ...], float]]

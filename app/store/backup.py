@@ -22,7 +22,8 @@ from datetime import UTC, datetime
 from pathlib import Path, PurePosixPath
 from typing import IO, Any
 
-from app.errors import Conflict, InvalidInput, StorageDamaged, StorageFull, StorageUnavailable
+from app.errors import Conflict, InvalidInput
+from app.storage_errors import StorageDamaged, StorageFull, StorageUnavailable
 from app.store.engine import BUSY_TIMEOUT_S, Store
 from app.store.lock import ServerLock
 from app.store.schema import REVISION

@@ -29,13 +29,8 @@ from sqlalchemy.exc import (
 )
 from sqlalchemy.pool import ConnectionPoolEntry
 
-from app.errors import (
-    InvalidInput,
-    ServiceError,
-    StorageDamaged,
-    StorageFull,
-    StorageUnavailable,
-)
+from app.errors import InvalidInput, ServiceError
+from app.storage_errors import StorageDamaged, StorageFull, StorageUnavailable
 
 logger = logging.getLogger(__name__)
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import sqlalchemy as sa
 
-from app.errors import StaleAttempt
+from app.storage_errors import StaleAttempt
 from app.store.engine import Store
 from app.store.events import append_event
 from app.store.jobs import find_job

@@ -16,7 +16,8 @@ from datetime import UTC, datetime, timedelta
 
 import sqlalchemy as sa
 
-from app.errors import Conflict, LeaseLost
+from app.errors import Conflict
+from app.storage_errors import LeaseLost
 from app.store.engine import Store
 from app.store.lock import ServerLock
 from app.store.tables import leases

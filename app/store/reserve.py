@@ -5,7 +5,7 @@ from typing import TypeVar
 
 import sqlalchemy as sa
 
-from app.errors import StorageFull
+from app.storage_errors import StorageFull
 from app.store.engine import Store
 from app.store.tables import reserve
 

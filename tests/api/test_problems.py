@@ -18,8 +18,8 @@ from app.errors import (
     NotReady,
     ServiceError,
     SimulationError,
-    StorageFull,
 )
+from app.storage_errors import StorageFull
 
 ERRORS: list[tuple[ServiceError, int]] = [
     (NotFound("job", "x"), 404),

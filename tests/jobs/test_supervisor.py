@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from app.errors import Conflict, StorageUnavailable
+from app.errors import Conflict
+from app.storage_errors import StorageUnavailable
 from app.store import attempts, checkpoints, events, job_actions, jobs, metrics
 from app.store.engine import Store
 from jobs.executor import LocalProcess

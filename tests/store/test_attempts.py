@@ -4,7 +4,8 @@ from collections.abc import Callable
 import pytest
 
 from app.digests import digest
-from app.errors import InvalidInput, StaleAttempt
+from app.errors import InvalidInput
+from app.storage_errors import StaleAttempt
 from app.store import attempts, checkpoints, completion, events, fencing, jobs, metrics
 from app.store.engine import Store
 from app.store.records import Claim, NewCheckpoint, NewJob, ResumeState

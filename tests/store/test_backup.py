@@ -10,7 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from app.errors import Conflict, InvalidInput, StorageDamaged, StorageFull
+from app.errors import Conflict, InvalidInput
+from app.storage_errors import StorageDamaged, StorageFull
 from app.store import attempts, backup, checkpoints, jobs, metrics
 from app.store.backup import restore_backup, write_backup
 from app.store.engine import Store

@@ -10,7 +10,8 @@ import sqlalchemy as sa
 from alembic import command
 
 from app.digests import digest
-from app.errors import Damaged, NotFound, StorageUnavailable
+from app.errors import Damaged, NotFound
+from app.storage_errors import StorageUnavailable
 from app.store import attempts, cells, checkpoints, completion, jobs, metrics, recordings
 from app.store.engine import Store
 from app.store.migrate import alembic_config, migrate

@@ -6,7 +6,8 @@ import pytest
 import sqlalchemy as sa
 from sqlalchemy import event
 
-from app.errors import InvalidInput, StorageFull, StorageUnavailable
+from app.errors import InvalidInput
+from app.storage_errors import StorageFull, StorageUnavailable
 from app.store import attempts, completion, jobs, metrics
 from app.store.engine import Store
 from app.store.migrate import migrate

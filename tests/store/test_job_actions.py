@@ -2,7 +2,8 @@ from dataclasses import replace
 
 import pytest
 
-from app.errors import NotFound, StaleAttempt, WrongState
+from app.errors import NotFound, WrongState
+from app.storage_errors import StaleAttempt
 from app.store import attempts, completion, job_actions, jobs
 from app.store.engine import Store
 from app.store.records import Claim, JobRecord, NewCheckpoint, NewJob, ResumeState

@@ -4,7 +4,8 @@ from pathlib import Path
 import pytest
 import sqlalchemy as sa
 
-from app.errors import Conflict, LeaseLost
+from app.errors import Conflict
+from app.storage_errors import LeaseLost
 from app.store import attempts, completion, jobs, reserve
 from app.store.engine import Store
 from app.store.lease import Lease

@@ -7,7 +7,8 @@ from alembic.autogenerate import compare_metadata
 from alembic.migration import MigrationContext
 from alembic.script import ScriptDirectory
 
-from app.errors import Conflict, StorageDamaged
+from app.errors import Conflict
+from app.storage_errors import StorageDamaged
 from app.store.engine import Store
 from app.store.migrate import alembic_config, migrate
 from app.store.schema import REVISION, check_schema

@@ -20,7 +20,8 @@ from safetensors.numpy import load as load_arrays
 from safetensors.numpy import save as save_arrays
 from stable_baselines3.common.buffers import ReplayBuffer
 
-from app.errors import Damaged, StorageFull
+from app.errors import Damaged
+from app.storage_errors import StorageFull
 
 FILE_BYTES = 32 * 1024 * 1024
 """Size of a file of transitions, approximately [bytes]."""
