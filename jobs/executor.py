@@ -142,10 +142,14 @@ class LocalProcess:
 
 
 def _tail(handle: LocalHandle) -> str:
-    with handle.log.open("rb") as log:
-        end = log.seek(0, os.SEEK_END)
-        log.seek(max(handle.log_start, end - TAIL_BYTES))
-        return log.read().decode(errors="replace").strip()
+    """Return the end of what an attempt logged; empty once its job was deleted."""
+    try:
+        with handle.log.open("rb") as log:
+            end = log.seek(0, os.SEEK_END)
+            log.seek(max(handle.log_start, end - TAIL_BYTES))
+            return log.read().decode(errors="replace").strip()
+    except FileNotFoundError:
+        return ""
 
 
 def search_path(environment: Mapping[str, str]) -> str:

@@ -13,7 +13,11 @@ from packaging.utils import canonicalize_name
 ROOT = Path(__file__).resolve().parent.parent
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 ROOTS = ("app", "jobs", "web")
-EXTRAS = {"tools/distance_fields.py": "dev", "app/policies/inference/onnx_export.py": "onnx"}
+EXTRAS = {
+    "app/client/transport.py": "client",
+    "app/policies/inference/onnx_export.py": "onnx",
+    "tools/distance_fields.py": "dev",
+}
 """Modules that are imported only where an extra is installed."""
 
 
@@ -53,7 +57,7 @@ def test_every_declared_package_is_locked_but_torch() -> None:
     runtime, everything = pins("requirements.lock"), pins("requirements-dev.lock")
     for lines, lock in (
         (PROJECT["project"]["dependencies"], runtime),
-        (extras["dev"] + extras["onnx"] + extras["otel"], everything),
+        (extras["dev"] + extras["client"] + extras["onnx"] + extras["otel"], everything),
     ):
         for requirement in map(Requirement, lines):
             if requirement.name != "torch":

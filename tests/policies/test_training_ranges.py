@@ -8,7 +8,7 @@ from app.sim.pick.batch import PickBatch, PickSettings
 
 
 def test_people_who_are_not_there_widen_no_range() -> None:
-    ranges, work = Ranges(None), HumanMotionConfig(absent=0.5)
+    ranges, work = Ranges(), HumanMotionConfig(absent=0.5)
     batch = PickBatch(load_cell(), 64, 1, PickSettings(work=work))
     batch.reset()
     ranges.look(visited_states(batch))
@@ -18,7 +18,7 @@ def test_people_who_are_not_there_widen_no_range() -> None:
 
 
 def test_a_cell_without_people_has_no_range_of_people() -> None:
-    ranges, work = Ranges(None), HumanMotionConfig(absent=1.0)
+    ranges, work = Ranges(), HumanMotionConfig(absent=1.0)
     batch = PickBatch(load_cell(), 8, 1, PickSettings(work=work))
     batch.reset()
     ranges.look(visited_states(batch))

@@ -11,7 +11,7 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
-from app.api.routes.motion import decide
+from app.api.motion.decision import decide
 from app.api.schemas.motion import MotionAnswer, MotionRequest
 from app.api.tracker_sessions import TrackerSession, TrackerSessions
 from app.errors import ClockJump

@@ -55,7 +55,7 @@ def test_exported_pick_policy_acts_and_values_as_the_checkpoint() -> None:
     checkpoint = pretrained.load("pick")
     obs = observations(checkpoint)
     act, value = played(checkpoint, obs)
-    expected = ValueNetworks(checkpoint).act_and_value(obs)
+    expected = ValueNetworks(checkpoint).evaluate(obs)
     np.testing.assert_allclose(act, expected[0], atol=TOLERANCE)
     np.testing.assert_allclose(value[:, 0], expected[1], atol=TOLERANCE)
 
