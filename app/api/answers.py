@@ -41,6 +41,8 @@ _RAW = tuple((name.lower().encode(), value.encode()) for name, value in HEADERS.
 ID_HEADER = b"x-request-id"
 _ID = re.compile(rb"[A-Za-z0-9._:/+=-]{1,128}")
 _RANDOM = Random()
+NOT_READY = 503
+"""Status that monitors get again and again while the service starts."""
 READS = ("GET", "HEAD", "OPTIONS")
 DECIDING = "deciding"
 """Tag of the routes whose answers are not logged one by one."""
@@ -122,7 +124,7 @@ class Answers:
         route, method = scope.get("route"), scope["method"]
         self.metrics.observe(method, getattr(route, "path", UNROUTED), status, seconds)
         changes = method not in READS and DECIDING not in getattr(route, "tags", ())
-        if status >= 400 or changes:
+        if (status >= 400 and status != NOT_READY) or changes:
             fields = {"status": status, "duration_s": round(seconds, 6)}
             logger.info("%s %s", method, path_of(scope), extra=fields)
 

@@ -2,6 +2,7 @@
 import { html, useEffect, useState } from "../vendor/htm-preact-standalone.module.js";
 import { Icon } from "../icons.js";
 import { Comparison, MAX_JOBS } from "./compare.js";
+import { CheckpointCards } from "./checkpointcards.js";
 import { isActive } from "./jobactions.js";
 import { JobList, QueueWaits } from "./jobs.js";
 import { TrainForm, usePresets } from "./trainform.js";
@@ -48,5 +49,6 @@ export function Training({ link, cell, jobs, error, waiting, refresh, acting, on
         onClone=${(job) => setForm({ from: job })}
         onNew=${form ? null : () => setForm({})} />
     </section>
+    <${CheckpointCards} link=${link} jobs=${jobs} acting=${acting} />
   </div>`;
 }

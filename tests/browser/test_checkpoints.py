@@ -1,0 +1,66 @@
+"""A visitor looks at the stored checkpoints, names one, uploads one and compares two."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Page, expect
+
+from app.policies.checkpoints import pretrained
+from tests import patient_http
+
+pytestmark = pytest.mark.browser
+
+FOLDER = Path(pretrained.__file__).parent
+NAME = "of-a-visitor"
+
+
+def card(alias: str) -> str:
+    return f'[data-checkpoint="{pretrained.SHA256[alias]}"]'
+
+
+def opened(open_page: Callable[..., Page], alias: str) -> Page:
+    page = open_page(scene=False)
+    page.click("#tab-training")
+    page.click(f"{card(alias)} .job-head")
+    return page
+
+
+def test_alias_is_added_and_removed(open_page: Callable[..., Page], server: str) -> None:
+    page = opened(open_page, "reach")
+    page.fill("[data-role=alias]", NAME)
+    page.click("[data-action=alias]")
+    alias = page.locator(f'button[title$="{NAME}"]')
+    expect(alias).to_be_visible()
+    found = patient_http.get(f"{server}/v1/aliases/{NAME}").json()
+    assert found["checkpoint"] == pretrained.SHA256["reach"]
+    alias.click()
+    expect(alias).to_be_hidden()
+    assert patient_http.get(f"{server}/v1/aliases/{NAME}").status_code == 404
+
+
+def test_alias_of_a_shipped_checkpoint_is_kept(open_page: Callable[..., Page]) -> None:
+    page = opened(open_page, "reach")
+    page.click('button[title="Remove the alias reach"]')
+    expect(page.locator("[data-role=checkpoints] .field-error")).to_contain_text("shipped")
+
+
+def test_uploaded_files_make_the_same_checkpoint(open_page: Callable[..., Page]) -> None:
+    page = opened(open_page, "pick")
+    files = page.locator("[data-role=checkpoint-files]")
+    files.set_input_files([FOLDER / "reach.json"])
+    expect(page.locator(".upload .field-error")).to_contain_text("two files")
+    files.set_input_files([FOLDER / "reach.json", FOLDER / "reach.safetensors"])
+    expect(page.locator(".upload [role=status]")).to_contain_text(
+        pretrained.SHA256["reach"][:7]
+    )
+
+
+def test_two_checkpoints_are_compared_by_what_differs(open_page: Callable[..., Page]) -> None:
+    page = opened(open_page, "sorting-e0")
+    page.check(f"{card('sorting-e0')} [data-action=compare-checkpoint]")
+    page.click(f"{card('sorting-e1')} .job-head")
+    page.check(f"{card('sorting-e1')} [data-action=compare-checkpoint]")
+    table = page.locator("[data-role=checkpoint-differences] table")
+    expect(table.get_by_role("row", name="Cell")).to_contain_text("sorting-e1")
+    expect(table.get_by_role("row", name="Seed")).to_have_count(0)

@@ -1,0 +1,210 @@
+// Stored checkpoints: card, use, evaluations, aliases, upload, and two of them side by side.
+import { html, useEffect, useState } from "../vendor/htm-preact-standalone.module.js";
+import { get, postFile, put, remove } from "../api.js";
+import * as format from "../format.js";
+import { Icon } from "../icons.js";
+
+const PAGE = 100;
+const PURPOSES = { "choosing tasks": "task selection", "reaching goals": "reach", sorting: "sorting" };
+
+/** The section of the checkpoints; `acting` are the SHA-256 of those of the live cell. */
+export function CheckpointCards({ link, jobs, acting }) {
+  const [list, setList] = useState(null);
+  const [error, setError] = useState(null);
+  const [open, setOpen] = useState(null);
+  const [pair, setPair] = useState([]);
+  const refresh = () => get(`v1/checkpoints?limit=${PAGE}`).then(
+    (page) => { setList(page.items); setError(null); }, setError);
+  const stamp = (jobs ?? []).map((job) => job.state).join();
+  useEffect(() => { if (link === "live") refresh(); }, [link, stamp]);
+  const choose = (sha256) => setPair((now) =>
+    (now.includes(sha256) ? now.filter((one) => one !== sha256) : [...now, sha256].slice(-2)));
+  const compared = pair.map((sha256) => list?.find((c) => c.sha256 === sha256)).filter(Boolean);
+  return html`<section class="card" aria-labelledby="checkpoints-title" data-role="checkpoints">
+    <header class="card-head"><h2 id="checkpoints-title">Checkpoints</h2></header>
+    <${Upload} onDone=${(one) => { refresh(); setOpen(one.sha256); }} />
+    ${error && html`<p class="notice bad" role="alert"><${Icon} name="alert" />
+      The checkpoints could not be loaded: ${error.message}</p>`}
+    ${!list && !error && html`<div class="skeleton" aria-busy="true" aria-label="Loading checkpoints"></div>`}
+    ${list?.length === 0 && html`<p class="empty">No checkpoints yet: the shipped ones are stored
+      while the server starts.</p>`}
+    ${compared.length === 2 && html`<${Comparison} pair=${compared} jobs=${jobs}
+      onClose=${() => setPair([])} />`}
+    ${compared.length === 1 && html`<p class="faint" role="status">Choose a second checkpoint to compare.</p>`}
+    <ul class="jobs">${(list ?? []).map((one) => html`<${Card} key=${one.sha256} one=${one}
+      open=${open === one.sha256} chosen=${pair.includes(one.sha256)} acting=${acting} jobs=${jobs}
+      onOpen=${setOpen} onChoose=${choose} onChanged=${refresh} />`)}</ul>
+    ${list?.length === PAGE && html`<p class="faint">The newest ${PAGE} are shown.</p>`}
+  </section>`;
+}
+
+function Card({ one, open, chosen, acting, jobs, onOpen, onChoose, onChanged }) {
+  const acts = acting.includes(one.sha256);
+  return html`<li class=${`stored ${open ? "is-open" : ""}`} data-checkpoint=${one.sha256}>
+    <button type="button" class="job-head" aria-expanded=${String(open)}
+      onClick=${() => onOpen(open ? null : one.sha256)}>
+      <${Icon} name="chevron" />
+      <span class="job-name">${nameOf(one)}</span>
+      ${acts ? html`<span class="chip chip-good">acts</span>`
+        : html`<span class="chip">${PURPOSES[one.purpose] ?? one.purpose}</span>`}
+      <span class="job-sub">${subtitle(one)}</span>
+    </button>
+    ${open && html`<div class="job-detail">
+      <${Facts} entries=${Object.entries(facts(one))} />
+      <${Uses} one=${one} acts=${acts} jobs=${jobs} />
+      <${Aliases} one=${one} onChanged=${onChanged} />
+      <div class="job-actions">
+        <label class="tool"><input type="checkbox" data-action="compare-checkpoint" checked=${chosen}
+          onChange=${() => onChoose(one.sha256)} /> Compare</label>
+        <a class="tool" download href=${`v1/checkpoints/${one.sha256}/tensors`}>safetensors</a>
+        <a class="tool" download=${`${nameOf(one)}.json`}
+          href=${`v1/checkpoints/${one.sha256}/manifest`}>manifest</a>
+      </div></div>`}
+  </li>`;
+}
+
+function nameOf(one) {
+  return one.aliases.join(", ") || `${one.preset ?? "checkpoint"} ${format.short(one.sha256)}`;
+}
+
+function subtitle(one) {
+  const steps = one.step ?? one.manifest.step;
+  return [one.aliases.length > 0 && one.preset, Number.isFinite(steps) && `${format.steps(steps)} steps`,
+    format.ago(one.created_at)].filter(Boolean).join(" · ");
+}
+
+function facts(one) {
+  const { manifest } = one;
+  return {
+    Id: format.short(one.sha256),
+    Cell: manifest.cell ?? "–",
+    Seed: String(manifest.seed ?? "–"),
+    Steps: format.steps(one.step ?? manifest.step),
+    Updates: format.steps(manifest.updates),
+    "CPU time": format.duration(manifest.cpu_s),
+    Size: `${format.number(one.size / 1024 ** 2)} MiB`,
+    "Trained with": `torch ${manifest.versions?.torch ?? "–"}`,
+  };
+}
+
+function Facts({ entries }) {
+  return html`<dl class="facts">${entries.map(([name, text]) => html`<div key=${name}>
+    <dt>${name}</dt><dd>${text}</dd></div>`)}</dl>`;
+}
+
+/** Jobs among the listed ones that evaluated a checkpoint. */
+function evaluations(one, jobs) {
+  const names = [one.sha256, ...one.aliases];
+  return (jobs ?? []).filter((job) => job.kind === "evaluate" && names.includes(job.spec?.checkpoint));
+}
+
+function Uses({ one, acts, jobs }) {
+  const tested = evaluations(one, jobs);
+  const maker = jobs?.find((job) => job.id === one.job_id);
+  const uses = [
+    acts && "Acts in the live cell",
+    one.job_id ? `Made by job ${maker?.number ?? format.short(one.job_id)}` : "Shipped or uploaded",
+    ...tested.map((job) => `Job ${job.number} · ${job.spec.protocol}: ${job.state}`),
+  ].filter(Boolean);
+  return html`<ul class="uses" aria-label="Use">${uses.map((text) => html`<li key=${text}>${text}</li>`)}
+    </ul>${tested.filter((job) => job.result).map((job) => html`<dl class="rows" key=${job.id}>
+      ${rates(job).map(([name, text]) => html`<div key=${name}><dt>${name}</dt>
+        <dd><span>success</span><b>${text}</b></dd></div>`)}</dl>`)}`;
+}
+
+function rates(job) {
+  return (job.result?.results ?? []).filter((row) => row.success)
+    .map((row) => [row.name, format.interval(row.success)]);
+}
+
+function Aliases({ one, onChanged }) {
+  const [name, setName] = useState("");
+  const [error, setError] = useState(null);
+  const change = async (action) => {
+    try {
+      await action();
+      setName("");
+      setError(null);
+      onChanged();
+    } catch (problem) {
+      setError(problem);
+    }
+  };
+  const add = (event) => {
+    event.preventDefault();
+    change(() => put(`v1/aliases/${encodeURIComponent(name.trim())}`, { checkpoint: one.sha256 }));
+  };
+  return html`<form class="job-actions" onSubmit=${add} aria-label="Aliases">
+    ${one.aliases.map((alias) => html`<button type="button" class="tool" key=${alias}
+      title=${`Remove the alias ${alias}`}
+      onClick=${() => change(() => remove(`v1/aliases/${encodeURIComponent(alias)}`))}>
+      ${alias}<${Icon} name="close" /></button>`)}
+    <input data-role="alias" value=${name} placeholder="new alias" aria-label="New alias"
+      spellcheck="false" maxlength="64" onInput=${(event) => setName(event.target.value)} />
+    <button type="submit" class="tool" data-action="alias" disabled=${!name.trim()}>Add alias</button>
+    ${error && html`<span class="field-error" role="alert">${error.message}</span>`}
+  </form>`;
+}
+
+/** Manifest and tensors, chosen together, as one body: the manifest's line, then the tensors. */
+function Upload({ onDone }) {
+  const [answer, setAnswer] = useState({});
+  const send = async (event) => {
+    const files = [...event.target.files];
+    event.target.value = "";
+    const manifest = files.find((file) => file.name.endsWith(".json"));
+    const tensors = files.find((file) => file.name.endsWith(".safetensors"));
+    if (!manifest || !tensors || files.length !== 2) {
+      setAnswer({ error: "Choose two files: the manifest (.json) and the tensors (.safetensors)." });
+      return;
+    }
+    setAnswer({ busy: true });
+    try {
+      // Line ends stand between members only; the text of the numbers is part of the id.
+      const line = (await manifest.text()).replace(/[\r\n]+/g, " ");
+      const stored = await postFile("v1/checkpoints", new Blob([line, "\n", tensors]));
+      setAnswer({ stored });
+      onDone(stored);
+    } catch (problem) {
+      setAnswer({ error: problem.message });
+    }
+  };
+  return html`<div class="job-actions upload">
+    <label class="tool" title="The manifest (.json) and the tensors (.safetensors), at most 16 MiB">
+      <input class="sr" type="file" multiple accept=".json,.safetensors" data-role="checkpoint-files"
+        disabled=${Boolean(answer.busy)} onChange=${send} />
+      <${Icon} name="plus" />${answer.busy ? "Checking …" : "Upload"}</label>
+    ${answer.stored && html`<span class="faint" role="status">Stored ${format.short(answer.stored.sha256)}.</span>`}
+    ${answer.error && html`<span class="field-error" role="alert">${answer.error}</span>`}</div>`;
+}
+
+/** Facts, preset fields and evaluations of two checkpoints: those that differ. */
+function Comparison({ pair, jobs, onClose }) {
+  const columns = pair.map((one) => ({
+    Purpose: PURPOSES[one.purpose] ?? one.purpose, ...facts(one),
+    ...flat({ ...one.manifest.preset, name: undefined, cell: undefined }), ...latestRates(one, jobs),
+  }));
+  const names = [...new Set(columns.flatMap(Object.keys))]
+    .filter((name) => columns[0][name] !== columns[1][name]);
+  return html`<div class="differences" data-role="checkpoint-differences">
+    <table><thead><tr><th scope="col">differs</th>
+      ${pair.map((one) => html`<th scope="col" key=${one.sha256}>${nameOf(one)}</th>`)}</tr></thead>
+    <tbody>${names.map((name) => html`<tr key=${name}><th scope="row">${name}</th>
+      ${columns.map((column, k) => html`<td key=${k}>${column[name] ?? "–"}</td>`)}</tr>`)}</tbody></table>
+    <div class="job-actions"><button type="button" class="tool" onClick=${onClose}>Close the comparison
+      </button></div></div>`;
+}
+
+function flat(value, prefix = "") {
+  return Object.fromEntries(Object.entries(value).flatMap(([key, one]) => {
+    const name = prefix ? `${prefix}.${key}` : key;
+    return one !== null && typeof one === "object" && !Array.isArray(one)
+      ? Object.entries(flat(one, name)) : [[name, typeof one === "string" ? one : JSON.stringify(one)]];
+  }));
+}
+
+function latestRates(one, jobs) {
+  const found = evaluations(one, jobs).reverse().flatMap((job) =>
+    rates(job).map(([name, text]) => [`${job.spec.protocol}: ${name}`, text]));
+  return Object.fromEntries(found);
+}
