@@ -5,7 +5,8 @@
 The service runs in a process of its own. Its peer, a bare FastAPI route that returns its small
 body, is measured in alternation with every row: ``times_bare`` is the ratio of their answers
 per second. The rows ``...-training`` are measured beside a training job of the service.
-``task-selection`` chooses among 3 candidates, ``motion`` has a rollout (``motion-alone`` none),
+``task-selection`` chooses among 3 candidates beside a person in joint angles (``-keypoints``:
+in key-points, which are fitted first), ``motion`` has a rollout (``motion-alone`` none),
 ``risk-map`` has 3 x 2 positions, ``jobs`` lists 50 of 2,000 jobs.
 
 Clock time at the client: median, 99th and 99.9th percentile over all rounds.
@@ -21,6 +22,7 @@ import numpy as np
 import sqlalchemy as sa
 
 from app.api.schemas import examples
+from app.sim.human import model as human
 from app.store.engine import Store
 from app.store.migrate import migrate
 from app.store.tables import jobs
@@ -35,15 +37,21 @@ THREE = [
     *examples.TASK_SELECTION["candidates"],
     {"id": "middle", "position": [-0.1, 0.75, 0.12]},
 ]
+PEOPLE = [{"q": human.rest_posture(0.0, 1.45, -1.57).tolist(), "qd": [0.0] * 18}]
+"""A person in joint angles; the examples have key-points, which take a fit."""
 SORTING = {name: examples.PLAN[name] for name in ("cell", "objects", "goal")}
 REQUESTS = {
     "task-selection": Request(
+        path="/v1/task-selection",
+        body={**examples.TASK_SELECTION, "candidates": THREE, "people": PEOPLE},
+    ),
+    "task-selection-keypoints": Request(
         path="/v1/task-selection", body={**examples.TASK_SELECTION, "candidates": THREE}
     ),
     "motion": Request(path="/v1/motion", body=examples.MOTION),
     "motion-alone": Request(path="/v1/motion", body={**examples.MOTION, "rollout": False}),
-    "plan": Request(path="/v1/plan", body=examples.PLAN),
-    "risk-map": Request(path="/v1/risk-map", body=examples.RISK_MAP),
+    "plan": Request(path="/v1/plan", body={**examples.PLAN, "people": PEOPLE}),
+    "risk-map": Request(path="/v1/risk-map", body={**examples.RISK_MAP, "people": PEOPLE}),
     "sorting": Request(path="/v1/sorting", body=SORTING),
     "jobs": Request(path="/v1/jobs"),
 }
