@@ -68,6 +68,8 @@ class Client(asyncio.Protocol):
         self._body = b""
         self.done = asyncio.get_running_loop().create_future()
         """Set once the last answer has come; an exception where one is no 200."""
+        self.closed = asyncio.get_running_loop().create_future()
+        """Set once the connection is closed."""
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """Send the first request."""
@@ -98,6 +100,7 @@ class Client(asyncio.Protocol):
     def connection_lost(self, exc: Exception | None) -> None:
         """Fail where the server closed the connection."""
         self._end(exc or ConnectionError("the server closed the connection"))
+        self.closed.set_result(None)
 
     def _send(self) -> None:
         self._sent = time.perf_counter()
@@ -140,6 +143,10 @@ async def _load(address: str, request: Request, clients: int, seconds: float) ->
         for _ in range(clients)
     ]
     connected = await asyncio.gather(*opened)
-    await asyncio.gather(*(one.done for _, one in connected))
+    ends = await asyncio.gather(*(one.done for _, one in connected), return_exceptions=True)
     spent = time.perf_counter() - begin
+    await asyncio.gather(*(one.closed for _, one in connected))
+    for end in ends:
+        if end is not None:
+            raise end
     return Load(times_ms=np.array(times_ms), per_second=len(times_ms) / spent)
