@@ -78,7 +78,27 @@ class NotFound(ServiceError):
         return {"what": self.what, "name": self.name, "known": list(self.known)}
 
 
-class InvalidInput(ServiceError):
+class _BrokenRule(ServiceError):
+    """A field whose value breaks a rule; see the subclasses."""
+
+    def __init__(
+        self, message: str, field: str, value: object, rule: str, choices: Sequence[str]
+    ) -> None:
+        super().__init__(message)
+        self.field, self.value, self.rule = field, value, rule
+        self.choices = tuple(choices)
+
+    def problem(self) -> dict[str, object]:
+        """Return field, value, rule and choices."""
+        return {
+            "field": self.field,
+            "value": repr(self.value),
+            "rule": self.rule,
+            "choices": list(self.choices),
+        }
+
+
+class InvalidInput(_BrokenRule):
     """A value breaks a rule.
 
     Args:
@@ -92,18 +112,8 @@ class InvalidInput(ServiceError):
         self, field: str, value: object, rule: str, choices: Sequence[str] = ()
     ) -> None:
         listed = f"; choices: {', '.join(choices)}" if choices else ""
-        super().__init__(f"{field} = {value!r} {rule}{listed}")
-        self.field, self.value, self.rule = field, value, rule
-        self.choices = tuple(choices)
-
-    def problem(self) -> dict[str, object]:
-        """Return field, value, rule and choices."""
-        return {
-            "field": self.field,
-            "value": repr(self.value),
-            "rule": self.rule,
-            "choices": list(self.choices),
-        }
+        message = f"{field} = {value!r} {rule}{listed}"
+        super().__init__(message, field, value, rule, choices)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -208,7 +218,7 @@ class Conflict(ServiceError):
     """The request contradicts the present state."""
 
 
-class WrongState(Conflict):
+class WrongState(_BrokenRule, Conflict):
     """An object is not in the state that an action requires.
 
     Args:
@@ -221,18 +231,7 @@ class WrongState(Conflict):
     def __init__(
         self, field: str, value: object, rule: str, choices: Sequence[str] = ()
     ) -> None:
-        super().__init__(f"{field} = {value!r} {rule}")
-        self.field, self.value, self.rule = field, value, rule
-        self.choices = tuple(choices)
-
-    def problem(self) -> dict[str, object]:
-        """Return field, value, rule and choices."""
-        return {
-            "field": self.field,
-            "value": repr(self.value),
-            "rule": self.rule,
-            "choices": list(self.choices),
-        }
+        super().__init__(f"{field} = {value!r} {rule}", field, value, rule, choices)
 
 
 class ClockJump(Conflict):
