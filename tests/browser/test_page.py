@@ -71,6 +71,17 @@ def test_value_plot_draws_while_its_data_is_older_than_the_history(
     assert names == ["first"]
 
 
+def test_a_value_of_a_contact_does_not_flatten_the_plot(open_page: Callable[..., Page]) -> None:
+    page = open_page(scene=False)
+    ranges = page.evaluate(
+        """async () => {
+          const { valueRange } = await import("/static/live/value-plot.js");
+          return [[0.5, 2], [-10, 2], [-10, -7]].map(([low, high]) => valueRange(low, high));
+        }"""
+    )
+    assert ranges == [[0.5, 2], [-5, 2], [-8, -7]]
+
+
 def test_goal_chips_change_the_candidates_of_the_world(
     open_page: Callable[..., Page], server: str
 ) -> None:

@@ -2,7 +2,7 @@
 import { html, useEffect, useMemo, useRef, useState } from "./vendor/htm-preact-standalone.module.js";
 import * as format from "./format.js";
 import { SPAN_S } from "./live/history.js";
-import { drawValues } from "./live/value-plot.js";
+import { drawValues, valueRange } from "./live/value-plot.js";
 import { themeColours } from "./palette.js";
 
 const FONT = "11px Inter, system-ui, sans-serif";
@@ -77,7 +77,7 @@ function valueOptions(theme, ids, live) {
     cursor: { y: false, drag: { setScale: false, x: false, y: false }, points: { show: false } },
     scales: {
       x: { time: false, range: [-SPAN_S, 0] },
-      y: { range: (_, low, high) => padded(low, high, 0.6) },
+      y: { range: (_, low, high) => padded(...valueRange(low, high), 0.6) },
     },
     axes: [
       axis(theme, { size: 24, space: 70, values: (_, ticks) => ticks.map(secondsAgo) }),

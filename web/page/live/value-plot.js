@@ -7,6 +7,17 @@ const THIN = 1.6;
 const THICK = 3.4;
 
 /**
+ * Least value that sets the scale. A value below it means that a contact is expected: its line
+ * leaves the plot, so that a person who touches the arm does not flatten all other lines.
+ */
+const LEAST_SHOWN = -5;
+
+/** Ends of the value axis that shows values from `low` to `high`. */
+export function valueRange(low, high) {
+  return [Math.max(low, Math.min(LEAST_SHOWN, high - 1)), high];
+}
+
+/**
  * Draw hook of uPlot. The history may be newer than the plot's data, so the ids are those of the
  * plot's series, and what is chosen may have no column yet.
  */

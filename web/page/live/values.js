@@ -4,6 +4,7 @@ import * as format from "../format.js";
 import { SPAN_S } from "./history.js";
 import { ValuePlot } from "../plots.js";
 import { outsideText } from "./status.js";
+import { valueRange } from "./value-plot.js";
 
 export function Values({ world, cell, history, colourOf, labelOf }) {
   const [at, setAt] = useState(null);
@@ -116,7 +117,8 @@ function explain({ id, value, reachable, success, contact, time_s: time, outside
 function bounds(history, rows) {
   const seen = history.samples.flatMap((s) => [...s.values.values()]);
   const all = [...seen, ...rows.map((r) => r.value)].filter((v) => Number.isFinite(v));
-  const low = Math.min(0, Math.floor(Math.min(0, ...all) * 2) / 2);
-  const high = Math.max(low + 1, Math.ceil(Math.max(0, ...all) * 2) / 2);
+  const [least, most] = valueRange(Math.min(0, ...all), Math.max(0, ...all));
+  const low = Math.floor(least * 2) / 2;
+  const high = Math.max(low + 1, Math.ceil(most * 2) / 2);
   return { at: (v) => (100 * (Math.min(high, Math.max(low, v)) - low)) / (high - low) };
 }
