@@ -14,9 +14,9 @@ from typing import Any
 from app import logs
 from app.errors import InvalidInput, ServiceError
 from app.storage_errors import StorageFull, StorageUnavailable
+from app.store.database.schema import check_schema
 from app.store.engine import Store
 from app.store.records import Claim
-from app.store.schema import check_schema
 from jobs.worker import JobWorker, Runner
 
 logger = logging.getLogger(__name__)

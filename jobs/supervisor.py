@@ -24,13 +24,14 @@ from opentelemetry.trace import NoOpTracer, Span, StatusCode, Tracer
 
 from app.errors import Conflict, NotFound
 from app.storage_errors import LeaseLost, StaleAttempt, StorageFull, StorageUnavailable
-from app.store import attempts, completion, reserve
+from app.store import attempts, completion
+from app.store.database import reserve
+from app.store.database.lease import LEASE_S, Lease
+from app.store.database.lock import ServerLock
+from app.store.database.migrate import migrate
+from app.store.database.schema import check_schema
 from app.store.engine import Store
-from app.store.lease import LEASE_S, Lease
-from app.store.lock import ServerLock
-from app.store.migrate import migrate
 from app.store.records import Claim
-from app.store.schema import check_schema
 from jobs.executor import Executor, Exit, Handle, LocalProcess
 from jobs.resume_files import remove_unneeded
 from jobs.retention import Retention

@@ -13,7 +13,7 @@ from typing import Any
 
 import httpx
 
-from tests import patient_http
+from tests.support import patient_http
 
 ROOT = Path(__file__).parents[1]
 PATIENCE_S = 300.0

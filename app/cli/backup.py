@@ -10,7 +10,7 @@ from app.cli.options import Json, prepared_settings
 from app.cli.output import print_result
 
 if TYPE_CHECKING:
-    from app.store.backup import BackupSummary
+    from app.store.database.backup import BackupSummary
 
 File = Annotated[Path, typer.Argument(help="File of the backup.", show_default=False)]
 
@@ -18,7 +18,7 @@ File = Annotated[Path, typer.Argument(help="File of the backup.", show_default=F
 def backup(file: File, as_json: Json = False) -> None:
     """Copy the database and the files of the jobs into one file; the server may run."""
     settings = prepared_settings()
-    from app.store.backup import write_backup
+    from app.store.database.backup import write_backup
     from app.store.engine import Store
 
     store = Store(settings.database)
@@ -32,7 +32,7 @@ def backup(file: File, as_json: Json = False) -> None:
 def restore(file: File, as_json: Json = False) -> None:
     """Replace the database by that of a backup; the server must be stopped."""
     settings = prepared_settings()
-    from app.store.backup import restore_backup
+    from app.store.database.backup import restore_backup
     from app.store.engine import Store
 
     settings.data.mkdir(parents=True, exist_ok=True)

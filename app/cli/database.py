@@ -5,11 +5,11 @@ from contextlib import contextmanager
 
 from app.errors import Conflict, NotFound
 from app.settings import Settings
+from app.store.database.lease import Lease
+from app.store.database.lock import ServerLock
+from app.store.database.migrate import migrate
+from app.store.database.schema import check_schema
 from app.store.engine import Store
-from app.store.lease import Lease
-from app.store.lock import ServerLock
-from app.store.migrate import migrate
-from app.store.schema import check_schema
 
 
 def has_database(settings: Settings) -> bool:

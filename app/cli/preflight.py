@@ -6,9 +6,9 @@ import socket
 
 from app.errors import Conflict, InvalidInput
 from app.settings import Settings
+from app.store.database.lease import Lease
+from app.store.database.lock import ServerLock
 from app.store.engine import Store
-from app.store.lease import Lease
-from app.store.lock import ServerLock
 
 BACKLOG = 128
 

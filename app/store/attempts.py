@@ -15,12 +15,12 @@ import sqlalchemy as sa
 from app.digests import digest, has_digest
 from app.errors import InvalidInput
 from app.store.checkpoints import drop_job_checkpoints, insert_checkpoint
+from app.store.database.tables import events, job_checkpoints, jobs, metrics, resume_states
 from app.store.engine import Store
 from app.store.events import append_event
 from app.store.fencing import change_state, fenced_update
 from app.store.jobs import job_from_row, read_job
 from app.store.records import Claim, JobRecord, NewCheckpoint, ResumeState
-from app.store.tables import events, job_checkpoints, jobs, metrics, resume_states
 
 logger = logging.getLogger(__name__)
 

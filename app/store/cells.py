@@ -13,9 +13,9 @@ import sqlalchemy as sa
 
 from app.digests import digest, has_digest
 from app.errors import Conflict, Damaged, NotFound
+from app.store.database.tables import cells, jobs
 from app.store.engine import Store
 from app.store.records import CellRecord
-from app.store.tables import cells, jobs
 
 logger = logging.getLogger(__name__)
 

@@ -15,9 +15,9 @@ import sqlalchemy as sa
 from app.digests import has_digest
 from app.errors import Damaged, InvalidInput, NotFound
 from app.store.cursors import check_limit, decode_cursor, encode_cursor
+from app.store.database.tables import aliases, checkpoints, job_checkpoints
 from app.store.engine import Store
 from app.store.records import CheckpointRecord, NewCheckpoint, Page
-from app.store.tables import aliases, checkpoints, job_checkpoints
 
 logger = logging.getLogger(__name__)
 

@@ -9,12 +9,12 @@ from typing import Any, Literal
 
 import sqlalchemy as sa
 
+from app.store.database.reserve import write_with_reserve
+from app.store.database.tables import jobs, resume_states
 from app.store.engine import Store
 from app.store.fencing import change_state, fenced_update, peek
 from app.store.jobs import read_job
 from app.store.records import Claim, JobRecord
-from app.store.reserve import write_with_reserve
-from app.store.tables import jobs, resume_states
 
 MAX_ERROR = 4000
 """Longest error text of a job [characters]."""

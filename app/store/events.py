@@ -11,9 +11,9 @@ from typing import Any
 
 import sqlalchemy as sa
 
+from app.store.database.tables import events, metrics
 from app.store.engine import Store
 from app.store.records import JobEvent
-from app.store.tables import events, metrics
 
 
 def list_events(

@@ -10,11 +10,11 @@ from typing import Any
 import sqlalchemy as sa
 
 from app.storage_errors import StaleAttempt
+from app.store.database.tables import jobs
 from app.store.engine import Store
 from app.store.events import append_event
 from app.store.jobs import find_job
 from app.store.records import Claim, JobRecord
-from app.store.tables import jobs
 
 
 def fenced_update(

@@ -6,11 +6,11 @@ from typing import Any
 import sqlalchemy as sa
 
 from app.errors import WrongState
+from app.store.database.tables import jobs, resume_states
 from app.store.engine import Store
 from app.store.fencing import change_state
 from app.store.jobs import read_job
 from app.store.records import JobRecord
-from app.store.tables import jobs, resume_states
 
 REPEATABLE = ("cancelled", "failed")
 """States from which a job is resumed or retried."""

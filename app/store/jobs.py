@@ -21,11 +21,11 @@ from sqlalchemy.exc import IntegrityError
 
 from app.errors import Conflict, InvalidInput, NotFound, WrongState
 from app.store.cursors import check_limit, decode_cursor, encode_cursor
+from app.store.database.reserve import write_with_reserve
+from app.store.database.tables import jobs
 from app.store.engine import Store
 from app.store.events import append_event
 from app.store.records import FINAL_STATES, JobRecord, JobState, NewJob, Page
-from app.store.reserve import write_with_reserve
-from app.store.tables import jobs
 
 MAX_KEY_LENGTH = 255
 """Longest idempotency key."""

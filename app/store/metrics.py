@@ -3,10 +3,10 @@
 import sqlalchemy as sa
 
 from app.errors import NotFound
+from app.store.database.tables import jobs
+from app.store.database.tables import metrics as table
 from app.store.engine import Store
 from app.store.records import MetricRow
-from app.store.tables import jobs
-from app.store.tables import metrics as table
 
 
 def list_metrics(

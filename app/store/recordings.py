@@ -12,9 +12,9 @@ import sqlalchemy as sa
 
 from app.digests import digest, has_digest
 from app.errors import Conflict, Damaged, InvalidInput, NotFound
+from app.store.database.tables import recordings
 from app.store.engine import Store
 from app.store.records import NewRecording, StoredRecording
-from app.store.tables import recordings
 
 logger = logging.getLogger(__name__)
 

@@ -7,11 +7,11 @@ import sqlalchemy as sa
 
 from app.errors import WrongState
 from app.store.checkpoints import drop_job_checkpoints, sole_checkpoints
+from app.store.database.reserve import write_with_reserve
+from app.store.database.tables import jobs, resume_states
 from app.store.engine import Store
 from app.store.jobs import job_from_row, read_job
 from app.store.records import FINAL_STATES, JobRecord
-from app.store.reserve import write_with_reserve
-from app.store.tables import jobs, resume_states
 
 logger = logging.getLogger(__name__)
 

@@ -9,7 +9,7 @@ from fastapi import FastAPI
 
 from app.cli.preflight import address_of, listen
 from app.cli.uvicorn_server import Server, new_server
-from tests import patient_http
+from tests.support import patient_http
 
 START_S = 30.0
 WARM_UP_S = 900.0

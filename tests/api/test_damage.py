@@ -20,7 +20,7 @@ from app.store.checkpoints import put_checkpoint, read_checkpoint, set_alias
 from app.store.engine import Store
 from app.store.records import NewCheckpoint
 from tests.api.conftest import ADDRESS, wait_until_ready
-from tests.damage import JSON, TENSORS, Change, cut, damage, flip
+from tests.support.damage import JSON, TENSORS, Change, cut, damage, flip
 
 SEEDS = count(1000)
 PLACES = {

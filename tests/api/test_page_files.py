@@ -12,10 +12,10 @@ from websockets.sync.client import connect
 import web
 from app.main import create_app
 from app.settings import Settings
-from tests import patient_http
 from tests.api.conftest import ADDRESS
 from tests.api.live_server import running, wait_until_ready
-from tests.sub_path_proxy import PREFIX, below_path
+from tests.support import patient_http
+from tests.support.sub_path_proxy import PREFIX, below_path
 
 STATIC = Path(web.__file__).parent / "page"
 FILES = sorted(

@@ -23,9 +23,9 @@ import sqlalchemy as sa
 
 from app.api.schemas import examples
 from app.sim.human import model as human
+from app.store.database.migrate import migrate
+from app.store.database.tables import jobs
 from app.store.engine import Store
-from app.store.migrate import migrate
-from app.store.tables import jobs
 from tests.benchmarks.http_load import Load, Request, load
 from tests.benchmarks.http_servers import bare_route, service, start_training
 from tests.benchmarks.measure import Row, arguments, quantiles_ms, report, row_of

@@ -29,7 +29,7 @@ from app.policies.training import reach as reach_training
 from app.sim.cells.cell import load_cell
 from app.sim.reach.batch import N_ACT, ReachBatch
 from tests.benchmarks.measure import Subject, report, rounds_over, row
-from tests.benchmarks.stock_dqn import FOR_EVER
+from tests.benchmarks.peers.stock_dqn import FOR_EVER
 from tests.benchmarks.training_rates import rates, trainer_arguments
 
 BENCH = "reach-training"

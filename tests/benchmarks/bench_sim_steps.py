@@ -30,7 +30,6 @@ from app.sim.core.arrays import Vec
 from app.sim.pick.batch import PickBatch, PickSettings
 from app.sim.reach.batch import ReachBatch, ReachSettings
 from tests.benchmarks import sorting_steps
-from tests.benchmarks.fcl_pick import FclPick
 from tests.benchmarks.measure import (
     Row,
     Subject,
@@ -40,7 +39,8 @@ from tests.benchmarks.measure import (
     row,
     row_without,
 )
-from tests.benchmarks.mujoco_pick import INSTALLED, MODES, MujocoPick
+from tests.benchmarks.peers.fcl_pick import FclPick
+from tests.benchmarks.peers.mujoco_pick import INSTALLED, MODES, MujocoPick
 
 BENCH = "sim-steps"
 BATCH = 128

@@ -32,7 +32,7 @@ from app.sim.sorting.batch import observe, valid_moves
 from app.sim.sorting.planner import solve
 from app.sim.sorting.state import SortingShape, SortingState, empty_state
 from tests.benchmarks.measure import Row, report, row_without
-from tests.benchmarks.sorting_pddl import PACKAGES, Found, installed, plan
+from tests.benchmarks.peers.sorting_pddl import PACKAGES, Found, installed, plan
 
 BENCH = "sorting"
 SHAPES = tuple(

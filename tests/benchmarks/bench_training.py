@@ -22,8 +22,8 @@ from app.policies.configs.sorting import SortingPreset
 from app.policies.training import sorting as sorting_training
 from app.sim.cells.cell import load_cell
 from tests.benchmarks.measure import report, rounds_over, row
+from tests.benchmarks.peers.stock_dqn import FOR_EVER, stock
 from tests.benchmarks.sorting_steps import batched, gymnasium_alone
-from tests.benchmarks.stock_dqn import FOR_EVER, stock
 from tests.benchmarks.training_rates import rates, trainer_arguments
 
 BENCH = "training"

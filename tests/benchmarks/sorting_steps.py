@@ -7,7 +7,7 @@ import numpy as np
 from app.sim.cells.cell import load_cell
 from app.sim.sorting.batch import batch_in
 from tests.benchmarks.measure import Subject
-from tests.benchmarks.stock_dqn import plain
+from tests.benchmarks.peers.stock_dqn import plain
 
 BATCH = 128
 RECORDED = 512

@@ -15,7 +15,7 @@ import httpx
 import pytest
 from playwright.sync_api import Browser, ConsoleMessage, Page, Request, expect, sync_playwright
 
-from tests import patient_http
+from tests.support import patient_http
 
 ROOT = Path(__file__).parents[2]
 START_S = 300.0

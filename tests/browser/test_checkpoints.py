@@ -7,7 +7,7 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from app.policies.checkpoints import pretrained
-from tests import patient_http
+from tests.support import patient_http
 
 pytestmark = pytest.mark.browser
 

@@ -10,8 +10,8 @@ from playwright.sync_api import Page, expect
 
 from app.sim.cells.cell import Cell, load_cell
 from app.sim.human import model as human
-from tests import patient_http
 from tests.browser.camera import Camera
+from tests.support import patient_http
 from web.viewer.scene import workplace
 from web.viewer.server import ViewerServer
 

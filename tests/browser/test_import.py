@@ -6,9 +6,9 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Page, expect
 
-from tests import patient_http
 from tests.sim.recorded_person import csv_text, working
 from tests.sim.recorded_skeleton import Person, skeleton
+from tests.support import patient_http
 
 pytestmark = pytest.mark.browser
 

@@ -6,9 +6,9 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from app.sim.cells.cell import cell_names, load_cell
-from tests import patient_http
 from tests.browser.contrast import faint_text
 from tests.browser.test_drag import state, tell, until
+from tests.support import patient_http
 
 pytestmark = pytest.mark.browser
 

@@ -5,7 +5,7 @@ from collections.abc import Callable
 import pytest
 from playwright.sync_api import Page, expect
 
-from tests import patient_http
+from tests.support import patient_http
 
 pytestmark = pytest.mark.browser
 

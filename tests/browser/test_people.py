@@ -5,9 +5,9 @@ from collections.abc import Callable, Iterator
 import pytest
 from playwright.sync_api import Page, expect
 
-from tests import patient_http
 from tests.browser.test_drag import state, until
 from tests.sim.recorded_person import csv_text, working
+from tests.support import patient_http
 
 pytestmark = pytest.mark.browser
 

@@ -9,9 +9,9 @@ import pytest
 from playwright.sync_api import Error, Frame, Page, TimeoutError, expect
 
 from app.sim.cells.cell import load_cell
-from tests import patient_http
 from tests.browser.conftest import free_port, serving
 from tests.browser.test_drag import VIEWER, state, tell, until
+from tests.support import patient_http
 
 pytestmark = pytest.mark.browser
 

@@ -6,8 +6,8 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from app.sim.cells.cell import load_cell
-from tests import patient_http
 from tests.browser.test_drag import state, tell, until
+from tests.support import patient_http
 
 pytestmark = pytest.mark.browser
 

@@ -5,9 +5,9 @@ from collections.abc import Callable, Iterator
 import pytest
 from playwright.sync_api import Page, expect
 
-from tests import patient_http
 from tests.browser.conftest import free_port, serving
-from tests.sub_path_proxy import PREFIX, below_path
+from tests.support import patient_http
+from tests.support.sub_path_proxy import PREFIX, below_path
 
 pytestmark = pytest.mark.browser
 

@@ -8,8 +8,8 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from app.policies.evaluation.statistics import wilson
-from tests import patient_http
 from tests.browser.test_drag import state, tell
+from tests.support import patient_http
 
 pytestmark = pytest.mark.browser
 

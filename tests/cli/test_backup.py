@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 
 from app.cli.entry import main
-from tests import workshop
 from tests.cli.test_commands import run
+from tests.support import workshop
 
 
 @pytest.fixture

@@ -16,9 +16,9 @@ from app.cli.preflight import address_of, listen
 from app.cli.train import parse_overrides
 from app.errors import InvalidInput
 from app.precompile import PARTS
-from tests import workshop
 from tests.policies.evaluation.sorting_players import untrained
 from tests.sim.recorded_person import csv_text, working
+from tests.support import workshop
 
 ROOT = Path(__file__).resolve().parents[2]
 START_S, COMPILE_S = 240.0, 1200.0

@@ -18,8 +18,8 @@ from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
 from app.cli import http_limits
-from tests import patient_http
-from tests.small_service import LARGE, TOKEN
+from tests.support import patient_http
+from tests.support.small_service import LARGE, TOKEN
 
 ROOT = Path(__file__).parents[2]
 MIB = 1024 * 1024
@@ -36,7 +36,7 @@ LAST = b"Connection: close\r\n\r\n"
 
 
 class Small(NamedTuple):
-    """The server of ``tests.small_service``."""
+    """The server of ``tests.support.small_service``."""
 
     process: subprocess.Popen[str]
     port: int
@@ -94,7 +94,7 @@ def problem_of(answer: bytes) -> str:
 def serving(**limits_s: float) -> Iterator[Small]:
     """Run the server with other time limits [s], by name in ``http_limits``."""
     process = subprocess.Popen(
-        [sys.executable, "-m", "tests.small_service"],
+        [sys.executable, "-m", "tests.support.small_service"],
         cwd=ROOT,
         env=os.environ | {name: str(value) for name, value in limits_s.items()},
         stdout=subprocess.PIPE,

@@ -11,7 +11,7 @@ from app.main import create_app
 from app.settings import Settings
 from jobs.spec import EvaluateSpec
 from tests.api.live_server import running, wait_until_ready
-from tests.workshop import definition
+from tests.support.workshop import definition
 from tools.generate_client import TARGET, render
 
 TOKEN = "a-token-of-some-length"

@@ -6,9 +6,9 @@ import pytest
 from app.store.engine import Store
 from jobs.executor import LocalProcess
 from jobs.supervisor import Supervisor
-from tests.databases import database_url, migrated, postgresql, store
 from tests.jobs.machinery import PATIENCE
 from tests.jobs.supervisor_process import COUNTING
+from tests.support.databases import database_url, migrated, postgresql, store
 
 __all__ = ["database_url", "migrated", "postgresql", "store"]
 

@@ -8,8 +8,8 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from app.store import checkpoints, jobs, metrics
+from app.store.database.lease import LEASE_S
 from app.store.engine import Store
-from app.store.lease import LEASE_S
 from app.store.records import JobRecord, NewJob
 from jobs.executor import PROJECT_ROOT
 from jobs.supervisor import Timeouts

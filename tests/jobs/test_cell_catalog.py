@@ -6,7 +6,7 @@ from app.sim.cells.cell import cell_names, load_cell
 from app.store.cells import put_cell
 from app.store.engine import Store
 from jobs.cell_catalog import CellCatalog
-from tests import workshop
+from tests.support import workshop
 
 
 @pytest.fixture

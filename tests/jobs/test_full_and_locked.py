@@ -21,7 +21,6 @@ from jobs import worker as jobs_worker
 from jobs.executor import Handle, LocalProcess
 from jobs.supervisor import Supervisor
 from jobs.worker import JobWorker
-from tests.databases import SQLITE_ONLY
 from tests.jobs.counting_worker import count
 from tests.jobs.machinery import (
     PATIENCE,
@@ -31,6 +30,7 @@ from tests.jobs.machinery import (
     wait_for,
     wait_until_final,
 )
+from tests.support.databases import SQLITE_ONLY
 
 pytestmark = SQLITE_ONLY  # its limits and locks are those of a file
 

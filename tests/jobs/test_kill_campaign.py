@@ -3,7 +3,7 @@ from pathlib import Path
 import pytest
 
 from tests.jobs.kill_campaign import campaign, run_series
-from tests.postgresql_server import PostgresqlServer
+from tests.support.postgresql_server import PostgresqlServer
 
 
 def test_nothing_acknowledged_is_lost_in_ten_kills(tmp_path: Path) -> None:

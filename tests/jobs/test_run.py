@@ -17,11 +17,11 @@ from jobs.cell_catalog import CellCatalog
 from jobs.recording_catalog import RecordingCatalog
 from jobs.spec import parse_spec
 from jobs.supervisor import Supervisor
-from tests import workshop
-from tests.databases import SQLITE_ONLY
 from tests.jobs.machinery import PATIENCE, wait_for, wait_until_final, worker_pids
 from tests.policies.evaluation.sorting_players import untrained
 from tests.sim.recorded_person import csv_text, working
+from tests.support import workshop
+from tests.support.databases import SQLITE_ONLY
 
 TINY = {
     "learning.total_steps": 2048,

@@ -13,7 +13,6 @@ from app.store import attempts, checkpoints, events, job_actions, jobs, metrics
 from app.store.engine import Store
 from jobs.executor import LocalProcess
 from jobs.supervisor import Supervisor
-from tests.databases import POSTGRESQL_ONLY, wait_until_lease_expires
 from tests.jobs.machinery import (
     PATIENCE,
     assert_counted_once,
@@ -24,7 +23,8 @@ from tests.jobs.machinery import (
     worker_pids,
 )
 from tests.jobs.supervisor_process import COUNTING
-from tests.postgresql_server import PostgresqlServer
+from tests.support.databases import POSTGRESQL_ONLY, wait_until_lease_expires
+from tests.support.postgresql_server import PostgresqlServer
 
 
 def is_running(pid: int) -> bool:

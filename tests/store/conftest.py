@@ -3,7 +3,7 @@ import pytest
 from app.store import attempts, jobs
 from app.store.engine import Store
 from app.store.records import Claim, NewJob
-from tests.databases import database_url, migrated, postgresql, store
+from tests.support.databases import database_url, migrated, postgresql, store
 
 __all__ = ["database_url", "migrated", "postgresql", "store"]
 

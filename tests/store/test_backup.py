@@ -12,13 +12,14 @@ import pytest
 
 from app.errors import Conflict, InvalidInput
 from app.storage_errors import StorageDamaged, StorageFull
-from app.store import attempts, backup, checkpoints, jobs, metrics
-from app.store.backup import restore_backup, write_backup
+from app.store import attempts, checkpoints, jobs, metrics
+from app.store.database import backup
+from app.store.database.backup import restore_backup, write_backup
+from app.store.database.lock import ServerLock
 from app.store.engine import Store
-from app.store.lock import ServerLock
 from app.store.records import Claim
-from tests.databases import SQLITE_ONLY
 from tests.store.test_attempts import policy, record, resume
+from tests.support.databases import SQLITE_ONLY
 
 pytestmark = SQLITE_ONLY
 

@@ -13,11 +13,11 @@ from app.digests import digest
 from app.errors import Damaged, NotFound
 from app.storage_errors import StorageUnavailable
 from app.store import attempts, cells, checkpoints, completion, jobs, metrics, recordings
+from app.store.database.migrate import alembic_config, migrate
 from app.store.engine import Store
-from app.store.migrate import alembic_config, migrate
 from app.store.records import Claim, NewCheckpoint, NewRecording, ResumeState
-from tests.damage import JSON, TENSORS, Change, cut, damage, flip
-from tests.databases import SQLITE_ONLY
+from tests.support.damage import JSON, TENSORS, Change, cut, damage, flip
+from tests.support.databases import SQLITE_ONLY
 
 pytestmark = SQLITE_ONLY  # PostgreSQL's files are not ours to damage
 

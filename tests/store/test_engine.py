@@ -9,12 +9,12 @@ from sqlalchemy import event
 from app.errors import InvalidInput
 from app.storage_errors import StorageFull, StorageUnavailable
 from app.store import attempts, completion, jobs, metrics
+from app.store.database.migrate import migrate
+from app.store.database.reserve import fill_reserve
 from app.store.engine import Store
-from app.store.migrate import migrate
 from app.store.records import Claim, NewCheckpoint, NewJob, ResumeState
-from app.store.reserve import fill_reserve
-from tests.databases import POSTGRESQL_ONLY, SQLITE_ONLY
-from tests.postgresql_server import PostgresqlServer
+from tests.support.databases import POSTGRESQL_ONLY, SQLITE_ONLY
+from tests.support.postgresql_server import PostgresqlServer
 
 
 def fill_up(store: Store, *, spare_pages: int) -> None:

@@ -8,10 +8,10 @@ import pytest
 import sqlalchemy as sa
 
 from app.store import jobs
+from app.store.database.tables import jobs as table
 from app.store.engine import Store
 from app.store.records import JobState
-from app.store.tables import jobs as table
-from tests.databases import SQLITE_ONLY
+from tests.support.databases import SQLITE_ONLY
 
 pytestmark = SQLITE_ONLY  # query plans and counts of its virtual machine
 

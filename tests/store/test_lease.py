@@ -6,13 +6,14 @@ import sqlalchemy as sa
 
 from app.errors import Conflict
 from app.storage_errors import LeaseLost
-from app.store import attempts, completion, jobs, reserve
+from app.store import attempts, completion, jobs
+from app.store.database import reserve
+from app.store.database.lease import Lease
+from app.store.database.lock import ServerLock
+from app.store.database.migrate import migrate
 from app.store.engine import Store
-from app.store.lease import Lease
-from app.store.lock import ServerLock
-from app.store.migrate import migrate
 from app.store.records import Claim, NewJob
-from tests.databases import POSTGRESQL_ONLY, wait_until_lease_expires
+from tests.support.databases import POSTGRESQL_ONLY, wait_until_lease_expires
 
 
 def server(store: Store, folder: Path, duration_s: float = 1000.0) -> tuple[Lease, ServerLock]:

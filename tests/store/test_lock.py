@@ -6,15 +6,15 @@ from pathlib import Path
 import pytest
 
 from app.errors import Conflict, InvalidInput
+from app.store.database.lock import ServerLock
 from app.store.engine import Store
-from app.store.lock import ServerLock
-from tests.databases import SQLITE_ONLY
+from tests.support.databases import SQLITE_ONLY
 
 HOLDER = """
 import sys, time
 from pathlib import Path
 from app.store.engine import Store
-from app.store.lock import ServerLock
+from app.store.database.lock import ServerLock
 lock = ServerLock(Store(sys.argv[1]), Path(sys.argv[2]))
 lock.acquire()
 print("held", flush=True)

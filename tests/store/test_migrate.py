@@ -9,10 +9,10 @@ from alembic.script import ScriptDirectory
 
 from app.errors import Conflict
 from app.storage_errors import StorageDamaged
+from app.store.database.migrate import alembic_config, migrate
+from app.store.database.schema import REVISION, check_schema
+from app.store.database.tables import metadata
 from app.store.engine import Store
-from app.store.migrate import alembic_config, migrate
-from app.store.schema import REVISION, check_schema
-from app.store.tables import metadata
 
 
 def test_migrations_build_exactly_the_tables(store: Store) -> None:

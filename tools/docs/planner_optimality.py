@@ -24,7 +24,7 @@ from app.sim.sorting.kernels.planner import new_work
 from app.sim.sorting.kernels.planner_batch import TaskBatch, plan_rows
 from app.sim.sorting.planner import attempts_of, solve
 from app.sim.sorting.state import Move, SortingShape, SortingState
-from tests.sim.sorting_search import (
+from tests.sim.sorting.sorting_search import (
     fewest_attempts,
     first_moves,
     moves_to_go,

@@ -6,7 +6,7 @@ import pytest
 from fastapi.testclient import TestClient
 
 from app.sim.cells.cell import cell_names
-from tests import workshop
+from tests.support import workshop
 
 
 @pytest.fixture

@@ -9,7 +9,7 @@ from safetensors.numpy import load, save
 
 from app.policies.checkpoints import checkpoint, pretrained
 from app.policies.checkpoints.upload import MAX_FILE, MAX_MANIFEST
-from tests.api.routes.test_motion import TASK
+from tests.api.routes.motion.motion_requests import TASK
 
 
 def test_shipped_checkpoint_is_listed_with_its_alias(client: TestClient) -> None:

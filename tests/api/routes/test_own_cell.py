@@ -10,7 +10,7 @@ from app.policies.configs import presets
 from app.policies.training.train import train
 from app.store.checkpoints import put_checkpoint
 from app.store.records import NewCheckpoint
-from tests import workshop
+from tests.support import workshop
 
 TINY = {
     "learning.total_steps": 1024,

@@ -9,8 +9,8 @@ import pytest
 
 from app.main import create_app
 from app.settings import Settings
-from tests import patient_http
 from tests.api.live_server import running, wait_until_ready
+from tests.support import patient_http
 
 
 @pytest.fixture(scope="module")

@@ -17,7 +17,7 @@ from app.sim.human.anthropometry import percentile_body
 from app.sim.human.kernels.kinematics import PELVIS_Z, capsule_columns
 from app.sim.scene.scene import NO_CYLINDERS, arm_of, people_of
 from tests.sim.recorded_motion import recorded
-from tests.straight_policy import StraightPolicy
+from tests.support.straight_policy import StraightPolicy
 
 DT = 0.05
 

@@ -11,7 +11,7 @@ from app.live.pick.risk_worker import GRID, RiskQuery, RiskWorker
 from app.live.pick.world import LivePickWorld
 from app.sim.cells.cell import load_cell
 from app.sim.pick.task_policy import MovedPerson, RiskMap
-from tests.straight_policy import StraightPolicy
+from tests.support.straight_policy import StraightPolicy
 
 WAIT_S = 30.0
 

@@ -10,7 +10,7 @@ from app.sim.cells.cell import Cell, load_cell
 from app.sim.human import model as human
 from app.sim.human.person import Person
 from app.sim.pick.task_policy import Candidate, PickProgress
-from tests.straight_policy import StraightPolicy
+from tests.support.straight_policy import StraightPolicy
 
 
 @pytest.fixture

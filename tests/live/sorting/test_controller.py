@@ -7,7 +7,7 @@ from app.live.sorting.snapshot import Order
 from app.live.sorting.table import SortingTable
 from app.sim.cells.cell import load_cell
 from app.sim.sorting.state import Move
-from tests.sorting_values import FixedValues
+from tests.support.sorting_values import FixedValues
 
 RED, BLUE = 10, 11
 

@@ -23,9 +23,9 @@ from app.policies.checkpoints import pretrained
 from app.policies.inference.task_selection import TaskChooser
 from app.sim.cells.cell import load_cell
 from app.sim.sorting.state import Move, SortingShape
-from tests.sim.sorting_scenes import empty_world, lay, solved, towers, until
-from tests.sorting_values import FixedValues
-from tests.straight_policy import StraightPolicy
+from tests.sim.sorting.sorting_scenes import empty_world, lay, solved, towers, until
+from tests.support.sorting_values import FixedValues
+from tests.support.straight_policy import StraightPolicy
 
 
 def phase(name: str):

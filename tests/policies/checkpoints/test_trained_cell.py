@@ -9,8 +9,8 @@ from app.policies.checkpoints.trained_cell import cell_of, is_for, manifest_fiel
 from app.policies.inference.task_selection import TaskChooser
 from app.policies.training.train import train
 from app.sim.cells.cell import load_cell
-from tests import workshop
 from tests.policies.conftest import TINY, preset_of
+from tests.support import workshop
 
 
 @pytest.fixture(scope="module")

@@ -17,7 +17,7 @@ from app.sim.pick.task_policy import Decision, PickProgress
 from app.sim.scene.scene import arm_of
 from app.sim.sorting.names import names_of
 from app.sim.sorting.state import Move, SortingState, empty_state
-from tests.straight_policy import StraightPolicy
+from tests.support.straight_policy import StraightPolicy
 
 CELL = load_cell("sorting-e0")
 SHAPE = names_of(CELL).shape

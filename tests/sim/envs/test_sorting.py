@@ -13,7 +13,7 @@ from app.sim.envs.sorting import SortingEnv, SortingVectorEnv
 from app.sim.sorting.batch import OUTCOMES, SortingBatch, SortingSettings, fail_of, shape_of
 from app.sim.sorting.kernels.reward import SortingWeights
 from app.sim.sorting.state import SortingState
-from tests.benchmarks.plain_sorting import PlainSorting
+from tests.benchmarks.peers.plain_sorting import PlainSorting
 
 LIVELY = SortingSettings(
     disturbed_share=0.3, human_rate=0.1, localisation_rate=0.1, random_map_share=0.5

@@ -9,7 +9,7 @@ from app.live.pick.world import LivePickWorld
 from app.sim.cells.cell import load_cell
 from app.sim.pick.case_verdict import CaseRun, End, is_as_expected, judge
 from app.sim.pick.cases import find_case
-from tests.straight_policy import StraightPolicy
+from tests.support.straight_policy import StraightPolicy
 
 
 def run_of(goals: Sequence[str], end: End | None = "reached") -> CaseRun:

@@ -8,7 +8,7 @@ from app.sim.sorting.decision import decide, outside_goal
 from app.sim.sorting.decision_types import SortingDecision
 from app.sim.sorting.planner import solve
 from app.sim.sorting.state import Move, SortingShape, SortingState, empty_state
-from tests.sorting_values import FixedValues
+from tests.support.sorting_values import FixedValues
 
 SHAPE = SortingShape(n_cells=5, n_colours=2)
 RED, BLUE = 5, 6

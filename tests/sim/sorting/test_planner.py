@@ -7,7 +7,12 @@ from app.errors import InvalidInput
 from app.sim.sorting.batch import apply
 from app.sim.sorting.planner import attempts_of, follow, solve
 from app.sim.sorting.state import Move, SortingShape, SortingState
-from tests.sim.sorting_search import fewest_attempts, first_moves, moves_to_go, random_task
+from tests.sim.sorting.sorting_search import (
+    fewest_attempts,
+    first_moves,
+    moves_to_go,
+    random_task,
+)
 
 Task = tuple[SortingState, SortingShape]
 

@@ -10,8 +10,8 @@ from app.live import commands
 from app.live.sorting import commands as commands_of_sorting
 from app.sim.cells.cell import load_cell
 from app.sim.human import model as human
-from tests.listening_ports import listening_ports
-from tests.straight_policy import StraightPolicy
+from tests.support.listening_ports import listening_ports
+from tests.support.straight_policy import StraightPolicy
 from tests.web.viewer_client import ViewerClient
 from web.viewer.loop import LiveCell
 

@@ -4,8 +4,8 @@
 
 A RUN is a folder written by ``training_curves.py``. Each stored policy is evaluated greedily
 and without planner fallback on each pair (K_E, K_G): 500 episodes per pair on e0, 100 on e1,
-or ``--episodes``. ``--stock`` adds the output of ``tests/benchmarks/stock_dqn.py``. Writes
-``docs/results/sorting-curves.json`` (drawn by ``sorting/plots.py``).
+or ``--episodes``. ``--stock`` adds the output of ``tests/benchmarks/peers/stock_dqn.py``.
+Writes ``docs/results/sorting-curves.json`` (drawn by ``sorting/plots.py``).
 
 A curve has ``played``, the greedy evaluations during training, and ``pairs``, one point per
 stored policy.

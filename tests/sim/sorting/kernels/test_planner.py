@@ -15,7 +15,7 @@ from app.sim.sorting.kernels.planner_batch import TaskBatch, mark_rows, plan_row
 from app.sim.sorting.kernels.shortest_paths import lay_out, most_states, new_shortest_paths
 from app.sim.sorting.planner import solve
 from app.sim.sorting.state import SortingShape, SortingState
-from tests.sim.sorting_search import random_task
+from tests.sim.sorting.sorting_search import random_task
 
 SHAPE = SortingShape(n_cells=8, n_colours=3, n_sizes=2)
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests import reach_results as made
+from tests.support import reach_results as made
 from tools.docs.learning_curves import merged
 from tools.docs.reach import curves as reach_curves
 from tools.docs.reach import plots as reach_plots

@@ -10,7 +10,7 @@ from app.live.pick.world import LivePickWorld
 from app.sim.cells.cell import Cell, load_cell
 from app.sim.human import model as human
 from app.sim.robot.ur10 import LINK_NAMES, Robot
-from tests.straight_policy import StraightPolicy
+from tests.support.straight_policy import StraightPolicy
 from web.viewer.capsules_view import HIT
 from web.viewer.scene.arc import dashes
 from web.viewer.scene.cell_scene import PATH_LIFT, CellScene

@@ -1,6 +1,6 @@
 """Train the stock DQN of Stable-Baselines3 on the plain environment, as its users do.
 
-    PYTHONPATH=. python -m tests.benchmarks.stock_dqn --cell sorting-e0 --out curve.jsonl
+    PYTHONPATH=. python -m tests.benchmarks.peers.stock_dqn --cell sorting-e0 --out curve.jsonl
 
 Hyper-parameters are those of the thesis' table 3.1, as far as Stable-Baselines3 has them: it
 has neither prioritised replay nor duelling nor double Q-learning, and no masks. Every
@@ -23,7 +23,7 @@ from stable_baselines3 import DQN
 from stable_baselines3.common.callbacks import BaseCallback
 
 from app.sim.cells.cell import load_cell
-from tests.benchmarks.plain_sorting import PlainSorting
+from tests.benchmarks.peers.plain_sorting import PlainSorting
 
 EXPLORATION_STEPS = {"sorting-e0": 2_000_000, "sorting-e1": 8_000_000}
 """N_t: epsilon falls over so many steps, linearly."""

@@ -5,7 +5,7 @@ from app.sim.collision.contact import clearance
 from app.sim.human import model as human
 from app.sim.pick.batch import step_robot
 from app.sim.scene.scene import NO_CYLINDERS, arm_of, people_of
-from tests.benchmarks.fcl_pick import FclPick
+from tests.benchmarks.peers.fcl_pick import FclPick
 
 CELL = load_cell()
 PERSON = human.rest_posture(*CELL.human.home)

@@ -6,7 +6,7 @@ import pytest
 from app.sim.sorting.planner import solve
 from app.sim.sorting.state import SortingShape, SortingState
 from tests.benchmarks.bench_sorting import task
-from tests.benchmarks.sorting_pddl import installed, plan, problem, replayed
+from tests.benchmarks.peers.sorting_pddl import installed, plan, problem, replayed
 
 SHAPE = SortingShape(n_cells=4, n_colours=2, n_sizes=2)
 

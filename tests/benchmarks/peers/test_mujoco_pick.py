@@ -15,7 +15,7 @@ from app.sim.robot.kernels.arm import (
     table_clearance,
 )
 from app.sim.scene.scene import arm_of, people_geometry_of, people_of
-from tests.benchmarks.mujoco_pick import INSTALLED, MujocoPick
+from tests.benchmarks.peers.mujoco_pick import INSTALLED, MujocoPick
 
 pytestmark = pytest.mark.skipif(not INSTALLED, reason="MuJoCo comes with the dev extra")
 CELL = load_cell()

@@ -1,82 +1,32 @@
-"""``POST /v1/motion`` and its socket: answers, flags, stops, and what is refused."""
+"""``POST /v1/motion``: answers, flags, stops, and what is refused."""
 
 import json
 import re
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from fastapi.testclient import TestClient
-from starlette.testclient import WebSocketTestSession
-from starlette.websockets import WebSocketDisconnect
 
-from app.policies.checkpoints.checkpoint import Checkpoint, pack
-from app.sim.cells.cell import load_cell
-from app.store.records import NewCheckpoint
-from tests.api.conftest import ADDRESS
-from tests.policies.untrained import untrained_reach
+from tests.api.routes.motion.motion_requests import (
+    BAD,
+    BOX,
+    FAR,
+    GRID,
+    HOME,
+    INSIDE,
+    JERK,
+    STANDING,
+    TASK,
+    URL,
+    WALKER,
+    asked,
+    refused,
+)
 
-URL, STREAM = "/v1/motion", "/v1/motion/stream"
-SOCKET = ADDRESS.replace("http", "ws") + STREAM
-GRID, BOX, JERK = "untrained-grid", "untrained-box", "untrained-jerk"
-PAGE = (Path(__file__).parents[3] / "docs" / "http.md").read_text("utf-8")
-HOME = list(load_cell("shared-workspace").robot.home_q)
-WALKER = {"x": 0.3, "y": 1.5, "vx": 0.0, "vy": -0.5, "r": 0.3}
-FAR = {"x": -1.8, "y": 1.9, "vx": 0.0, "vy": 0.0, "r": 0.3}
-INSIDE = {"x": 0.2, "y": 0.2, "vx": 0.0, "vy": 0.0, "r": 0.5}
-STANDING = {
-    "q": [0.6, 1.45, -1.57, 0, 0, 0, 0, 0, 0, 0, 0.15, 0.12, 0, 0.45, 0.15, 0.12, 0, 0.45],
-    "qd": [0.0] * 18,
-}
-RANGES = {
-    "goal": {"low": [-0.5, 0.6, 0.1], "high": [0.5, 1.0, 0.5]},
-    "human": {"low": [-2.0, 0.5, -1.0, -1.0, 0.2], "high": [1.0, 2.0, 1.0, 1.0, 0.5]},
-}
-TASK: dict[str, Any] = {
-    "cell": "shared-workspace",
-    "robot": {"q": HOME, "qd": [0.0] * 6},
-    "people": [WALKER],
-    "goal": [0.05, 0.75, 0.31],
-    "checkpoint": GRID,
-}
-
-
-def with_ranges(checkpoint: Checkpoint) -> Checkpoint:
-    """The same, as if it had met certain values in training."""
-    return pack({**checkpoint.manifest, "trained_range": RANGES}, checkpoint.arrays())
-
-
-@pytest.fixture(scope="module", autouse=True)
-def policies(client: TestClient) -> dict[str, str]:
-    """Policies that have learned nothing, in the store of the service."""
-    names = client.app.state.services.checkpoints  # type: ignore[attr-defined]
-    made = {
-        GRID: with_ranges(untrained_reach()),
-        BOX: with_ranges(untrained_reach(goals="box")),
-        JERK: untrained_reach(degree=3),
-    }
-    for alias, one in made.items():
-        new = NewCheckpoint(sha256=one.sha256, manifest=one.manifest, tensors=one.tensors)
-        names.publish(alias, new)
-    return {alias: one.sha256 for alias, one in made.items()}
-
-
-def asked(client: TestClient, **changes: Any) -> dict[str, Any]:
-    answer = client.post(URL, json={**TASK, **changes})
-    assert answer.status_code == 200, answer.text
-    found: dict[str, Any] = answer.json()
-    return found
-
-
-def refused(client: TestClient, status: int = 422, **changes: Any) -> dict[str, Any]:
-    content = json.dumps({**TASK, **changes})
-    answer = client.post(URL, content=content, headers={"Content-Type": "application/json"})
-    assert answer.status_code == status, answer.text
-    assert answer.headers["content-type"] == "application/problem+json"
-    problem: dict[str, Any] = answer.json()
-    return problem
+pytestmark = pytest.mark.usefixtures("policies")
+PAGE = (Path(__file__).parents[4] / "docs" / "http.md").read_text("utf-8")
 
 
 def at(piece: dict[str, Any], t: float) -> np.ndarray:
@@ -254,48 +204,6 @@ def test_a_policy_that_limits_jerk_asks_for_accelerations(client: TestClient) ->
     assert [len(one) for one in answer["segment"]["coefficients"]] == [4] * 6
 
 
-BAD: list[tuple[dict[str, Any], int, str]] = [
-    ({"cell": "moon"}, 422, "cell"),
-    ({"cell": "pick-and-place"}, 409, "cell"),
-    ({"checkpoint": "nobody"}, 422, "checkpoint"),
-    ({"checkpoint": "pick"}, 409, "purpose"),
-    ({"frame": "world"}, 422, "frame"),
-    ({"robot": {"q": HOME[:5], "qd": [0.0] * 6}}, 422, "robot.q"),
-    ({"robot": {"q": [9.0, *HOME[1:]], "qd": [0.0] * 6}}, 422, "robot.q[0]"),
-    ({"robot": {"q": HOME, "qd": [0, 0, 1.2, 0, 0, 0]}}, 422, "robot.qd[2]"),
-    ({"robot": {"q": HOME, "qd": [0, 0, float("nan"), 0, 0, 0]}}, 422, "robot.qd[2]"),
-    (
-        {
-            "robot": {"q": HOME, "qd": [0.0] * 6, "qdd": [0, 50, 0, 0, 0, 0]},
-            "checkpoint": JERK,
-        },
-        422,
-        "robot.qdd[1]",
-    ),
-    ({"goal": [0.0, 0.8]}, 422, "goal"),
-    ({"goal": [0.0, float("inf"), 0.3]}, 422, "goal[1]"),
-    ({"goal": [0.0, 1e300, 0.3]}, 422, "goal[1]"),
-    ({"goal": "there"}, 422, "goal"),
-    ({"inference_mode": "around"}, 422, "inference_mode"),
-    ({"inference_mode": "interpolated", "checkpoint": BOX}, 422, "inference_mode"),
-    ({"beside": "farthest"}, 422, "beside"),
-    ({"time_left_s": -1e12}, 422, "time_left_s"),
-    ({"elapsed_s": -1}, 422, "elapsed_s"),
-    ({"age_s": -1}, 422, "age_s"),
-    ({"safety": {"human_speed": -1}}, 422, "safety.human_speed"),
-    ({"safety": {"speed_change": -1}}, 422, "safety.speed_change"),
-    ({"safety": {"human_sped": 1}}, 422, "safety.human_sped"),
-    ({"safety": {"reaction_time": float("nan")}}, 422, "safety.reaction_time"),
-    ({"people": [WALKER] * 65}, 422, "people"),
-    ({"people": [{"x": 0.1}]}, 422, "people[0].y"),
-    ({"people": [{**WALKER, "r": -1}]}, 422, "people[0].r"),
-    ({"people": [{**WALKER, "vx": 1e9}]}, 422, "people[0].vx"),
-    ({"people": [{"tracker": "none", "person": 0}]}, 422, "people[0].tracker"),
-    ({"people": None}, 422, "people"),
-    ({"previous": 1}, 422, "previous"),
-]
-
-
 @pytest.mark.parametrize(("changes", "status", "field"), BAD)
 def test_bad_input_is_a_named_problem(
     client: TestClient, changes: dict[str, Any], status: int, field: str
@@ -343,119 +251,6 @@ def test_whatever_numbers_come_the_answer_is_an_answer_or_a_named_problem(
         else:
             assert np.isfinite(answer.json()["segment"]["q"]).all()
     assert {200, 422} == set(statuses)
-
-
-@pytest.fixture
-def socket(client: TestClient) -> Iterator[WebSocketTestSession]:
-    with client.websocket_connect(SOCKET) as one:
-        yield one
-
-
-def without_time(answer: dict[str, Any]) -> dict[str, Any]:
-    return {k: v for k, v in answer.items() if k not in ("elapsed_ms", "stream")}
-
-
-def test_socket_gives_the_answers_of_the_route(
-    client: TestClient, socket: WebSocketTestSession
-) -> None:
-    for k in range(5):
-        changes = {"stamp": k, "goal": [0.1 * k, 0.7, 0.2]}
-        socket.send_json({**TASK, **changes, "rollout": True})
-        found = socket.receive_json()
-        assert found["stream"]["superseded"] == 0 and found["stream"]["waited_ms"] >= 0.0
-        expected = asked(client, **changes)
-        assert without_time(found) == without_time(expected) and expected["stream"] is None
-
-
-@pytest.mark.parametrize(
-    ("message", "status"),
-    [
-        ("", 400),
-        ("{", 400),
-        ("[" * 50_000, 400),
-        ("null", 422),
-        ("[1, 2]", 422),
-        ('{"cell": "shared-workspace"}', 422),
-        (json.dumps({**TASK, "goal": [9.0, 0.8, 0.3], "stamp": 7}), 422),
-        (json.dumps({**TASK, "goal": [float("nan"), 0.8, 0.3]}), 422),
-        (json.dumps({**TASK, "stamp": float("nan")}), 422),
-        (json.dumps({**TASK, "cell": "pick-and-place"}), 409),
-        (json.dumps({**TASK, "cell": "x" * 70_000}), 413),
-    ],
-)
-def test_a_bad_message_is_answered_by_a_problem_and_the_socket_lives_on(
-    socket: WebSocketTestSession, message: str, status: int
-) -> None:
-    socket.send_text(message)
-    problem = json.loads(socket.receive_text(), parse_constant=pytest.fail)
-    assert problem["status"] == status and problem["detail"]
-    assert problem["instance"] == STREAM
-    assert problem.get("stamp") in (None, 7)
-    socket.send_json({**TASK, "stamp": "next"})
-    assert socket.receive_json()["stamp"] == "next"
-
-
-def test_bytes_are_no_message(socket: WebSocketTestSession) -> None:
-    socket.send_bytes(json.dumps(TASK).encode())
-    assert socket.receive_json()["status"] == 400
-    socket.send_json(TASK)
-    assert socket.receive_json()["inference_mode"] == "interpolated"
-
-
-def test_problems_on_the_socket_are_those_of_the_route(
-    client: TestClient, socket: WebSocketTestSession
-) -> None:
-    for changes, status, _ in BAD:
-        socket.send_text(json.dumps({**TASK, **changes}))
-        found, expected = socket.receive_json(), refused(client, status, **changes)
-        assert found.pop("stream")["left_out"] == []
-        differ = {"instance": "", "request_id": ""}
-        assert found | differ == expected | differ
-
-
-def test_socket_refuses_pages_of_other_sites(client: TestClient) -> None:
-    with (
-        pytest.raises(WebSocketDisconnect) as caught,
-        client.websocket_connect(SOCKET, headers={"Origin": "http://evil.example"}),
-    ):
-        pass
-    assert caught.value.code == 1008
-
-
-@pytest.mark.parametrize(
-    ("change", "field"),
-    [
-        ({"cell": "\ud800"}, "cell"),
-        ({"cell": "a\0"}, "cell"),
-        ({"t\0": 1}, "t\0"),
-        ({"checkpoint": 2**70}, "checkpoint"),
-        ({"people": [[[2**64]]]}, "people[0][0][0]"),
-    ],
-)
-def test_a_socket_outlives_text_and_integers_that_nothing_takes(
-    client: TestClient, change: dict[str, Any], field: str
-) -> None:
-    with client.websocket_connect(SOCKET) as one:
-        one.send_text(json.dumps({**TASK, **change, "stamp": "s1"}))
-        reply = one.receive_json()
-        assert (reply["status"], reply["field"], reply["stamp"]) == (422, field, "s1")
-        for text in ("[" * 60_000, '{"a": ' * 10_000, "[" * 100 + "]" * 100):
-            one.send_text(text)
-            assert one.receive_json()["status"] in (400, 422)
-        one.send_json(TASK)
-        assert one.receive_json()["inference_mode"] == "interpolated"
-
-
-def test_a_stopping_server_ends_its_sockets(client: TestClient) -> None:
-    stopping = client.app.state.services.stopping  # type: ignore[attr-defined]
-    with client.websocket_connect(SOCKET) as one:
-        one.send_json(TASK)
-        assert one.receive_json()["inference_mode"] == "interpolated"
-        stopping.set()
-        try:
-            assert one.receive()["code"] == 1001
-        finally:
-            stopping.clear()
 
 
 def test_growth_of_a_cylinder_is_seen(client: TestClient) -> None:

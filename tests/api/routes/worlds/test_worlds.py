@@ -5,8 +5,8 @@ from typing import Any
 import pytest
 from fastapi.testclient import TestClient
 
-from tests import workshop
 from tests.sim.recorded_person import csv_text, working
+from tests.support import workshop
 
 WORLD = "/v1/worlds/main"
 COMMANDS = f"{WORLD}/commands"

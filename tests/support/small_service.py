@@ -1,4 +1,4 @@
-"""A small application behind the service's guard: ``python -m tests.small_service``.
+"""A small application behind the service's guard: ``python -m tests.support.small_service``.
 
 Runs until it is killed, in a process of its own, so that its memory can be measured. Prints its
 address once it listens. ``HEAD_S`` and other limits in the environment replace the

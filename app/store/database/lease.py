@@ -18,9 +18,9 @@ import sqlalchemy as sa
 
 from app.errors import Conflict
 from app.storage_errors import LeaseLost
+from app.store.database.lock import ServerLock
+from app.store.database.tables import leases
 from app.store.engine import Store
-from app.store.lock import ServerLock
-from app.store.tables import leases
 
 LEASE_S = 30.0
 """Time from a renewal until another server may take the lease [s]."""

@@ -1,7 +1,7 @@
 """Lock for one server per data folder and SQLite file.
 
 The lock is the kernel's (``flock``) and ends with its process, so that it is never stale. The
-process id in the file is for error messages. ``app.store.lease`` covers several machines.
+process id in the file is for error messages. ``lease.py`` covers several machines.
 """
 
 import fcntl

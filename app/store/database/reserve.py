@@ -6,8 +6,8 @@ from typing import TypeVar
 import sqlalchemy as sa
 
 from app.storage_errors import StorageFull
+from app.store.database.tables import reserve
 from app.store.engine import Store
-from app.store.tables import reserve
 
 RESERVE_BYTES = 128 * 1024
 """Reserved space [bytes]."""

@@ -15,9 +15,9 @@ from app.api.routes.viewer import MAX_FRAME_BYTES, is_allowed
 from app.api.services import MAX_VIEWERS
 from app.main import create_app
 from app.settings import Settings
-from tests import patient_http
 from tests.api.live_server import running, wait_until_ready
-from tests.listening_ports import listening_ports
+from tests.support import patient_http
+from tests.support.listening_ports import listening_ports
 
 TOKEN = "a-token-of-some-length"
 PROTOCOL = Subprotocol(f"viser-v{viser.__version__}")

@@ -9,8 +9,8 @@ import pytest
 from app.sim.sorting.kernels.reward import SortingWeights
 from app.sim.sorting.planner import solve
 from app.sim.sorting.state import SortingShape, SortingState
-from tests.sim.sorting_search import random_task
-from tests.sim.sorting_values import judged, model_of, moves_to_go, values
+from tests.sim.sorting.sorting_search import random_task
+from tests.sim.sorting.sorting_values import judged, model_of, moves_to_go, values
 
 GAMMAS = (0.92, 0.95, 0.99)
 

@@ -9,10 +9,10 @@ from alembic.migration import MigrationContext
 from alembic.script import ScriptDirectory
 
 from app.errors import Conflict
+from app.store.database.lease import Lease
 from app.store.engine import Store
-from app.store.lease import Lease
 
-_SCRIPTS = Path(__file__).parent / "migrations"
+_SCRIPTS = Path(__file__).parents[1] / "migrations"
 
 
 def migrate(store: Store, lease: Lease | None = None) -> None:

@@ -9,7 +9,7 @@ from app.live.sorting.world import LiveSortingWorld
 from app.sim.cells.cell import load_cell
 from app.sim.pick.task_policy import TaskPolicy
 from app.sim.sorting.sorting_values import SortingValues
-from tests.straight_policy import StraightPolicy
+from tests.support.straight_policy import StraightPolicy
 
 LOOK = 3
 """Ticks between two looks."""

@@ -24,9 +24,9 @@ from typing import IO, Any
 
 from app.errors import Conflict, InvalidInput
 from app.storage_errors import StorageDamaged, StorageFull, StorageUnavailable
+from app.store.database.lock import ServerLock
+from app.store.database.schema import REVISION
 from app.store.engine import BUSY_TIMEOUT_S, Store
-from app.store.lock import ServerLock
-from app.store.schema import REVISION
 
 HEAD, HEAD_DIGEST = "backup.json", "backup.json.sha256"
 DATABASE = "tandem.db"

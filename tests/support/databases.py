@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 import sqlalchemy as sa
 
+from app.store.database.migrate import migrate
 from app.store.engine import Store
-from app.store.migrate import migrate
-from tests.postgresql_server import TEMPLATE, PostgresqlServer, postgresql_server
+from tests.support.postgresql_server import TEMPLATE, PostgresqlServer, postgresql_server
 
 SQLITE_ONLY = pytest.mark.parametrize("database_url", ["sqlite"], indirect=True)
 POSTGRESQL = pytest.param("postgresql", marks=pytest.mark.postgres)

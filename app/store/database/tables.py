@@ -208,7 +208,7 @@ leases = Table(
     Column("epoch", BigInteger, nullable=False),
     Column("expires_at", UtcDateTime, nullable=False),
 )
-"""One row: the server that runs the jobs (``app.store.lease``)."""
+"""One row: the server that runs the jobs (``app.store.database.lease``)."""
 
 reserve = Table(
     "reserve",
