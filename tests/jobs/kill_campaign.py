@@ -15,6 +15,7 @@ import subprocess
 import sys
 import time
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -32,6 +33,8 @@ SERIES = 25
 """Kills of one database, below the number that ends a job."""
 LONGEST_S = 2.0
 """Longest time from the start of a server, its readiness or the last kill to a kill [s]."""
+NATURAL_END_S = 20.0
+"""Longest time in which the kernel ends the workers of a killed server [s]."""
 SHARE_IN_START = 0.25
 """Share of the servers that are killed before they are ready, wherever they are then."""
 KILLS = {
@@ -54,6 +57,8 @@ class Series:
     folder: Path
     posted: dict[str, tuple[int, int]] = field(default_factory=dict)
     asked_to_cancel: set[str] = field(default_factory=set)
+    continued: int = 0
+    """Workers that were stopped before they asked to end with their server."""
     server: "subprocess.Popen[str] | None" = None
 
     def start(self, seed: int) -> "subprocess.Popen[str]":
@@ -103,9 +108,21 @@ def kill(series: Series, how: str, chance: random.Random) -> bool:
     if then == "SIGCONT" or (target == "worker" and not then):
         return True
     series.collect()
-    deadline = time.monotonic() + WAIT_S
+    if not _end(workers, NATURAL_END_S):
+        # Stopped before it asked to end with its server: it ends as soon as it goes on.
+        assert how.startswith("SIGSTOP worker"), "a worker outlives its server"
+        _send(workers[0], "SIGCONT")
+        assert _end(workers, WAIT_S), "a worker goes on after the end of its server"
+        series.continued += 1
+    return True
+
+
+def _end(workers: Sequence[int], within_s: float) -> bool:
+    """Return whether processes end within a time [s]."""
+    deadline = time.monotonic() + within_s
     while any(Path(f"/proc/{pid}").exists() for pid in workers):
-        assert time.monotonic() < deadline, "a worker outlives its server"
+        if time.monotonic() >= deadline:
+            return False
         time.sleep(0.01)
     return True
 
@@ -140,7 +157,7 @@ def run_series(url: str, folder: Path, n_kills: int, seed: int) -> dict[str, Any
         if series.server is not None:
             series.server.kill()
             series.server.communicate()
-    return {"kills": dict(kills), **check(series)}
+    return {"kills": dict(kills), "continued": series.continued, **check(series)}
 
 
 def check(series: Series) -> dict[str, Any]:
