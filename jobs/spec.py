@@ -20,12 +20,16 @@ from app.policies.evaluation.registry import (
     default_checkpoint,
     most_episodes,
 )
-from app.store.records import NewJob
+from app.store.records import JobRecord, NewJob
 
 MAX_SEED = 2**31 - 1
 """Greatest seed; every random stream accepts it."""
 MAX_RECORDINGS = 32
 """Most recordings of one evaluation."""
+MAX_STEPS = 1_000_000_000
+"""Greatest step budget."""
+MAX_TIME_S = 366 * 86_400.0
+"""Greatest time budget [s]."""
 
 Seed = Annotated[int, Field(ge=0, le=MAX_SEED)]
 Name = Annotated[str, Field(min_length=1, max_length=64)]
@@ -55,16 +59,42 @@ class JobLabels(BaseModel):
         }
 
 
+class Budget(BaseModel):
+    """What a job may use before it ends and keeps its state; part of no spec."""
+
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False, frozen=True, strict=True)
+
+    step_budget: Annotated[int, Field(ge=1, le=MAX_STEPS)] | None = Field(
+        None,
+        description="environment steps: the job ends at the first point of its curve at or "
+        "beyond it, and can be resumed with a larger one; null for none",
+    )
+    time_budget_s: Annotated[float, Field(ge=1, le=MAX_TIME_S)] | None = Field(
+        None,
+        description="run time of all attempts, without waiting in the queue [s]: the job ends "
+        "after the step in which it is reached; null for none",
+    )
+
+
+class JobChanges(JobLabels, Budget):
+    """What can be changed of a posted job."""
+
+    def given(self) -> dict[str, Any]:
+        """Return the given members; an empty text counts as none."""
+        members = {**self.labels(), **self.model_dump(include=set(Budget.model_fields))}
+        return {name: members[name] for name in members if name in self.model_fields_set}
+
+
 class _Spec(JobLabels):
     """A body without unknown fields, non-finite numbers and values of another JSON type."""
 
     def _body(self) -> dict[str, Any]:
-        """Return the spec to store: the given fields, without labels."""
-        labels = set(JobLabels.model_fields)
-        return self.model_dump(mode="json", exclude_unset=True, exclude=labels)
+        """Return the spec to store: the given fields, without labels and budgets."""
+        left_out = set(JobChanges.model_fields)
+        return self.model_dump(mode="json", exclude_unset=True, exclude=left_out)
 
 
-class TrainSpec(_Spec):
+class TrainSpec(_Spec, Budget):
     """Train a policy: a preset, a seed, and fields that differ from the preset."""
 
     kind: Literal["train"]
@@ -89,6 +119,8 @@ class TrainSpec(_Spec):
             seed=self.seed,
             overrides=self.overrides,
             total_steps=presets.resolve(self.preset, self.overrides).learning.total_steps,
+            step_budget=self.step_budget,
+            time_budget_s=self.time_budget_s,
             **self.labels(),
         )
 
@@ -146,6 +178,24 @@ def parse_spec(body: Mapping[str, Any]) -> TrainSpec | EvaluateSpec:
 def spec_type(kind: str) -> type[TrainSpec] | type[EvaluateSpec]:
     """Return the type of a kind's specs."""
     return TrainSpec if kind == "train" else EvaluateSpec
+
+
+def budgets(job: JobRecord) -> dict[str, Any]:
+    """Return the budgets of a job that has some."""
+    values = {name: getattr(job, name) for name in Budget.model_fields}
+    return {name: value for name, value in values.items() if value is not None}
+
+
+def require_budgeted(job: JobRecord, changes: Mapping[str, Any]) -> None:
+    """Check that budgets are given only to a job of a kind that has them.
+
+    Raises:
+        InvalidInput: One is given to an evaluation.
+    """
+    for name in Budget.model_fields:
+        if name in changes and not issubclass(spec_type(job.kind), Budget):
+            rule = f"must not be given to job {job.number}: of kind {job.kind}, which has none"
+            raise InvalidInput(name, changes[name], rule)
 
 
 def merge(spec: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:

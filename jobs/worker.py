@@ -19,7 +19,7 @@ from app.storage_errors import StaleAttempt, StorageDamaged, StorageFull, Storag
 from app.store import attempts, completion, fencing, metrics
 from app.store.engine import Store
 from app.store.jobs import get_job
-from app.store.records import Claim, JobRecord, NewCheckpoint, ResumeState
+from app.store.records import Claim, JobRecord, NewCheckpoint, ResumeState, Spent
 
 logger = logging.getLogger(__name__)
 
@@ -58,8 +58,16 @@ class JobWorker:
         self._lost = threading.Event()
         self._stop_seen = False
         self._waiting: str | None = None
+        self._spent: Spent | None = None
+        self._budgeted = self.job
+        self._run_before, self._started = self.job.run_s, time.monotonic()
         self.after_success: Callable[[], None] = lambda: None
         """Called once the job has succeeded, to remove what only its attempts need."""
+
+    @property
+    def run_s(self) -> float:
+        """Run time of all attempts so far [s]."""
+        return self._run_before + time.monotonic() - self._started
 
     def resume(
         self, usable: Callable[[ResumeState], bool] = lambda _: True
@@ -79,6 +87,8 @@ class JobWorker:
     ) -> None:
         """Add a point to the job's curve; waits until the database takes it.
 
+        At a point beyond the job's step budget the runner must stop.
+
         Raises:
             StaleAttempt: The attempt no longer holds the job.
             StorageFull: No room is left, and the runner must stop.
@@ -92,6 +102,9 @@ class JobWorker:
             )
 
         self.wait_to(write)
+        budget = self._budgeted.step_budget
+        if budget is not None and budget <= step != total_steps:
+            self._spent = "step budget"
 
     def record_checkpoint(
         self, step: int, policy: NewCheckpoint, resume: ResumeState | None
@@ -108,6 +121,12 @@ class JobWorker:
 
     def should_stop(self) -> bool:
         """Whether the runner must write a last checkpoint and return; for every step."""
+        budget = self._budgeted.time_budget_s
+        if self._spent is None and budget is not None and self.run_s >= budget:
+            self._spent = "time budget"
+        return self._interrupted_now() or self._spent is not None
+
+    def _interrupted_now(self) -> bool:
         stop = self._cancelled.is_set() or self._interrupted.is_set() or self._lost.is_set()
         self._stop_seen = self._stop_seen or stop
         return stop
@@ -148,15 +167,21 @@ class JobWorker:
     def _record_end(self, result: Mapping[str, Any] | None) -> None:
         cancelled = fencing.peek(self.store, self._claim).cancel_requested
         if self._stop_seen and cancelled:
-            completion.finish(self.store, self._claim, state="cancelled", result=result)
+            completion.finish(
+                self.store, self._claim, state="cancelled", result=result, run_s=self.run_s
+            )
             logger.info("cancelled")
         elif self._stop_seen:
             completion.give_back(self.store, self._claim)
             logger.info("interrupted: the job resumes with the next attempt")
         else:
-            completion.finish(self.store, self._claim, result=result)
-            self.after_success()
-            logger.info("succeeded")
+            spent, run_s = self._spent, self.run_s
+            completion.finish(
+                self.store, self._claim, result=result, ended_by=spent, run_s=run_s
+            )
+            if spent is None:
+                self.after_success()
+            logger.info("succeeded" if spent is None else f"ended by its {spent}")
 
     def _fail(self, message: str) -> int:
         try:
@@ -185,7 +210,7 @@ class JobWorker:
             except StorageDamaged:
                 raise
             except (StorageFull, StorageUnavailable) as error:
-                if self.should_stop():
+                if self._interrupted_now():
                     raise
                 if self._waiting != error.short:
                     logger.warning("waits: %s", error.message)
@@ -194,7 +219,7 @@ class JobWorker:
                 self._waiting = None
                 return
             again = time.monotonic() + RETRY_S
-            while time.monotonic() < again and not self.should_stop():
+            while time.monotonic() < again and not self._interrupted_now():
                 time.sleep(POLL_S)
 
     def _beat(self) -> None:
@@ -205,7 +230,7 @@ class JobWorker:
             due = time.monotonic() >= next_heartbeat or waiting != recorded
             try:
                 if due:
-                    job = attempts.heartbeat(self.store, self._claim, waiting)
+                    job = attempts.heartbeat(self.store, self._claim, waiting, run_s=self.run_s)
                 else:
                     job = fencing.peek(self.store, self._claim)
             except StaleAttempt:
@@ -214,6 +239,7 @@ class JobWorker:
             except (StorageUnavailable, StorageFull) as error:
                 logger.warning("no heartbeat this time: %s", error)
                 continue
+            self._budgeted = job
             if due:
                 next_heartbeat, recorded = time.monotonic() + HEARTBEAT_S, waiting
             if job.cancel_requested:

@@ -83,9 +83,8 @@ class Writer:
         parts = []
         if (body := operation.get("requestBody")) is not None:
             media = body["content"].get("application/json")
-            arguments.append(
-                "content: bytes" if media is None else f"body: {self._body(media)}"
-            )
+            kind = "content: bytes" if media is None else f"body: {self._body(media)}"
+            arguments.append(kind if body.get("required") else f"{kind} | None = None")
             parts.append("content=content" if media is None else "body=body")
         if named:
             arguments.append("*")
@@ -133,7 +132,8 @@ class Writer:
     def _body(self, media: Node) -> str:
         """Return the type of a JSON body."""
         schema = media["schema"]
-        names = [one for one in map(self._model, schema.get("oneOf", [schema])) if one]
+        variants = schema.get("oneOf", schema.get("anyOf", [schema]))
+        names = [one for one in map(self._model, variants) if one]
         if len(names) > MAX_VARIANTS:
             lines = [self._models[name].__mro__ for name in names]
             base = next(one for one in lines[0] if all(one in line for line in lines))

@@ -36,7 +36,7 @@ from app.api.schemas.trackers import (
 from app.api.schemas.worlds import CommandAccepted, WorldCell, WorldList, WorldSummary
 from app.client.transport import StreamEvent, Transport
 from app.live.commands import LiveCommand
-from jobs.spec import EvaluateSpec, JobLabels, TrainSpec
+from jobs.spec import Budget, EvaluateSpec, JobChanges, TrainSpec
 
 
 class Client(Transport):
@@ -154,8 +154,8 @@ class Client(Transport):
         """One job."""
         return self._parsed(JobPublic, self._send("GET", f"/v1/jobs/{quote(job_id, safe='')}"))
 
-    def update_job(self, job_id: str, body: JobLabels | Mapping[str, Any]) -> JobPublic:
-        """Change name, notes or priority of a job."""
+    def update_job(self, job_id: str, body: JobChanges | Mapping[str, Any]) -> JobPublic:
+        """Change name, notes, priority or budgets of a job."""
         return self._parsed(
             JobPublic, self._send("PATCH", f"/v1/jobs/{quote(job_id, safe='')}", body=body)
         )
@@ -192,10 +192,13 @@ class Client(Transport):
             JobPublic, self._send("POST", f"/v1/jobs/{quote(job_id, safe='')}/cancel")
         )
 
-    def resume_job(self, job_id: str) -> JobPublic:
-        """Resume a cancelled or failed job."""
+    def resume_job(
+        self, job_id: str, body: Budget | Mapping[str, Any] | None = None
+    ) -> JobPublic:
+        """Resume an ended job."""
         return self._parsed(
-            JobPublic, self._send("POST", f"/v1/jobs/{quote(job_id, safe='')}/resume")
+            JobPublic,
+            self._send("POST", f"/v1/jobs/{quote(job_id, safe='')}/resume", body=body),
         )
 
     def retry_job(self, job_id: str, *, idempotency_key: str | None = None) -> JobPublic:

@@ -76,18 +76,23 @@ def claim_next(store: Store) -> tuple[Claim, JobRecord] | None:
         return Claim(job_id=job_id, attempt=attempt), read_job(connection, job_id)
 
 
-def heartbeat(store: Store, claim: Claim, waiting: str | None = None) -> JobRecord:
+def heartbeat(
+    store: Store, claim: Claim, waiting: str | None = None, *, run_s: float | None = None
+) -> JobRecord:
     """Record a heartbeat and return the job, with ``cancel_requested``.
 
     Args:
         store: The database.
         claim: The attempt that writes.
         waiting: Reason for which its worker cannot write.
+        run_s: Run time of all attempts; None leaves it [s].
 
     Raises:
         StaleAttempt: The attempt no longer holds the job.
     """
-    changes = {"heartbeat_at": datetime.now(UTC), "waiting": waiting}
+    changes: dict[str, Any] = {"heartbeat_at": datetime.now(UTC), "waiting": waiting}
+    if run_s is not None:
+        changes["run_s"] = run_s
     with store.writing() as connection:
         fenced_update(connection, claim, changes, counts=False)
         return read_job(connection, claim.job_id)

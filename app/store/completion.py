@@ -14,7 +14,7 @@ from app.store.database.tables import jobs, resume_states
 from app.store.engine import Store
 from app.store.fencing import change_state, fenced_update, peek
 from app.store.jobs import read_job
-from app.store.records import Claim, JobRecord
+from app.store.records import Claim, JobRecord, Spent
 
 MAX_ERROR = 4000
 """Longest error text of a job [characters]."""
@@ -28,17 +28,34 @@ def finish(
     *,
     state: Literal["succeeded", "cancelled"] = "succeeded",
     result: Mapping[str, Any] | None = None,
+    ended_by: Spent | None = None,
+    run_s: float | None = None,
 ) -> None:
-    """End a job as succeeded or cancelled; a cancelled one keeps its state to resume from.
+    """End a job as succeeded or cancelled.
+
+    Args:
+        store: The database.
+        claim: The attempt that writes.
+        state: Its state; a cancelled job keeps its state to resume from.
+        result: Its result.
+        ended_by: The budget that ended it; it keeps its state to resume from.
+        run_s: Run time of all attempts; None leaves it [s].
 
     Raises:
         StaleAttempt: The attempt no longer holds the job.
         StorageFull: No room is left.
     """
-    changes = {"result": None if result is None else dict(result)}
+    changes: dict[str, Any] = {
+        "result": None if result is None else dict(result),
+        "ended_by": ended_by,
+    }
+    if run_s is not None:
+        changes["run_s"] = run_s
 
     def end(connection: sa.Connection) -> None:
-        if state == "succeeded":  # first, which frees space in a full database
+        if (
+            state == "succeeded" and ended_by is None
+        ):  # first, which frees space in a full database
             mine = resume_states.c.job_id == claim.job_id
             connection.execute(sa.delete(resume_states).where(mine))
         _end(connection, claim, state, changes)
@@ -128,8 +145,9 @@ def _end(
     fenced_update(connection, claim, {}, counts=False)
     now = datetime.now(UTC)
     data: dict[str, Any] = {"attempt": claim.attempt}
-    if changes.get("error"):
-        data["error"] = changes["error"]
+    for name in ("error", "ended_by"):
+        if changes.get(name):
+            data[name] = changes[name]
     values = {"error": None, **changes, "finished_at": now, "heartbeat_at": now}
     values["waiting"] = None
     change_state(connection, claim.job_id, state, values, data)

@@ -1,11 +1,11 @@
-"""Actions on jobs beside cancel: resume, name, notes, priority."""
+"""Actions on jobs beside cancel: resume, name, notes, priority, budgets."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import sqlalchemy as sa
 
-from app.errors import WrongState
+from app.errors import InvalidInput, WrongState
 from app.store.database.tables import jobs, resume_states
 from app.store.engine import Store
 from app.store.fencing import change_state
@@ -27,18 +27,27 @@ def resume_steps(store: Store, job_ids: Sequence[str]) -> dict[str, int]:
         return {row.job_id: row.step for row in connection.execute(query)}
 
 
-def resume_job(store: Store, job_id: str) -> JobRecord:
-    """Queue a cancelled or failed job again; its next attempt resumes from its newest state.
+def resume_job(
+    store: Store, job_id: str, budget: Mapping[str, float | None] | None = None
+) -> JobRecord:
+    """Queue an ended job again; its next attempt resumes from its newest state.
 
     Crashes before count no longer.
 
+    Args:
+        store: The database.
+        job_id: A job that is cancelled, has failed, or was ended by a budget.
+        budget: Changed budgets by name; None removes one.
+
     Raises:
         NotFound: There is no such job.
-        WrongState: It is neither cancelled nor failed, or it has no state to resume from.
+        WrongState: It has not ended or is complete, or it has no state to resume from.
+        InvalidInput: A budget is spent already.
     """
     with store.writing() as connection:
         job = read_job(connection, job_id, for_update=True)
-        require_repeatable(job, "resume")
+        if job.ended_by is None:
+            require_repeatable(job, "resume")
         newest = sa.select(sa.func.max(resume_states.c.step))
         step = connection.execute(newest.where(resume_states.c.job_id == job_id)).scalar()
         if step is None:
@@ -47,15 +56,32 @@ def resume_job(store: Store, job_id: str) -> JobRecord:
                 "not kept any more; retry it, which starts at step 0"
             )
             raise WrongState("resume_step", None, rule)
+        budgets = {"step_budget": job.step_budget, "time_budget_s": job.time_budget_s}
+        budgets |= budget or {}
+        _require_left(job, budgets, {"step_budget": step, "time_budget_s": job.run_s})
         changes = {
+            **budgets,
             "failures": 0,
             "cancel_requested": False,
             "error": None,
+            "ended_by": None,
             "result": None,
             "finished_at": None,
         }
         change_state(connection, job_id, "queued", changes, {"attempt": job.attempt})
         return read_job(connection, job_id)
+
+
+def _require_left(
+    job: JobRecord, budgets: Mapping[str, float | None], used: Mapping[str, float]
+) -> None:
+    """Check that something is left of each budget."""
+    units = {"step_budget": "steps", "time_budget_s": "s of run time"}
+    for name, budget in budgets.items():
+        if budget is not None and budget <= used[name]:
+            spent = f"{used[name]:.10g} {units[name]}"
+            rule = f"must be above the {spent} that job {job.number} has used"
+            raise InvalidInput(name, budget, rule)
 
 
 def require_repeatable(job: JobRecord, action: str) -> None:
@@ -66,13 +92,17 @@ def require_repeatable(job: JobRecord, action: str) -> None:
     """
     if job.state in REPEATABLE:
         return
-    remedy = "clone it with changes" if job.state == "succeeded" else "cancel it first"
+    remedy = "cancel it first"
+    if job.state == "succeeded":
+        remedy = "resume it with a larger budget" if job.ended_by else "clone it with changes"
     rule = f"must be {' or '.join(REPEATABLE)} to {action} job {job.number}: {remedy}"
     raise WrongState("state", job.state, rule, REPEATABLE)
 
 
 def change_labels(store: Store, job_id: str, changes: Mapping[str, Any]) -> JobRecord:
-    """Change name, notes or priority of a job; a priority counts while the job is queued.
+    """Change name, notes, priority or budgets of a job.
+
+    A priority counts while the job is queued, a budget until it has ended.
 
     Raises:
         NotFound: There is no such job.

@@ -16,6 +16,9 @@ JobState = Literal["queued", "running", "cancelling", "succeeded", "failed", "ca
 FINAL_STATES: tuple[JobState, ...] = ("succeeded", "failed", "cancelled")
 """Final states."""
 
+Spent = Literal["step budget", "time budget"]
+"""The budget that ended a job before its last step."""
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Page(Generic[Item]):
@@ -51,6 +54,10 @@ class NewJob:
     """Queued jobs of a higher priority start first."""
     parent: str | None = None
     """Id of the job that this one repeats or changes."""
+    step_budget: int | None = None
+    """Steps after which the job ends and keeps its state."""
+    time_budget_s: float | None = None
+    """Run time after which the job ends and keeps its state [s]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -111,6 +118,14 @@ class JobRecord:
     """Number of attempts that were killed with their server."""
     waiting: str | None
     """Reason for which its worker cannot write, such as ``"disk full"``."""
+    step_budget: int | None
+    """Steps after which it ends and keeps its state."""
+    time_budget_s: float | None
+    """Run time after which it ends and keeps its state [s]."""
+    run_s: float
+    """Run time of all its attempts, at the last heartbeat [s]."""
+    ended_by: Spent | None
+    """The budget that ended it; it can be resumed with a larger one."""
 
     @property
     def is_final(self) -> bool:

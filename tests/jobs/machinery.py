@@ -3,9 +3,10 @@
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 from app.store import checkpoints, jobs, metrics
 from app.store.database.lease import LEASE_S
@@ -20,9 +21,16 @@ WAIT_S = 600.0
 """Far above what anything takes, compiling kernels included; only a hang reaches it."""
 
 
-def queue(store: Store, *, seed: int = 0, kind: str = "count", **overrides: object) -> str:
+def queue(
+    store: Store,
+    *,
+    seed: int = 0,
+    kind: str = "count",
+    budgets: Mapping[str, Any] | None = None,
+    **overrides: object,
+) -> str:
     spec = {"kind": kind, "seed": seed, "overrides": overrides}
-    new = NewJob(kind=kind, seed=seed, overrides=overrides, spec=spec)
+    new = NewJob(kind=kind, seed=seed, overrides=overrides, spec=spec, **(budgets or {}))
     return jobs.create_job(store, new).id
 
 

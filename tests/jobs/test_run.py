@@ -10,7 +10,7 @@ import pytest
 from app.policies.checkpoints import pretrained
 from app.policies.checkpoints.trained_cell import is_for
 from app.policies.configs.presets import nested
-from app.store import attempts, checkpoints, events, jobs, metrics
+from app.store import attempts, checkpoints, events, job_actions, jobs, metrics
 from app.store.engine import Store
 from app.store.records import CheckpointRecord, NewCheckpoint
 from jobs.cell_catalog import CellCatalog
@@ -45,9 +45,10 @@ def supervisor(store: Store, tmp_path: Path) -> Iterator[Supervisor]:
     started.stop()
 
 
-def train(store: Store, **overrides: float | str) -> str:
+def train(store: Store, step_budget: int | None = None, **overrides: float | str) -> str:
     fields = nested(TINY | overrides)
     body = {"kind": "train", "preset": "pick-td3", "seed": 4, "overrides": fields}
+    body["step_budget"] = step_budget
     return jobs.create_job(store, parse_spec(body).new_job()).id
 
 
@@ -84,6 +85,18 @@ def test_killed_training_ends_with_the_checkpoints_of_one_that_was_not(
     ]
     assert ids[0] == ids[1] and len(ids[0]) == 8
     assert not (tmp_path / "resume" / killed_id).exists()
+
+
+@pytest.mark.usefixtures("supervisor")
+@SQLITE_ONLY
+def test_training_that_a_budget_ended_goes_on_to_the_same_bits(store: Store) -> None:
+    whole = wait_until_final(store, train(store))
+    job = wait_until_final(store, train(store, step_budget=700))
+    assert (job.state, job.ended_by, job.step) == ("succeeded", "step budget", 768)
+    assert job.result is not None and job.result["step"] == 768
+    job_actions.resume_job(store, job.id, {"step_budget": None})
+    job = wait_until_final(store, job.id)
+    assert (job.ended_by, job.result) == (None, whole.result)
 
 
 def checkpoints_of(store: Store, job_id: str) -> tuple[CheckpointRecord, ...]:

@@ -1,4 +1,4 @@
-"""Actions on jobs: cancel, resume, retry, clone, label, delete."""
+"""Actions on jobs: cancel, resume, retry, clone, change, delete."""
 
 from dataclasses import replace
 from typing import Annotated, Any
@@ -13,15 +13,19 @@ from app.api.schemas.jobs import JobPublic
 from app.api.services import ServicesDep
 from app.api.validation import validated
 from app.store import job_actions, jobs
-from jobs.spec import JobLabels, merge, spec_type
+from jobs.spec import Budget, JobChanges, budgets, merge, require_budgeted, spec_type
 
 CHANGES = Body(
     description="fields that differ from the job's spec, as a JSON merge patch (RFC 7396): "
-    "objects are merged, null removes a member; also name, notes and priority",
+    "objects are merged, null removes a member; also name, notes, priority and budgets",
     openapi_examples=named({"change": examples.CHANGES}),
 )
 
 LABELS = Body(openapi_examples=named({"label": examples.LABELS}))
+BUDGET = Body(
+    description="changed budgets; without one they stay",
+    openapi_examples=named({"larger": examples.BUDGET}),
+)
 DELETED: dict[int | str, dict[str, Any]] = {
     409: {"description": "The job has not ended, or one of its checkpoints is in use"},
     507: {},
@@ -50,12 +54,17 @@ def cancel_job(job: JobDep, services: ServicesDep) -> JobPublic:
     return shown(cancelled, services)
 
 
-@router.post(
-    "/resume", status_code=202, summary="Resume a cancelled or failed job", responses=ENDED
-)
-def resume_job(job: JobDep, services: ServicesDep) -> JobPublic:
-    """Queue the same job again; it continues from its newest state, at ``resume_step``."""
-    resumed = job_actions.resume_job(services.store, job.id)
+@router.post("/resume", status_code=202, summary="Resume an ended job", responses=ENDED)
+def resume_job(
+    job: JobDep, services: ServicesDep, body: Annotated[Budget | None, BUDGET] = None
+) -> JobPublic:
+    """Queue the same job again; it continues from its newest state, at ``resume_step``.
+
+    Cancelled and failed jobs can be resumed, and those that a budget ended, with a larger one.
+    """
+    changes = {} if body is None else body.model_dump(exclude_unset=True)
+    require_budgeted(job, changes)
+    resumed = job_actions.resume_job(services.store, job.id, changes)
     services.supervisor.wake()
     return shown(resumed, services)
 
@@ -75,7 +84,7 @@ def retry_job(
     """Queue a new job with the same spec, which starts at step 0; the first one stays."""
     job_actions.require_repeatable(job, "retry")
     labels = {"name": job.name, "priority": job.priority}
-    body = validated(spec_type(job.kind), {**job.spec, **labels})
+    body = validated(spec_type(job.kind), {**job.spec, **labels, **budgets(job)})
     new = replace(checked(body, services), parent=job.id)
     return queued(new, services, response, idempotency_key)
 
@@ -94,21 +103,23 @@ def clone_job(
     idempotency_key: IdempotencyKey = None,
 ) -> JobPublic:
     """Queue a new job with the spec of this one and the given changes."""
-    body = validated(spec_type(job.kind), merge(job.spec, changes))
+    body = validated(spec_type(job.kind), merge({**job.spec, **budgets(job)}, changes))
     new = replace(checked(body, services), parent=job.id)
     return queued(new, services, response, idempotency_key)
 
 
-@router.patch("", summary="Change name, notes or priority of a job", responses={507: {}})
+@router.patch(
+    "", summary="Change name, notes, priority or budgets of a job", responses={507: {}}
+)
 def update_job(
-    job: JobDep, services: ServicesDep, body: Annotated[JobLabels, LABELS]
+    job: JobDep, services: ServicesDep, body: Annotated[JobChanges, LABELS]
 ) -> JobPublic:
-    """Change the given members; null removes name or notes.
+    """Change the given members; null removes name, notes or a budget.
 
-    A priority counts while the job is queued.
+    A priority counts while the job is queued, a budget until the job has ended.
     """
-    given = body.labels().items()
-    changes = {name: value for name, value in given if name in body.model_fields_set}
+    changes = body.given()
+    require_budgeted(job, changes)
     changed = job_actions.change_labels(services.store, job.id, changes)
     return shown(changed, services)
 

@@ -72,6 +72,7 @@ JOBS: dict[str, Any] = {
     },
     "evaluate": {"kind": "evaluate", "protocol": "pick-single", "episodes": 100},
 }
+BUDGET: dict[str, Any] = {"step_budget": 204800, "time_budget_s": None}
 LABELS: dict[str, Any] = {"name": "baseline", "notes": "to compare with", "priority": 5}
 CHANGES: dict[str, Any] = {"seed": 2, "overrides": {"learning": {"gamma": 0.98}}}
 COMMANDS: dict[str, Any] = {

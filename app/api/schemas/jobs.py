@@ -36,6 +36,21 @@ class JobPublic(Answer):
     error: str | None
     step: int = Field(description="environment steps done")
     total_steps: int | None
+    step_budget: int | None = Field(description="steps after which it ends and can be resumed")
+    time_budget_s: float | None = Field(
+        description="run time after which it ends and can be resumed [s]"
+    )
+    run_s: float = Field(description="run time of all its attempts [s]")
+    ended_by: str | None = Field(
+        description="the budget that ended it: `step budget` or `time budget`; null otherwise"
+    )
+    progress: float | None = Field(
+        description="done share of its steps, or of the budget that is nearer to its end"
+    )
+    time_left_s: float | None = Field(
+        description="estimated run time until its end or the first spent budget [s]; null if "
+        "it does not run or nothing is known"
+    )
     cancel_requested: bool
     idempotency_key: str | None
     result: dict[str, Any] | None
@@ -54,10 +69,44 @@ class JobPublic(Answer):
         cls, job: JobRecord, latest: MetricRow | None = None, resume_step: int | None = None
     ) -> Self:
         """Return the schema of a record."""
-        names = cls.model_fields.keys() - {"latest", "resume_step"}
-        members = {name: getattr(job, name) for name in names}
-        values = dict(latest.values) if latest else None
-        return cls(**members, latest=values, resume_step=resume_step)
+        more: dict[str, Any] = {
+            "latest": dict(latest.values) if latest else None,
+            "resume_step": resume_step,
+            "progress": _progress(job),
+            "time_left_s": _time_left(job, latest),
+        }
+        names = cls.model_fields.keys() - more.keys()
+        return cls(**{name: getattr(job, name) for name in names}, **more)
+
+
+def _last_step(job: JobRecord) -> int | None:
+    """Return the step at which a job ends: its last one, or that of its budget."""
+    known = [one for one in (job.total_steps, job.step_budget) if one is not None]
+    return min(known, default=None)
+
+
+def _progress(job: JobRecord) -> float | None:
+    """Return the done share of a job, None where its steps are unknown and it has no budget."""
+    last, shares = _last_step(job), []
+    if last:
+        shares.append(job.step / last)
+    if job.time_budget_s is not None:
+        shares.append(job.run_s / job.time_budget_s)
+    return min(1.0, max(shares)) if shares else None
+
+
+def _time_left(job: JobRecord, latest: MetricRow | None) -> float | None:
+    """Return the time to the end of a running job, or to its first spent budget [s]."""
+    if job.state != "running":
+        return None
+    found, last = [], _last_step(job)
+    left = latest.values.get("time_left_s") if latest else None
+    if left is not None and last is not None and job.total_steps is not None:
+        share = (last - job.step) / max(1, job.total_steps - job.step)
+        found.append(left * max(0.0, share))
+    if job.time_budget_s is not None:
+        found.append(max(0.0, job.time_budget_s - job.run_s))
+    return min(found, default=None)
 
 
 class JobList(Answer):

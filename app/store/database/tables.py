@@ -103,6 +103,10 @@ jobs = Table(
     Column("last_event", Integer, nullable=False, default=0),
     Column("kills", Integer, nullable=False, server_default="0"),
     Column("waiting", String(64)),
+    Column("step_budget", BigInteger),
+    Column("time_budget_s", Float),
+    Column("run_s", Float, nullable=False, server_default="0"),
+    Column("ended_by", String(16)),
     Index("ix_jobs_state_number", "state", "number"),  # pages of jobs in a state
     sqlite_autoincrement=True,
 )

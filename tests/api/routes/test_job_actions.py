@@ -115,6 +115,45 @@ def test_labels_are_changed_and_removed(client: TestClient, ended: dict[str, Any
     assert refused.status_code == 422 and refused.json()["field"] == "priority"
 
 
+def test_budgets_are_given_changed_and_kept_by_repetitions(client: TestClient) -> None:
+    budgets = {"step_budget": 51200, "time_budget_s": 600}
+    job = cancelled(client, client.post("/v1/jobs", json={**TRAIN, **budgets}).json())
+    path = f"/v1/jobs/{job['id']}"
+    assert (job["step_budget"], job["time_budget_s"], job["ended_by"]) == (51200, 600.0, None)
+    assert job["spec"].keys() == {"kind", "preset", "seed"}
+    clone = client.post(f"{path}/clone", json={"time_budget_s": None, "priority": -100}).json()
+    assert (clone["step_budget"], clone["time_budget_s"]) == (51200, None)
+    changed = client.patch(path, json={"step_budget": None}).json()
+    assert (changed["step_budget"], changed["time_budget_s"]) == (None, 600.0)
+    cancelled(client, clone)
+
+
+@pytest.mark.parametrize(
+    ("budget", "field"),
+    [
+        ({"step_budget": 0}, "step_budget"),
+        ({"step_budget": 1.5}, "step_budget"),
+        ({"time_budget_s": "1 h"}, "time_budget_s"),
+        ({"time_budget_s": 0.1}, "time_budget_s"),
+        ({"priority": 3}, "priority"),
+    ],
+)
+def test_bad_budget_is_refused_by_field(
+    client: TestClient, ended: dict[str, Any], budget: dict[str, Any], field: str
+) -> None:
+    answer = client.post(f"/v1/jobs/{ended['id']}/resume", json=budget)
+    assert (answer.status_code, answer.json()["field"]) == (422, field)
+
+
+def test_evaluation_has_no_budget(client: TestClient) -> None:
+    body = {"kind": "evaluate", "protocol": "pick-single", "episodes": 2, "priority": -100}
+    refused = client.post("/v1/jobs", json={**body, "step_budget": 10})
+    assert (refused.status_code, refused.json()["field"]) == (422, "step_budget")
+    job = cancelled(client, client.post("/v1/jobs", json=body).json())
+    answer = client.patch(f"/v1/jobs/{job['id']}", json={"time_budget_s": 60})
+    assert (answer.status_code, answer.json()["field"]) == (422, "time_budget_s")
+
+
 def test_actions_on_an_unknown_job_are_not_found(client: TestClient) -> None:
     for action in ("cancel", "resume", "retry", "clone"):
         assert client.post(f"/v1/jobs/nothing/{action}", json={}).status_code == 404

@@ -3,8 +3,15 @@ import { html, useRef, useState } from "../vendor/htm-preact-standalone.module.j
 import { patch, post, remove } from "../api.js";
 import * as format from "../format.js";
 import { Icon } from "../icons.js";
+import { BUDGETS, budgetBody, budgetTexts } from "./budgets.js";
+import { parsed, useForm } from "./formfields.js";
 
 const FINAL = new Set(["succeeded", "failed", "cancelled"]);
+const LABELS = [
+  { name: "name", default: "", help: "For the list of jobs; may be empty." },
+  { name: "priority", default: 0, help: "Waiting jobs of a higher priority start first",
+    minimum: -100, maximum: 100 },
+];
 const REPEATABLE = new Set(["failed", "cancelled"]);
 
 export function isActive(job) {
@@ -87,45 +94,35 @@ export function Ask({ name, label, question, yes, no, action, onYes }) {
   </div>`;
 }
 
-/** Name, priority and notes of a job, changed together. */
+/** Name, priority, budgets and notes of a job, changed together. */
 export function Labels({ job, onChanged }) {
-  const [typed, setTyped] = useState({});
-  const saving = useAction(() => {
-    setTyped({});
-    onChanged();
+  const shown = { name: job.name ?? "", notes: job.notes ?? "", priority: String(job.priority),
+    ...budgetTexts(job) };
+  const fields = job.kind === "train" && job.state !== "succeeded" ? [...LABELS, ...BUDGETS] : LABELS;
+  const form = useForm({
+    names: ["notes", ...fields.map((field) => field.name)], prefix: "label",
+    onDone: () => {
+      form.start({});
+      onChanged();
+    },
   });
-  const shown = { name: job.name ?? "", notes: job.notes ?? "", priority: String(job.priority), ...typed };
-  const changed = Object.keys(typed).some((key) => typed[key] !== String(job[key] ?? ""));
-  const set = (key) => (event) => setTyped((now) => ({ ...now, [key]: event.target.value }));
-  const fault = (key) => saving.error?.field === key;
-  const save = (event) => {
-    event.preventDefault();
-    const body = { ...typed };
-    if ("priority" in body) body.priority = number(body.priority);
-    saving.run(() => patch(`v1/jobs/${job.id}`, body));
+  const values = { ...shown, ...form.typed };
+  const changed = Object.keys(form.typed).filter((name) => values[name] !== shown[name]);
+  const save = () => {
+    const body = { ...values, ...budgetBody(values), priority: parsed(values.priority.replace("\u2212", "-")) };
+    return patch(`v1/jobs/${job.id}`, Object.fromEntries(changed.map((name) => [name, body[name]])));
   };
-  const input = (key, label, more) => html`<div class="field">
-    <label for=${`label-${key}`}>${label}</label>
-    <input id=${`label-${key}`} type="text" autocomplete="off" value=${shown[key]} ...${more}
-      aria-invalid=${String(fault(key))} onInput=${set(key)} /></div>`;
   return html`<details class="more labels" data-role="labels">
-    <summary><${Icon} name="chevron" />Name, priority and notes</summary>
-    <form class="train" onSubmit=${save} noValidate>
-      ${input("name", "Name", { maxlength: 80, placeholder: "none" })}
-      ${input("priority", "Priority", { inputmode: "numeric" })}
-      <p class="field-help">Waiting jobs of a higher priority start first: −100 to 100.</p>
+    <summary><${Icon} name="chevron" />Name, priority${fields === LABELS ? "" : ", budgets"} and notes</summary>
+    <form class="train" ref=${form.ref} onSubmit=${form.submit(save)} noValidate>
+      ${fields.map((field) => form.row(field, values))}
       <label class="sr" for="label-notes">Notes</label>
-      <textarea id="label-notes" rows="3" maxlength="4000" placeholder="Notes" value=${shown.notes}
-        onInput=${set("notes")}></textarea>
+      <textarea id="label-notes" rows="3" maxlength="4000" placeholder="Notes" value=${values.notes}
+        onInput=${(event) => form.type("notes", event.target.value)}></textarea>
       <div class="train-foot"><button type="submit" class="tool" data-action="save-labels"
-        disabled=${saving.busy || !changed}>Save</button>
-        <${Fault} error=${saving.error} /></div>
+        disabled=${form.busy || changed.length === 0}>Save</button>
+        ${["", "notes"].map((name) => form.faults[name] && html`<span class="field-error" key=${name}
+          role="alert">${form.faults[name]}</span>`)}</div>
     </form>
   </details>`;
-}
-
-/** Text as a number where it is one; the service says what it thinks of the rest. */
-function number(text) {
-  const plain = String(text).trim().replace("\u2212", "-");
-  return plain !== "" && Number.isFinite(Number(plain)) ? Number(plain) : text;
 }

@@ -4,6 +4,7 @@ import { follow, get } from "../api.js";
 import * as format from "../format.js";
 import { Icon } from "../icons.js";
 import { CurvePlot } from "../plots.js";
+import { EndedByBudget } from "./budgets.js";
 import { MAX_JOBS } from "./compare.js";
 import { JobActions, Labels, isActive } from "./jobactions.js";
 
@@ -76,7 +77,7 @@ export function JobList({ jobs, error, onNew, ...rest }) {
 }
 
 function Job({ job, jobs, open, chosen, onChoose, ...rest }) {
-  const share = progress(job);
+  const share = job.progress ?? 0;
   return html`<li class=${`job ${open ? "is-open" : ""} ${chosen ? "has-choice" : ""}`} data-job=${job.id}
     data-state=${job.state}>
     ${chosen && html`<label class="job-choice"><input type="checkbox" checked=${chosen.includes(job.id)}
@@ -88,7 +89,7 @@ function Job({ job, jobs, open, chosen, onChoose, ...rest }) {
       <${Icon} name="chevron" />
       <span class="job-name">${title(job)}</span>
       <span class=${`chip chip-${job.waiting ? "warn" : TONES[job.state] ?? "quiet"}`}>${
-        job.waiting ? `waiting: ${job.waiting}` : job.state}</span>
+        job.waiting ? `waiting: ${job.waiting}` : stateOf(job)}</span>
       <span class="job-sub">${subtitle(job, jobs)}</span>
     </button>
     ${isActive(job) &&
@@ -99,6 +100,10 @@ function Job({ job, jobs, open, chosen, onChoose, ...rest }) {
       ? html`<${Evaluation} job=${job} ...${rest} />`
       : html`<${JobDetail} job=${job} ...${rest} />`)}
   </li>`;
+}
+
+function stateOf(job) {
+  return job.ended_by ? `${job.state}: ${job.ended_by}` : job.state;
 }
 
 function title(job) {
@@ -113,11 +118,14 @@ function subtitle(job, jobs) {
   if (parent) parts.push(`from job ${parent.number}`);
   if (job.state === "queued" && job.priority) parts.push(`priority ${format.number(job.priority)}`);
   const unit = job.kind === "evaluate" ? "rows" : "steps";
-  if (isActive(job) && job.total_steps) {
-    parts.push(`${format.steps(job.step)} of ${format.steps(job.total_steps)} ${unit}`);
-    if (job.state === "running" && job.latest && job.kind === "train") {
-      const left = job.latest.time_left_s;
-      parts.push(Number.isFinite(left) ? `${format.duration(left)} left` : "collecting");
+  const last = lastStep(job);
+  if (isActive(job) && last) {
+    const budget = last < job.total_steps ? " (budget)" : "";
+    parts.push(`${format.steps(job.step)} of ${format.steps(last)} ${unit}${budget}`);
+    if (job.state === "running" && job.kind === "train") {
+      const left = job.time_left_s;
+      if (Number.isFinite(left)) parts.push(`${format.duration(left)} left`);
+      else if (job.latest) parts.push("collecting");
     }
   } else {
     if (job.step) parts.push(`${format.steps(job.step)} ${job.step === 1 ? unit.slice(0, -1) : unit}`);
@@ -128,8 +136,9 @@ function subtitle(job, jobs) {
   return parts.join(" · ");
 }
 
-function progress(job) {
-  return job.total_steps ? Math.min(1, (job.step ?? 0) / job.total_steps) : 0;
+/** The step at which a job ends: its last one, or that of its budget. */
+function lastStep(job) {
+  return job.total_steps && Math.min(job.total_steps, job.step_budget ?? Infinity);
 }
 
 function JobDetail({ job, onChanged, onOpen, onClone, onAct, acting }) {
@@ -156,6 +165,7 @@ function JobDetail({ job, onChanged, onOpen, onClone, onAct, acting }) {
       <p class="plot-foot"><span data-points=${rows.length}>${rows.length} points</span>
         <span data-role="point">${row && `${readout ? "" : "last: "}${format.steps(row.step)} steps,
           ${episodes(row)}`}</span></p>`}
+    ${job.ended_by && html`<${EndedByBudget} key=${job.attempt} job=${job} onChanged=${onChanged} />`}
     ${lost && html`<p class="notice warn" role="status"><${Icon} name="alert" />
       Lost the stream of this job; trying again.</p>`}
     <${Speed} job=${job} row=${rows?.at(-1)} />
@@ -246,6 +256,9 @@ function Speed({ job, row }) {
       ["Updates per s", format.number(row.updates_per_s)],
       ["Steps per s", format.steps(row.steps_per_s)],
       ["CPU time", format.duration(row.cpu_s)],
+      ["Step budget", format.steps(job.step_budget)],
+      ["Time budget", job.time_budget_s === null ? "–"
+        : `${format.duration(job.run_s)} of ${format.duration(job.time_budget_s)}`],
     ].filter(([, text]) => text !== "–").map(([name, text]) => html`<div key=${name}>
       <dt>${name}</dt><dd>${text}</dd></div>`)}
     ${changed.map(([name, v]) => html`<div key=${name}><dt>${name}</dt>

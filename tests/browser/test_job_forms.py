@@ -1,0 +1,68 @@
+"""A visitor starts jobs by their forms, limits them and goes on."""
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+from playwright.sync_api import Page, expect
+
+from tests import patient_http
+from tests.browser.test_training import GROWTH_MS, open_form
+
+pytestmark = pytest.mark.browser
+
+TINY = {
+    "total_steps": 5120,
+    "n_envs": 128,
+    "buffer_size": 5000,
+    "learning_starts": 0,
+    "progress_steps": 128,
+    "checkpoint_steps": 128,
+}
+"""A training of seconds with a point and a checkpoint at every step."""
+
+
+def state_of(page: Page) -> str | None:
+    """Return the state of the open job once it has ended."""
+    page.wait_for_selector(".job.is-open:is([data-state=succeeded], [data-state=failed])")
+    return page.get_attribute(".job.is-open", "data-state")
+
+
+def test_training_ends_at_its_budget_and_goes_on_with_a_larger_one(
+    open_page: Callable[..., Page], server: str
+) -> None:
+    page = open_page((1280, 900), scene=False)
+    open_form(page)
+    page.click("form.train summary")
+    for name, value in TINY.items():
+        page.fill(f"#train-learning-{name}", str(value))
+    page.fill("#train-step_budget", "none")
+    page.fill("#train-time_budget_s", "30")
+    page.click("form.train [type=submit]")
+    expect(page.locator("#train-step_budget-error")).to_contain_text("integer")
+    page.fill("#train-step_budget", "1000")
+    page.click("form.train [type=submit]")
+    page.wait_for_selector(".job.is-open")
+    assert state_of(page) == "succeeded"
+    job_id = page.get_attribute(".job.is-open", "data-job")
+    ended = page.locator('.is-open [data-role="ended-by"]')
+    expect(ended).to_contain_text("Ended by its step budget at 1024 of 5120 steps")
+    expect(page.locator(".is-open .chip")).to_have_text("succeeded: step budget")
+    assert job(server, job_id)["time_budget_s"] == 1800.0
+    page.click('[data-action="resume-budget"]')
+    expect(page.locator("#resume-step_budget-error")).to_contain_text("above the 1024 steps")
+    page.fill("#resume-step_budget", "")
+    page.click('[data-action="resume-budget"]')
+    expect(ended).to_have_count(0)
+    expect(page.locator(".job.is-open .job-sub")).to_contain_text("attempt 2")
+    assert state_of(page) == "succeeded"
+    assert job(server, job_id)["step"] == 5120
+    expect(page.locator(".is-open [data-points]")).to_have_attribute(
+        "data-points", "40", timeout=GROWTH_MS
+    )
+    assert len(page.problems) == 2  # type: ignore[attr-defined]  # two refusals
+
+
+def job(server: str, job_id: str | None) -> dict[str, Any]:
+    found: dict[str, Any] = patient_http.get(f"{server}/v1/jobs/{job_id}").json()
+    return found

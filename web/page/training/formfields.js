@@ -1,0 +1,154 @@
+// Forms: what is typed, one submission at a time, and the faults that the service finds in it.
+import { html, useRef, useState } from "../vendor/htm-preact-standalone.module.js";
+import { Unreachable } from "../api.js";
+import { Icon } from "../icons.js";
+
+/**
+ * A form whose fields are `names`; `typed` are their texts at the start. `submit(send)` sends it
+ * with the key of this submission, which stays while the server is not reached.
+ */
+export function useForm({ typed: first = {}, names, onDone, prefix = "train" }) {
+  const [typed, setTyped] = useState(first);
+  const [problem, setProblem] = useState(null);
+  const [busy, setBusy] = useState(false);
+  const ref = useRef(null);
+  const attempt = useRef(key());
+  const faults = faultsByField(problem, names);
+  const type = (name, text) => {
+    setTyped((now) => ({ ...now, [name]: text }));
+    setProblem((now) => without(now, name, names));
+  };
+  const submit = (send) => async (event) => {
+    event.preventDefault();
+    setBusy(true);
+    setProblem(null);
+    try {
+      onDone(await send({ "Idempotency-Key": attempt.current }));
+    } catch (refused) {
+      attempt.current = refused instanceof Unreachable ? attempt.current : key();
+      setProblem(refused);
+      requestAnimationFrame(() => ref.current?.querySelector("[aria-invalid=true]")?.focus());
+    }
+    setBusy(false);
+  };
+  const row = (field, values = typed) => html`<${Field} key=${field.name} field=${field}
+    text=${values[field.name]}
+    fault=${faults[field.name]} prefix=${prefix} onText=${(text) => type(field.name, text)} />`;
+  const start = (values) => {
+    setTyped(values);
+    setProblem(null);
+  };
+  return { ref, typed, faults, busy, type, submit, row, start };
+}
+
+/** The head of a form, and what is wrong with it as a whole. */
+export function FormHead({ title, fault, onClose }) {
+  return html`<div class="train-head"><h3>${title}</h3>
+      <button type="button" class="quiet-button" aria-label="Close the form" onClick=${onClose}>
+        <${Icon} name="close" /></button></div>
+    ${fault && html`<p class="notice bad" role="alert"><${Icon} name="alert" />
+      <span>${fault}</span></p>`}`;
+}
+
+/** One field with its unit, help and fault; `prefix` keeps the fields of several forms apart. */
+export function Field({ field, text, fault, onText, prefix }) {
+  const id = `${prefix}-${field.name.replaceAll(".", "-")}`;
+  const own = text !== undefined && changed(field, { [field.name]: text });
+  const described = [fault && `${id}-error`, `${id}-help`].filter(Boolean).join(" ");
+  return html`<div class=${`field ${own ? "is-changed" : ""}`}>
+    <label for=${id}>${field.title ?? capital(field.name)}${field.unit && html`<span class="unit"> [${field.unit}]</span>`}</label>
+    ${isChoice(field)
+      ? html`<select id=${id} name=${field.name} value=${text ?? String(field.default)}
+          aria-describedby=${described} aria-invalid=${String(Boolean(fault))}
+          onChange=${(e) => onText(e.target.value)}>
+          ${choices(field).map((c) => html`<option key=${c} value=${c}>${c}</option>`)}</select>`
+      : html`<input id=${id} name=${field.name} type="text" inputmode="decimal" spellcheck="false"
+          autocomplete="off" value=${text ?? show(field.default)} aria-describedby=${described}
+          aria-invalid=${String(Boolean(fault))} onInput=${(e) => onText(e.target.value)} />`}
+    ${fault && html`<p class="field-error" id=${`${id}-error`} role="alert">${fault}</p>`}
+    <p class="field-help" id=${`${id}-help`}>${helpText(field)}</p>
+  </div>`;
+}
+
+/** Sentences: what the field does, and its range. */
+function helpText(field) {
+  const help = String(field.help ?? "").trim();
+  const sentence = help && `${capital(help)}${/[.!?]$/.test(help) ? "" : "."}`;
+  return [sentence, rangeText(field)].filter(Boolean).join(" ");
+}
+
+function rangeText({ minimum, maximum }) {
+  const [low, high] = [minimum, maximum].map((v) => (Number.isFinite(v) ? show(v) : null));
+  if (low !== null && high !== null) return `${low} to ${high}.`;
+  if (low !== null) return `At least ${low}.`;
+  return high !== null ? `At most ${high}.` : "";
+}
+
+function isChoice(field) {
+  return field.type === "bool" || Array.isArray(field.choices);
+}
+
+function choices(field) {
+  return field.type === "bool" ? ["true", "false"] : field.choices.map(String);
+}
+
+export function show(v) {
+  return typeof v === "string" ? v : JSON.stringify(v);
+}
+
+/** Text as the JSON it stands for; what is no JSON goes as text, and the service says so. */
+export function parsed(text) {
+  const plain = String(text).trim().replaceAll("_", "").replace(/(?<=\d)[\s\u202f](?=\d)/g, "");
+  try {
+    return JSON.parse(plain);
+  } catch {
+    return Number.isFinite(Number(plain)) && plain !== "" ? Number(plain) : String(text);
+  }
+}
+
+export function changed(field, texts) {
+  const text = texts[field.name];
+  return text !== undefined && JSON.stringify(parsed(text)) !== JSON.stringify(field.default);
+}
+
+/** The single faults that a problem lists. */
+function faultsOf(problem) {
+  return problem?.errors?.length ? problem.errors : problem?.field ? [problem] : [];
+}
+
+/** Name of the form's field that a fault is about; "" where it is none of them. */
+function fieldOf(fault, names) {
+  const name = String(fault.field ?? "").replace(/^overrides\./, "");
+  return names.includes(name) ? name : "";
+}
+
+/** What is left of a problem once a field was edited: the faults of the other fields. */
+function without(problem, name, names) {
+  const rest = faultsOf(problem).filter((one) => !["", name].includes(fieldOf(one, names)));
+  return rest.length ? { message: problem.message, errors: rest } : null;
+}
+
+/** Where each fault of a problem belongs: by field name, "" for the form as a whole. */
+function faultsByField(problem, names) {
+  if (!problem) return {};
+  const listed = faultsOf(problem);
+  const faults = {};
+  for (const one of listed) {
+    const name = fieldOf(one, names);
+    const choice = one.choices?.length ? ` Choices: ${one.choices.join(", ")}.` : "";
+    faults[name] = name
+      ? `${capital(one.rule ?? problem.message)}.${choice}`.replace(/\.\.(?= |$)/, ".")
+      : problem.message;
+  }
+  if (listed.length === 0) faults[""] = problem.message;
+  return faults;
+}
+
+export function capital(text) {
+  return String(text)[0].toUpperCase() + String(text).slice(1);
+}
+
+/** The key of one submission, however often it is sent. */
+function key() {
+  return crypto.randomUUID?.() ?? `${Date.now()}-${Math.random()}`;
+}
