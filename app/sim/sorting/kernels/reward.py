@@ -3,7 +3,7 @@
 ``R = r_move + r_empty + r_stuck + r_fail + r_back + r_dist + r_succ``. All but the last are
 costs. The source does not state coefficients; with those of :class:`SortingWeights` the plan of
 fewest moves and least risk is optimal, as value iteration verifies on small instances
-(``tests/sim/sorting/test_reward.py``).
+(``tests/sim/test_sorting_reward.py``).
 
 Source: thesis eq. (3.18), (3.19).
 """
