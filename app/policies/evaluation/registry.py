@@ -20,6 +20,7 @@ from app.policies.evaluation.reach.targets import run_targets
 from app.policies.evaluation.reach.tracker import run_tracker
 from app.policies.evaluation.rows import OnRow, ignore_row
 from app.policies.evaluation.safety.ssm import run_safety
+from app.policies.evaluation.sorting.cycle_time import run_cycle_time
 from app.policies.evaluation.sorting.people import run_sorting_people
 from app.policies.evaluation.sorting.runs import run_grid, run_tests
 from app.sim.mocap.importer import Motion
@@ -44,6 +45,7 @@ PROTOCOLS: Mapping[str, Protocol] = MappingProxyType(
         "sorting-grid": run_grid,
         "sorting-tests": run_tests,
         "sorting-people": run_sorting_people,
+        "sorting-cycle-time": run_cycle_time,
         "reach-targets": run_targets,
         "reach-random": run_random,
         "reach-constant": run_constant,
@@ -73,7 +75,7 @@ MAX_SORTING_EPISODES = 10_000
 FEWER_EPISODES: Mapping[str, int] = MappingProxyType(
     {**dict.fromkeys(OF_SORTING, MAX_SORTING_EPISODES), "reach-targets": 2_000}
     | {"reach-smoothness": 5_000, "reach-ssm": 20_000, "reach-oracle": 200}
-    | {"sorting-people": 2_000}
+    | {"sorting-people": 2_000, "sorting-cycle-time": 2_000}
 )
 """Maximum number of episodes where they count per pair or target, or paths are stored."""
 

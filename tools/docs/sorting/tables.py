@@ -48,10 +48,12 @@ FULL_TASKS: Mapping[str, str] = {
     "grasps": "grasps per task",
     "options_per_grasp": "objects to choose among",
     "cycle_time_s": "cycle time [s]",
+    "parts_per_hour": "parts per hour",
 }
 """Measures of full tasks beside a person and their row headers."""
 COUNTS = frozenset(
-    {"moving_contacts", "contacts_at_rest", "late_motions", "grasps", "cycle_time_s"}
+    {"moving_contacts", "contacts_at_rest", "late_motions", "grasps"}
+    | {"cycle_time_s", "parts_per_hour"}
 )
 """Measures that are means of counts or times, not rates."""
 
@@ -70,7 +72,7 @@ def lines_of(result: Json) -> list[list[str]]:
     rows: list[Json] = result["results"]
     if result.get("bench") == "sorting":
         return decisions(rows)
-    if result["protocol"] == "sorting-people":
+    if result["protocol"] in ("sorting-people", "sorting-cycle-time"):
         return full_tasks(result)
     if result["protocol"] != "sorting-grid":
         head = ["", *TESTS.values()]
@@ -90,12 +92,16 @@ def lines_of(result: Json) -> list[list[str]]:
 
 
 def full_tasks(result: Json) -> list[list[str]]:
-    """Return the table of full tasks: one column per order rule, then paired differences."""
+    """Return the table of full tasks: one column per row, then paired differences."""
     columns: list[Json] = [*result["results"], *result["paired"]]
     head = ["", *(f"`{row['name']}`" for row in columns)]
     return [
         head,
-        *([text, *(shown(row, key) for row in columns)] for key, text in FULL_TASKS.items()),
+        *(
+            [text, *(shown(row, key) for row in columns)]
+            for key, text in FULL_TASKS.items()
+            if any(key in row for row in columns)
+        ),
     ]
 
 

@@ -27,6 +27,7 @@ from app.policies.checkpoints.checkpoint import Checkpoint
 from app.policies.checkpoints.trained_cell import cell_of
 from app.policies.evaluation.pick.episodes import Sight, seen_exactly, settings_for
 from app.policies.evaluation.rows import OnRow, ignore_row
+from app.policies.evaluation.sorting.full_tasks import FullTasks
 from app.policies.evaluation.sorting.order_rules import (
     ORDER_RULES,
     OrderRule,
@@ -34,7 +35,7 @@ from app.policies.evaluation.sorting.order_rules import (
     critic,
 )
 from app.policies.evaluation.sorting.task_states import NOTHING, TaskStates
-from app.policies.evaluation.statistics import mean_of, wilson
+from app.policies.evaluation.statistics import mean_of
 from app.policies.inference.task_selection import HYSTERESIS
 from app.policies.inference.value_networks import ValueNetworks, pick_preset_of
 from app.sim.cells.cell import Cell, load_cell
@@ -43,6 +44,7 @@ from app.sim.core.kernels import rng as random
 from app.sim.people.kernels.motion import draw_script_of
 from app.sim.people.kernels.people import SCRIPTED
 from app.sim.pick.batch import (
+    PickBatch,
     PickSettings,
     hand_speeds,
     observation_workspace_of,
@@ -54,6 +56,7 @@ from app.sim.pick.kernels.observation import observe_batch
 from app.sim.pick.kernels.observation_layout import LAYOUT
 from app.sim.pick.monitored_batch import AMONG_HANDS, MonitoredPickBatch
 from app.sim.robot.kernels.arm import CONTROLLED, new_robot_pose, place_robot
+from app.sim.safety.layer import SafetySettings
 from app.sim.scenario.kernels.episode import COLLISION, RUNNING, SUCCESS, TIMEOUT
 from app.sim.scenario.kernels.monitored_state import PERIODS, STOPPED, TOUCHED_AT_REST
 from app.sim.scenario.monitoring import MonitoringSettings
@@ -81,43 +84,19 @@ PAUSE_S = 1.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class FullTasks:
-    """Results of n full tasks under one order rule; arrays of shape (n,)."""
+class CellCondition:
+    """Safety layer and motion of the robot."""
 
-    finished: Flags
-    """Whether the goal was reached within ``LIMIT_S``."""
-    cycle_s: NDArray[np.float64]
-    """Time to the goal, or ``LIMIT_S`` [s]."""
-    moving: Index
-    """Contacts of the moving robot."""
-    resting: Index
-    """Contacts of the robot at standstill."""
-    stopped: NDArray[np.float64]
-    """Share of the control cycles with override 0."""
-    attempts: Index
-    """Grasps."""
-    late: Index
-    """Motions that reached the time limit."""
-    options: Index
-    """Objects to choose among, summed over the grasps."""
+    safety: SafetySettings = AMONG_HANDS
+    """Assumptions of the safety layer."""
+    active: bool = True
+    """Whether the safety layer acts."""
+    straight: bool = False
+    """Whether each motion is the straight joint move, not that of the policy."""
 
-    def row(self, name: str) -> dict[str, Any]:
-        """Return the result row of these tasks, with 95 % intervals."""
-        n = len(self.finished)
-        free = int(((self.moving == 0) & self.finished).sum())
-        return {
-            "name": name,
-            "n": n,
-            "finished": wilson(int(self.finished.sum()), n),
-            "without_moving_contact": wilson(free, n),
-            "moving_contacts": mean_of(self.moving),
-            "contacts_at_rest": mean_of(self.resting),
-            "stopped": mean_of(self.stopped),
-            "late_motions": mean_of(self.late),
-            "grasps": mean_of(self.attempts),
-            "options_per_grasp": float(self.options.sum() / max(1, self.attempts.sum())),
-            "cycle_time_s": mean_of(self.cycle_s[self.finished]),
-        }
+
+USUAL = CellCondition()
+"""The policy under the safety layer."""
 
 
 def _of(sight: Sight, rows: Index) -> People:
@@ -134,7 +113,7 @@ class SortingBesidePeople:
         settings: Settings of the picks.
         n_tasks: Number of tasks.
         seed: Seed of tasks, grasps and people.
-        active: Whether the safety layer acts.
+        condition: Safety layer and motion.
     """
 
     def __init__(
@@ -144,17 +123,17 @@ class SortingBesidePeople:
         settings: PickSettings,
         n_tasks: int,
         seed: int,
-        *,
-        active: bool = True,
+        condition: CellCondition = USUAL,
     ) -> None:
         self._networks, self._seed = networks, seed
+        self._straight = condition.straight
         self.batch = MonitoredPickBatch(
             reaching_cell(cell),
             n_tasks,
             seed,
             settings,
-            AMONG_HANDS,
-            MonitoringSettings(active=active, rest_ends=False),
+            condition.safety,
+            MonitoringSettings(active=condition.active, rest_ends=False),
         )
         self.tasks = TaskStates(cell, n_tasks, N_OBJECTS, seed)
         grasp = settings.grasp
@@ -187,6 +166,7 @@ class SortingBesidePeople:
             moving=self._moving,
             resting=self._resting,
             stopped=account[:, STOPPED] / account[:, PERIODS],
+            parts=tasks.moves.copy(),
             attempts=tasks.attempts.copy(),
             late=self._late,
             options=tasks.options.copy(),
@@ -231,6 +211,7 @@ class SortingBesidePeople:
         robot, left = (state.q[env], state.qd[env]), state.time_left[env]
         obs = self._observe(robot, _of(sight, owner), point, progress, left)
         act, value, _ = self._networks.evaluate(obs, predict=False)
+        act = obs[:, LAYOUT["base"]] if self._straight else act
         later = np.flatnonzero((tasks.held[env] == NOTHING) & (counts[owner] > 1))
         if rule is critic and later.size:
             ends = np.concatenate([tasks.places[e] for e in rows])[later]
@@ -333,6 +314,27 @@ class SortingBesidePeople:
             people.clock[e, w] = 0.0
 
 
+def parts_of(checkpoint: Checkpoint) -> tuple[ValueNetworks, Cell, PickSettings]:
+    """Return the networks of a pick policy, the sorting cell and the settings of its picks."""
+    cell, preset = load_cell(CELL), pick_preset_of(checkpoint)
+    require_workspace(cell, cell_of(checkpoint.manifest))
+    settings = replace(settings_for((1, 1), preset), time_limit_s=MOTION_LIMIT_S)
+    return ValueNetworks(checkpoint), cell, settings
+
+
+def stated(batch: PickBatch) -> dict[str, Any]:
+    """Return the settings of full tasks that a result states."""
+    return {
+        "cell": CELL,
+        "objects": N_OBJECTS,
+        "limit_s": LIMIT_S,
+        "motion_limit_s": batch.settings.time_limit_s,
+        "margin_attempts": MARGIN,
+        "hysteresis": HYSTERESIS,
+        **hand_speeds(batch),
+    }
+
+
 def run_sorting_people(
     checkpoint: Checkpoint, *, episodes: int | None, seed: int, on_row: OnRow = ignore_row
 ) -> dict[str, Any]:
@@ -344,31 +346,20 @@ def run_sorting_people(
         seed: Seed of tasks, grasps and people.
         on_row: Callback for each finished row.
     """
-    cell, preset = load_cell(CELL), pick_preset_of(checkpoint)
-    require_workspace(cell, cell_of(checkpoint.manifest))
-    settings = replace(settings_for((1, 1), preset), time_limit_s=MOTION_LIMIT_S)
-    networks, n = ValueNetworks(checkpoint), episodes or DEFAULT_TASKS
+    networks, cell, settings = parts_of(checkpoint)
+    n = episodes or DEFAULT_TASKS
     runs: dict[str, FullTasks] = {}
     rows: list[dict[str, Any]] = []
     for suffix in ("", NO_SSM):
-        active = not suffix
-        bench = SortingBesidePeople(networks, cell, settings, n, seed, active=active)
+        condition = CellCondition(active=not suffix)
+        bench = SortingBesidePeople(networks, cell, settings, n, seed, condition)
         for rule, choose in ORDER_RULES.items():
             name = rule + suffix
             runs[name] = bench.run(choose)
             rows.append(runs[name].row(name))
             on_row(len(rows), 2 * len(ORDER_RULES), rows[-1])
     return {
-        "settings": {
-            "cell": CELL,
-            "objects": N_OBJECTS,
-            "limit_s": LIMIT_S,
-            "motion_limit_s": settings.time_limit_s,
-            "margin_attempts": MARGIN,
-            "hysteresis": HYSTERESIS,
-            "safety": AMONG_HANDS.describe(),
-            **hand_speeds(bench.batch),
-        },
+        "settings": {**stated(bench.batch), "safety": AMONG_HANDS.describe()},
         "results": rows,
         "paired": [_paired(runs["critic"], runs[name], name) for name in ("planner", "nearest")]
         + [_paired(runs["critic"], runs["critic" + NO_SSM], "critic" + NO_SSM)],

@@ -7,7 +7,11 @@ from app.policies.checkpoints import pretrained
 from app.policies.evaluation.pick.episodes import settings_for
 from app.policies.evaluation.sorting import order_rules, people
 from app.policies.evaluation.sorting.order_rules import OrderView
-from app.policies.evaluation.sorting.people import SortingBesidePeople, run_sorting_people
+from app.policies.evaluation.sorting.people import (
+    CellCondition,
+    SortingBesidePeople,
+    run_sorting_people,
+)
 from app.policies.evaluation.sorting.task_states import NOTHING, TaskStates
 from app.policies.inference.value_networks import ValueNetworks, pick_preset_of
 from app.sim.cells.cell import load_cell
@@ -71,7 +75,8 @@ def bench(n: int, *, active: bool = True) -> SortingBesidePeople:
     checkpoint = pretrained.load("pick")
     settings = settings_for((1, 1), pick_preset_of(checkpoint))
     networks = ValueNetworks(checkpoint)
-    return SortingBesidePeople(networks, CELL, settings, n, seed=3, active=active)
+    condition = CellCondition(active=active)
+    return SortingBesidePeople(networks, CELL, settings, n, 3, condition)
 
 
 def test_same_rule_repeats_its_run() -> None:

@@ -1,0 +1,124 @@
+"""Protocol ``sorting-cycle-time``: parts per hour of a cell with a working person.
+
+The full tasks of ``sorting-people``: ten objects, each picked and set down in its place.
+
+``policy``
+    Motion and order of the pick policy (order rule ``critic``) under the safety layer.
+``policy-nearest``
+    Motion of the policy; the nearest object first.
+``planner``
+    Straight joint moves to the nearest object, planned without regard to the person, under the
+    safety layer. Nothing but the person stands in their way: blocks are no obstacles.
+``policy-distance``, ``planner-distance``
+    ``policy-nearest`` and ``planner`` with the protective distance of thesis 4.4.6, 0.3 m.
+``alone``
+    No person. ``policy-nearest`` and ``planner`` then move alike: the actor adds nothing to the
+    straight joint move where nobody is near.
+
+All rows have the same tasks and grasps, all rows with a person the same person. The throughput
+counts every part that was set down and the whole time, also of tasks that were not finished.
+
+Source: the outlook of thesis 4.5, robot execution time in shared workspaces. Ours.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from types import MappingProxyType
+from typing import Any
+
+from app.policies.checkpoints.checkpoint import Checkpoint
+from app.policies.evaluation.rows import OnRow, ignore_row
+from app.policies.evaluation.sorting.full_tasks import FullTasks
+from app.policies.evaluation.sorting.order_rules import OrderRule, critic, nearest
+from app.policies.evaluation.sorting.people import (
+    DEFAULT_TASKS,
+    USUAL,
+    CellCondition,
+    SortingBesidePeople,
+    parts_of,
+    stated,
+)
+from app.policies.evaluation.statistics import mean_of
+from app.sim.core.arrays import Vec
+from app.sim.pick.monitored_batch import AMONG_HANDS
+from app.sim.safety.layer import SafetySettings
+
+ALONE = "alone"
+"""Row without a person."""
+STRAIGHT = CellCondition(straight=True)
+DISTANCE = SafetySettings()
+"""Assumptions with the default protective distance."""
+
+
+@dataclass(frozen=True, slots=True)
+class CycleRow:
+    """Conditions of a row."""
+
+    condition: CellCondition
+    """Safety layer and motion."""
+    rule: OrderRule = nearest
+    """Order rule."""
+    alone: bool = False
+    """Whether nobody else is in the cell."""
+
+
+ROWS: Mapping[str, CycleRow] = MappingProxyType(
+    {
+        "policy": CycleRow(USUAL, critic),
+        "policy-nearest": CycleRow(USUAL),
+        "planner": CycleRow(STRAIGHT),
+        "policy-distance": CycleRow(replace(USUAL, safety=DISTANCE)),
+        "planner-distance": CycleRow(replace(STRAIGHT, safety=DISTANCE)),
+        ALONE: CycleRow(STRAIGHT, alone=True),
+    }
+)
+"""Conditions by row."""
+PAIRS = (
+    ("policy", "planner"),
+    ("policy-nearest", "planner"),
+    ("policy-distance", "planner-distance"),
+    ("planner", ALONE),
+)
+"""Rows whose difference on the same tasks is given."""
+
+
+def _per_hour(values: Vec) -> dict[str, Any]:
+    """Return parts per hour, or a difference of them, with its 95 % interval."""
+    return {"parts_per_hour": mean_of(values)}
+
+
+def run_cycle_time(
+    checkpoint: Checkpoint, *, episodes: int | None, seed: int, on_row: OnRow = ignore_row
+) -> dict[str, Any]:
+    """Evaluate the throughput of a sorting cell.
+
+    Args:
+        checkpoint: Pick policy and its critic.
+        episodes: Number of tasks, by default 300.
+        seed: Seed of tasks, grasps and people.
+        on_row: Callback for each finished row.
+    """
+    networks, cell, settings = parts_of(checkpoint)
+    n = episodes or DEFAULT_TASKS
+    runs: dict[str, FullTasks] = {}
+    rows: list[dict[str, Any]] = []
+    shown: dict[str, Any] = {}
+    for name, row in ROWS.items():
+        picks = replace(settings, people=()) if row.alone else settings
+        bench = SortingBesidePeople(networks, cell, picks, n, seed, row.condition)
+        shown = shown or stated(bench.batch)
+        runs[name] = bench.run(row.rule)
+        rows.append(runs[name].row(name) | _per_hour(runs[name].throughput()))
+        on_row(len(rows), len(ROWS), rows[-1])
+    safety = AMONG_HANDS.describe() | {
+        "protective_distance [m]": [one.protective_distance for one in (AMONG_HANDS, DISTANCE)]
+    }
+    return {
+        "settings": {**shown, "safety": safety},
+        "results": rows,
+        "paired": [
+            {"name": f"{first} - {other}", "n": n}
+            | _per_hour(runs[first].throughput() - runs[other].throughput())
+            for first, other in PAIRS
+        ],
+    }

@@ -1,0 +1,68 @@
+"""Results of full sorting tasks, and the throughput that they imply."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.policies.evaluation.statistics import mean_of, wilson
+from app.sim.core.arrays import Vec
+
+Index = NDArray[np.int64]
+Flags = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FullTasks:
+    """Results of n full tasks under one order rule; arrays of shape (n,)."""
+
+    finished: Flags
+    """Whether the goal was reached within ``LIMIT_S``."""
+    cycle_s: NDArray[np.float64]
+    """Time to the goal, or ``LIMIT_S`` [s]."""
+    moving: Index
+    """Contacts of the moving robot."""
+    resting: Index
+    """Contacts of the robot at standstill."""
+    stopped: NDArray[np.float64]
+    """Share of the control cycles with override 0."""
+    parts: Index
+    """Objects set down in their places."""
+    attempts: Index
+    """Grasps."""
+    late: Index
+    """Motions that reached the time limit."""
+    options: Index
+    """Objects to choose among, summed over the grasps."""
+
+    def row(self, name: str) -> dict[str, Any]:
+        """Return the result row of these tasks, with 95 % intervals."""
+        n = len(self.finished)
+        free = int(((self.moving == 0) & self.finished).sum())
+        return {
+            "name": name,
+            "n": n,
+            "finished": wilson(int(self.finished.sum()), n),
+            "without_moving_contact": wilson(free, n),
+            "moving_contacts": mean_of(self.moving),
+            "contacts_at_rest": mean_of(self.resting),
+            "stopped": mean_of(self.stopped),
+            "late_motions": mean_of(self.late),
+            "grasps": mean_of(self.attempts),
+            "options_per_grasp": float(self.options.sum() / max(1, self.attempts.sum())),
+            "cycle_time_s": mean_of(self.cycle_s[self.finished]),
+        }
+
+    def throughput(self) -> Vec:
+        """Return values per task whose mean is the number of parts per hour, shape (n,).
+
+        The estimate is the ratio of all parts to the whole time, tasks that were not finished
+        included. The deviation of each value from the mean is the contribution of its task to
+        the first order (delta method), so that the interval of the mean is that of the ratio,
+        and differences between conditions on the same tasks are paired.
+        """
+        hours = self.cycle_s / 3600.0
+        rate = self.parts.sum() / hours.sum()
+        values: Vec = rate + (self.parts - rate * hours) / hours.mean()
+        return values
