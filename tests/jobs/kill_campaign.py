@@ -59,30 +59,35 @@ class Series:
     asked_to_cancel: set[str] = field(default_factory=set)
     continued: int = 0
     """Workers that were stopped before they asked to end with their server."""
-    server: "subprocess.Popen[str] | None" = None
+    server: "subprocess.Popen[bytes] | None" = None
 
-    def start(self, seed: int) -> "subprocess.Popen[str]":
+    def start(self, seed: int) -> "subprocess.Popen[bytes]":
         command = [sys.executable, "-m", "tests.jobs.campaign_server", self.url]
-        with (self.folder / "server.log").open("a") as log:
+        with (self.folder / "server.log").open("a") as log, self.output.open("w") as output:
             self.server = subprocess.Popen(
                 [*command, str(self.folder), str(seed)],
                 cwd=PROJECT_ROOT,
-                stdout=subprocess.PIPE,
+                stdout=output,
                 stderr=log,
-                text=True,
             )
         return self.server
 
+    @property
+    def output(self) -> Path:
+        """File of what the present server prints."""
+        return self.folder / "server.jsonl"
+
     def wait_until_ready(self) -> None:
         """Wait for the first line of the server, or its end."""
-        assert self.server is not None and self.server.stdout is not None
-        self.server.stdout.readline()
+        assert self.server is not None
+        while self.server.poll() is None and "\n" not in self.output.read_text():
+            time.sleep(0.01)
 
     def collect(self) -> None:
         """Wait for the end of the server and its workers; read what it acknowledged."""
-        assert self.server is not None and self.server.stdout is not None
-        output, _ = self.server.communicate(timeout=WAIT_S)
-        for line in output.splitlines():
+        assert self.server is not None
+        self.server.wait(timeout=WAIT_S)
+        for line in self.output.read_text().splitlines():
             if not line.endswith("}"):
                 continue  # cut off by the kill
             words = json.loads(line)
@@ -156,7 +161,7 @@ def run_series(url: str, folder: Path, n_kills: int, seed: int) -> dict[str, Any
     finally:
         if series.server is not None:
             series.server.kill()
-            series.server.communicate()
+            series.server.wait()
     return {"kills": dict(kills), "continued": series.continued, **check(series)}
 
 
