@@ -3,7 +3,7 @@
 Kills, stops and terminates servers and workers at random moments, also during start, migration,
 post and cancel, and checks after every SERIES kills that nothing acknowledged is lost. The
 folder has the progress: the same command goes on after an interruption. Its file *report.json*
-counts kills, jobs and their ends.
+counts kills, jobs and their ends, *summary.json* is the result for the docs.
 """
 
 import argparse
@@ -22,6 +22,7 @@ from typing import Any
 
 import sqlalchemy as sa
 
+from app.provenance import describe
 from app.store import checkpoints, events, jobs, metrics
 from app.store.engine import Store
 from app.store.records import FINAL_STATES, JobRecord
@@ -245,13 +246,27 @@ def campaign(folder: Path, n_kills: int, minutes: float) -> dict[str, Any]:
     return done
 
 
+def summary(done: dict[str, Any]) -> dict[str, Any]:
+    """Return the counts as a result for ``tools.docs.tables``."""
+    counts = ("posted", "jobs", "succeeded", "failed", "cancelled", "attempts", "continued")
+    kills = done["kills"]
+    row = {"name": "sqlite", "kills": sum(kills.values()), "series": done["series"]}
+    return {
+        "command": "python -m tests.jobs.kill_campaign FOLDER",
+        "settings": {"kills": kills, "seconds": done["seconds"]},
+        "results": [row | {name: done.get(name, 0) for name in counts}],
+        "machine": describe(),
+    }
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("folder", type=Path)
     parser.add_argument("--kills", type=int, default=1000)
     parser.add_argument("--minutes", type=float, default=120.0)
     options = parser.parse_args()
-    campaign(options.folder, options.kills, options.minutes)
+    done = campaign(options.folder, options.kills, options.minutes)
+    (options.folder / "summary.json").write_text(json.dumps(summary(done)))
 
 
 if __name__ == "__main__":
