@@ -18,7 +18,8 @@ import torch
 from app.policies.configs import presets
 from app.policies.configs.fields import read_config
 from app.policies.configs.reach import ReachPreset
-from app.policies.training.reach import CURVE_SEED, batch_of, play
+from app.policies.training.reach import batch_of
+from app.policies.training.td3 import CURVE_SEED, play
 from app.provenance import describe
 from app.sim.cells.cell import load_cell
 from tools.docs.learning_curves import lines, merged

@@ -3,6 +3,8 @@
 dqn                 DQN on Stable-Baselines3, extended at its extension points
 exploration         Exploration in parallel environments: noise with a scale per environment,
                     and options
+parameter_noise     Parameter-space noise: each episode is acted by a perturbed copy of the
+                    actor
 prioritized_replay  Replay buffer with priorities and n-step returns
 quantiles           Truncated quantile critics: distributional critics without the highest
                     quantiles in targets

@@ -6,8 +6,8 @@ the last. In half of the noisy environments a random *option* takes over from ti
 another task; in picks, half of the time, move straight to the target. Options reach states near
 people that the policy alone would not visit, and leave states in which it hesitates.
 
-Deviates: the thesis explores by parameter-space noise (section 5.3.4) and by an
-Ornstein-Uhlenbeck process (table 4.2), which is here too.
+Deviates: the thesis explores by an Ornstein-Uhlenbeck process (table 4.2), which is here too,
+and by parameter-space noise (section 5.3.4; ``parameter_noise.py``).
 """
 
 import math

@@ -23,6 +23,7 @@ from stable_baselines3.td3.policies import Actor, TD3Policy
 from torch import Tensor, nn
 
 from app.policies.algorithms.exploration import Exploration
+from app.policies.algorithms.parameter_noise import ADAPT_EVERY, ParameterNoise
 from app.policies.algorithms.prioritized_replay import Ints, PrioritisedReplay
 from app.policies.algorithms.vecenv import COUNTERS, BatchVecEnv
 from app.policies.configs.td3 import TD3Learning
@@ -151,7 +152,7 @@ class BatchTD3(TD3, Stateful):
             tau=learning.tau,
             gamma=learning.gamma,
             train_freq=1,
-            gradient_steps=1,
+            gradient_steps=learning.gradient_steps,
             policy_delay=learning.policy_delay,
             target_policy_noise=learning.target_noise,
             target_noise_clip=learning.target_noise_clip,
@@ -199,6 +200,10 @@ class BatchTD3(TD3, Stateful):
             self._n_updates += 1
             data = self._draw(batch_size)
             self._update_critics(data)
+            if self._n_updates % ADAPT_EVERY == 0 and isinstance(
+                self.exploration, ParameterNoise
+            ):
+                self.exploration.adapt(data.obs.numpy())
             if self._n_updates % self.policy_delay == 0:
                 if self._n_updates > self.learning.actor_frozen_updates:
                     self._update_actor(data.obs)

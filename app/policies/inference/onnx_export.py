@@ -21,7 +21,7 @@ from app.policies.inference.reach_policy import PEOPLE_SET, ReachPolicy
 from app.policies.inference.value_networks import ValueNetworks, pick_preset_of
 from app.policies.networks.actor_critic import BASE_WEIGHT, ResidualActor
 from app.policies.networks.forward import EPSILON
-from app.policies.networks.pick import actor_of
+from app.policies.networks.pick import NormedActor, actor_of
 from app.sim.envs.pick import PickEnv
 from app.sim.envs.reach import ReachEnv
 from app.sim.reach.batch import N_ACT
@@ -34,6 +34,12 @@ LIMITS = (
     "The networks only: no computation of observations, no joint limits, no safety layer, no "
     "rollout, no check of the training range. Do not move a robot by this model alone."
 )
+RAW_STATE = """
+| q, qd | 2 x 6 | the robot's joint positions and speeds [rad, rad/s] |
+| human_q, human_qd | 2 x 18 | the person's joints and their speeds [m, rad; m/s, rad/s] |
+| goal | 3 | target [m] |
+"""
+"""Groups of the raw state (5.8), as in the data sheet."""
 _ROW = re.compile(r"^\s*\| ([a-z_, .]*?) \| [^|]* \| ([^|]*?) \|$", re.MULTILINE)
 _TENSOR = re.compile(r"(\d+)\.weight")
 
@@ -119,7 +125,9 @@ def export(checkpoint: Checkpoint) -> bytes:
     groups: list[tuple[str, int]] = [(name, n) for name, n in checkpoint.manifest["layout"]]
     obs = graph.add("Concat", *(name for name, _ in groups), axis=1)
     if purpose == CHOOSING:
-        outputs, sheet = _pick(graph, checkpoint, obs), PickEnv.__doc__ or ""
+        raw = pick_preset_of(checkpoint).episode.observation == "state"
+        sheet = RAW_STATE if raw else PickEnv.__doc__ or ""
+        outputs = _pick(graph, checkpoint, obs)
     else:
         outputs, sheet = _reach(graph, checkpoint, obs), ReachEnv.__doc__ or ""
     inputs = [
@@ -141,7 +149,9 @@ def export(checkpoint: Checkpoint) -> bytes:
 
 def _pick(graph: Graph, checkpoint: Checkpoint, obs: str) -> list[onnx.ValueInfoProto]:
     """Add actor and critics of task selection."""
-    preset, n_obs = pick_preset_of(checkpoint), ValueNetworks(checkpoint).n_obs
+    preset = pick_preset_of(checkpoint)
+    ValueNetworks(checkpoint)  # checks the tensors
+    n_obs = sum(size for _, size in checkpoint.manifest["layout"])
     act = _pick_action(graph, actor_of(preset, n_obs), obs)
     both = graph.add("Concat", obs, act, axis=1)
     values = [
@@ -154,7 +164,9 @@ def _pick(graph: Graph, checkpoint: Checkpoint, obs: str) -> list[onnx.ValueInfo
     ]
 
 
-def _pick_action(graph: Graph, actor: ResidualActor, obs: str) -> str:
+def _pick_action(graph: Graph, actor: ResidualActor | NormedActor, obs: str) -> str:
+    if isinstance(actor, NormedActor):
+        return graph.add("Tanh", graph.layers(obs, "actor.net"), output="action")
     columns = graph.columns(obs, actor.base.start, actor.base.stop)
     base = graph.clip(columns, -1.0, 1.0)
     act = graph.residual(graph.layers(obs, "actor.net"), base)

@@ -6,14 +6,12 @@ import numpy as np
 
 from app.policies.checkpoints.checkpoint import Checkpoint
 from app.policies.inference.value_networks import pick_preset_of
+from app.policies.networks.pick import STATE_SIZES
 from app.sim.core.arrays import Vec
 from app.sim.core.out_of_range import OutsideField
 from app.sim.human import model as human
 from app.sim.human.person import Person
 from app.sim.robot import ur10 as robot
-
-STATE_SIZES = (("q", 6), ("qd", 6), ("human_q", 18), ("human_qd", 18))
-"""Variables of a state in a training range."""
 
 
 class TrainedRanges:
@@ -32,7 +30,7 @@ class TrainedRanges:
                 np.concatenate([self._bound(name, n, low) for name, n in sizes])
                 for low in (True, False)
             )
-            for sizes in (STATE_SIZES, (("goal", 3),))
+            for sizes in (STATE_SIZES[:-1], STATE_SIZES[-1:])
         )
 
     def _bound(self, key: str, n: int, low: bool) -> Vec:

@@ -16,15 +16,17 @@ from app.policies.checkpoints.checkpoint import (
     require_purpose,
 )
 from app.policies.checkpoints.model_state import under
+from app.policies.checkpoints.trained_cell import cell_of
 from app.policies.configs.fields import read_config
 from app.policies.configs.pick import PickPreset
+from app.policies.networks.actor_critic import ResidualActor
 from app.policies.networks.candidate_values import (
     ActorCritic,
     add_base,
     evaluate_few,
     new_workspace,
 )
-from app.policies.networks.forward import FEW, Floats, forward_many, layers_of
+from app.policies.networks.forward import FEW, Floats, Layers, forward_many, layers_of
 from app.policies.networks.outcome import (
     CLIP,
     OutcomeHead,
@@ -33,8 +35,12 @@ from app.policies.networks.outcome import (
     new_prediction,
 )
 from app.policies.networks.pick import LAYOUTS, actor_of, critics_for
+from app.sim.core.arrays import Vec
 from app.sim.core.jit import direct
+from app.sim.pick.kernels.observation_layout import N_FEATURES
+from app.sim.pick.raw_state import raw_state
 from app.sim.robot.kernels.arm import CONTROLLED
+from app.sim.scene.scene import arm_of
 
 
 def pick_preset_of(checkpoint: Checkpoint) -> PickPreset:
@@ -45,6 +51,17 @@ def pick_preset_of(checkpoint: Checkpoint) -> PickPreset:
     """
     require_purpose(checkpoint, CHOOSING)
     return read_config(PickPreset, checkpoint.manifest["preset"], "manifest.preset")
+
+
+def _joint_speeds(checkpoint: Checkpoint) -> Vec:
+    """Return the largest joint speeds in the cell of the training [rad/s], shape (6,)."""
+    return arm_of(cell_of(checkpoint.manifest)).limits.qd_max
+
+
+def _skipping(layers: Layers, first: int, n: int) -> Layers:
+    """Return layers that ignore ``n`` more inputs from number ``first`` on."""
+    weight = np.insert(layers[0].weight, [first] * n, 0.0, axis=0)
+    return (layers[0]._replace(weight=weight), *layers[1:])
 
 
 class ValueNetworks:
@@ -60,10 +77,13 @@ class ValueNetworks:
     def __init__(self, checkpoint: Checkpoint) -> None:
         preset = pick_preset_of(checkpoint)
         expect_layout(checkpoint, LAYOUTS[preset.episode.observation], CONTROLLED)
-        self.n_obs = sum(size for _, size in checkpoint.manifest["layout"])
-        """Length of the observations."""
-        actor, critics = actor_of(preset, self.n_obs), critics_for(preset, self.n_obs)
-        outcome, arrays = OutcomeHead(self.n_obs), checkpoint.arrays()
+        n = sum(size for _, size in checkpoint.manifest["layout"])
+        actor, critics = actor_of(preset, n), critics_for(preset, n)
+        self._qd_max = None if isinstance(actor, ResidualActor) else _joint_speeds(checkpoint)
+        self.n_obs = n if self._qd_max is None else N_FEATURES
+        """Length of the observations; policies of the raw state read it from features."""
+        self._n = n if self._qd_max is None else n + CONTROLLED
+        outcome, arrays = OutcomeHead(self._n), checkpoint.arrays()
         self.predicts = "outcome.mean" in arrays
         """Whether the checkpoint predicts outcomes."""
         parts: dict[str, torch.nn.Module] = {"actor": actor, "critic": critics}
@@ -74,18 +94,23 @@ class ValueNetworks:
                 module.load_state_dict(under(arrays, name))
             except RuntimeError as error:
                 raise CheckpointMismatch("tensors", f"those of {name}", str(error)) from error
-        fade = () if actor.fade is None else actor.fade
+        base, fade = n, None
+        if isinstance(actor, ResidualActor):
+            base, fade = actor.base.start, actor.fade
+        still = self._n - n  # a plain actor corrects a base motion of 0 behind its inputs
         self._networks = ActorCritic(
-            actor=layers_of(actor.net),
-            critics=tuple(layers_of(critic.children()) for critic in critics.children()),
+            actor=_skipping(layers_of(actor.net), n, still),
+            critics=tuple(
+                _skipping(layers_of(one.children()), n, still) for one in critics.children()
+            ),
             members=tuple(layers_of(member.children()) for member in outcome.members),
-            base=actor.base.start,
-            fade=np.array(fade, dtype=np.float32),
+            base=base,
+            fade=np.array(fade or (), dtype=np.float32),
             mean=outcome.mean.numpy(),
             scale=outcome.scale.numpy(),
             widen=float(outcome.widen),
         )
-        self._work = new_workspace(self._networks, self.n_obs, CONTROLLED)  # kept by the GIL
+        self._work = new_workspace(self._networks, self._n, CONTROLLED)  # kept by the GIL
         self._few: Callable[..., None] | None = None
 
     def evaluate(
@@ -101,6 +126,9 @@ class ValueNetworks:
             Actions, shape (n, 5), values, shape (n,), and predicted outcomes; None where they
             are not asked for or the checkpoint does not predict them.
         """
+        if self._qd_max is not None:
+            state = raw_state(obs, self._qd_max)
+            obs = np.hstack([state, np.zeros((len(obs), CONTROLLED), dtype=np.float32)])
         act = np.empty((len(obs), CONTROLLED), dtype=np.float32)
         values, outcomes = np.empty(len(obs), dtype=np.float32), new_prediction(len(obs))
         predict = predict and self.predicts
@@ -117,7 +145,7 @@ class ValueNetworks:
 
     def _act_and_value(self, obs: Floats, act: Floats, values: Floats) -> Floats:
         """Fill actions and values of many observations; return inputs for ``_predict``."""
-        nets, n = self._networks, self.n_obs
+        nets, n = self._networks, self._n
         rows = np.empty((len(obs), n + CONTROLLED), dtype=np.float32)
         varying = np.ones(n + CONTROLLED, dtype=np.bool_)
         varying[:n] = (obs != obs[:1]).any(axis=0)

@@ -1,7 +1,16 @@
 """Networks of the pick scenario, and the layout of their observations."""
 
+import torch
+from torch import nn
+
 from app.policies.configs.pick import PickPreset
-from app.policies.networks.actor_critic import Critics, Fade, MeanCritics, ResidualActor
+from app.policies.networks.actor_critic import (
+    Critics,
+    Fade,
+    MeanCritics,
+    ResidualActor,
+    hidden,
+)
 from app.sim.pick.kernels.observation_layout import (
     BODY_SIZES,
     DISTANCE_SCALE,
@@ -10,13 +19,17 @@ from app.sim.pick.kernels.observation_layout import (
     PICK_SIZES,
     SIZES,
 )
+from app.sim.robot.kernels.arm import CONTROLLED
 
 RESIDUAL_FULL_M, RESIDUAL_ZERO_M = 0.4, 0.5
 """Distances to people below which the residual counts fully, and beyond which the base motion
 acts alone [m]."""
 CLEARANCE = LAYOUT["distance_tilt_clearance_time"].start + 2
 """Index of the distance to the nearest person in an observation."""
+STATE_SIZES = (("q", 6), ("qd", 6), ("human_q", 18), ("human_qd", 18), ("goal", 3))
+"""Names and sizes of the groups of the raw state (5.8)."""
 LAYOUTS = {
+    "state": [[name, size] for name, size in STATE_SIZES],
     "features": [[name, size] for name, size in SIZES],
     "body": [[name, size] for name, size in BODY_SIZES],
     "phase": [[name, size] for name, size in PHASE_SIZES],
@@ -25,9 +38,41 @@ LAYOUTS = {
 """Names and sizes of the groups of each kind of observation, as manifests carry them."""
 
 
-def actor_of(preset: PickPreset, n_obs: int) -> ResidualActor:
+class NormedActor(nn.Module):
+    """Map observations to actions in [-1, 1]; hidden layers are normalised.
+
+    Perturbations of its weights have similar effects in all layers (Plappert et al. 2018).
+
+    Args:
+        width: Units per hidden layer.
+        n_obs: Length of observations.
+        layers: Number of hidden layers.
+    """
+
+    def __init__(self, width: int, n_obs: int, layers: int) -> None:
+        super().__init__()
+        before = hidden(n_obs, width, layers, normed=True)
+        self.net = nn.Sequential(*before, nn.Linear(width, CONTROLLED))
+        initialise_glorot(self)
+
+    def forward(self, obs: torch.Tensor) -> torch.Tensor:
+        """Return actions, shape (n, 5), for observations, shape (n, n_obs)."""
+        return torch.tanh(self.net(obs))
+
+
+def initialise_glorot(module: nn.Module) -> None:
+    """Set Glorot-uniform weights and zero biases, as Stable-Baselines 2 does for TD3."""
+    for layer in module.modules():
+        if isinstance(layer, nn.Linear):
+            nn.init.xavier_uniform_(layer.weight)
+            nn.init.zeros_(layer.bias)
+
+
+def actor_of(preset: PickPreset, n_obs: int) -> ResidualActor | NormedActor:
     """Return a new actor for observations of a length."""
     sizes, fade = preset.networks, None
+    if sizes.actor == "plain":
+        return NormedActor(sizes.width, n_obs, sizes.layers)
     if preset.episode.task == "pick":
         fade = Fade(
             CLEARANCE, RESIDUAL_FULL_M / DISTANCE_SCALE, RESIDUAL_ZERO_M / DISTANCE_SCALE
@@ -40,6 +85,9 @@ def critics_for(preset: PickPreset, n_obs: int) -> Critics:
     sizes = preset.networks
     kind = MeanCritics if sizes.target_value == "mean" else Critics
     normed = sizes.critic_norm == "layer"
-    return kind(
+    critics = kind(
         sizes.width, n_obs, n_critics=sizes.n_critics, layers=sizes.layers, normed=normed
     )
+    if sizes.actor == "plain":
+        initialise_glorot(critics)
+    return critics

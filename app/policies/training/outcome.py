@@ -10,9 +10,10 @@ from typing import NamedTuple
 import numpy as np
 import torch
 from numpy.typing import NDArray
+from torch import nn
 from torch.nn import functional
 
-from app.policies.networks.actor_critic import Critics, ResidualActor
+from app.policies.networks.actor_critic import Critics
 from app.policies.networks.outcome import MEMBERS, OUTCOMES, OutcomeHead
 from app.sim.pick.batch import PickBatch
 from app.sim.scenario.kernels.episode import COLLISION, SUCCESS, TIMEOUT, UNFEASIBLE
@@ -44,7 +45,7 @@ class OutcomeData(NamedTuple):
 
 
 def collect(
-    batch: PickBatch, actor: ResidualActor, critic: Critics, n_steps: int, seed: int
+    batch: PickBatch, actor: nn.Module, critic: Critics, n_steps: int, seed: int
 ) -> OutcomeData:
     """Return labelled observations of episodes under a greedy policy.
 

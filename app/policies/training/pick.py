@@ -6,7 +6,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from app.policies.algorithms.exploration import OptionExploration, PerEnvAR1Noise
+from app.policies.algorithms.exploration import (
+    Exploration,
+    OptionExploration,
+    PerEnvAR1Noise,
+)
+from app.policies.algorithms.parameter_noise import ParameterNoise
 from app.policies.algorithms.td3 import Networks
 from app.policies.checkpoints.checkpoint import Checkpoint
 from app.policies.checkpoints.model_state import under
@@ -16,13 +21,21 @@ from app.policies.networks.pick import LAYOUTS, actor_of, critics_for
 from app.policies.training.outcome import collect, fit
 from app.policies.training.reporter import Callbacks, Reporter
 from app.policies.training.run import TrainingRun
-from app.policies.training.td3 import TD3Scenario, TrainingMonitor, start_td3
+from app.policies.training.td3 import (
+    CURVE_SEED,
+    TD3Scenario,
+    TrainingMonitor,
+    outcome_rates,
+    play,
+    start_td3,
+)
 from app.sim.cells.cell import Cell
 from app.sim.core.arrays import Vec
 from app.sim.envs.tasks import ArmTask
 from app.sim.people.human_motion_config import HumanMotionConfig
 from app.sim.people.kernels.people import ABSENT
 from app.sim.pick.batch import OUTCOMES, PickBatch, PickSettings
+from app.sim.pick.curriculum_batch import CurriculumPickBatch, StartRange
 from app.sim.pick.kernels.reward import RewardWeights
 from app.sim.pick.monitored_batch import MonitoredPickBatch
 from app.sim.robot.kernels.arm import CONTROLLED
@@ -34,6 +47,8 @@ OUTCOME_SEED = 7_000_003
 """Added to the seed of a training for the episodes that outcomes are fitted to."""
 OUTCOME_SHARE = 0.15
 """Steps of these episodes, relative to the training."""
+FIRST_MODE = 0.05
+"""First mode and lower limit of the starts of the curriculum: "close to 0" (thesis 5.3.4)."""
 MIN_EPISODES = 100
 """Fewest ended episodes that outcomes are fitted to."""
 
@@ -98,19 +113,27 @@ def batch_of(preset: PickPreset, cell: Cell, n_envs: int, seed: int) -> PickBatc
         return MonitoredPickBatch(
             cell, n_envs, seed, settings, safety_settings(cell), monitoring
         )
-    return PickBatch(cell, n_envs, seed, settings)
+    kind = CurriculumPickBatch if preset.episode.curriculum_steps else PickBatch
+    return kind(cell, n_envs, seed, settings)
+
+
+def exploration_of(preset: PickPreset, batch: PickBatch, seed: int) -> Exploration:
+    """Return the exploration of a preset."""
+    rng, config = np.random.default_rng(seed), preset.exploration
+    if config.noise == "parameters":
+        return ParameterNoise(batch, config.parameter_sigma, rng)
+    noise = PerEnvAR1Noise((batch.n_envs, CONTROLLED), batch.arm.dt, config, rng)
+    return OptionExploration(noise, batch, batch.world.station_q, config.option_rate, rng)
 
 
 def start(preset: PickPreset, seed: int, cell: Cell) -> tuple[TrainingRun, TrainingMonitor]:
     """Return a training; see :func:`~app.policies.training.td3.start_td3`."""
     batch = batch_of(preset, cell, preset.learning.n_envs, seed)
-    batch.set_collision_cost(collision_cost(preset, 0))
-    rng, config = np.random.default_rng(seed), preset.exploration
-    noise = PerEnvAR1Noise((batch.n_envs, CONTROLLED), batch.arm.dt, config, rng)
-    stations = batch.world.station_q
+    follow_schedules(preset, batch, 0)
+    exploration = exploration_of(preset, batch, seed)
     scenario = TD3Scenario(
-        task=ArmTask(batch, sees_time=True),
-        exploration=OptionExploration(noise, batch, stations, config.option_rate, rng),
+        task=ArmTask(batch, sees_time=preset.episode.sees_time),
+        exploration=exploration,
         networks=Networks(
             actor=lambda: actor_of(preset, batch.obs_size),
             critic=lambda: critics_for(preset, batch.obs_size),
@@ -120,7 +143,10 @@ def start(preset: PickPreset, seed: int, cell: Cell) -> tuple[TrainingRun, Train
         act_size=CONTROLLED,
         visited_states=lambda: visited_states(batch),
     )
-    return start_td3(preset, seed, cell, scenario)
+    run, monitor = start_td3(preset, seed, cell, scenario)
+    if isinstance(exploration, ParameterNoise):
+        exploration.follow(monitor.actor)
+    return run, monitor
 
 
 def fit_outcomes(
@@ -164,8 +190,30 @@ def collision_cost(preset: PickPreset, step: int) -> float:
     return preset.reward.c_c + share * (preset.reward.c_c_end - preset.reward.c_c)
 
 
+def start_range(preset: PickPreset, step: int) -> StartRange:
+    """Return the lower limit and the mode of the curriculum at an environment step.
+
+    The mode moves from ``FIRST_MODE`` to 1 in ``curriculum_steps``, then the lower limit.
+    """
+    done = step / preset.episode.curriculum_steps
+    low, mode = (
+        FIRST_MODE + (1.0 - FIRST_MODE) * float(np.clip(x, 0.0, 1.0))
+        for x in (done - 1.0, done)
+    )
+    return StartRange(low, mode)
+
+
+def follow_schedules(preset: PickPreset, batch: PickBatch, step: int) -> None:
+    """Set the collision cost and the starts of an environment step."""
+    batch.set_collision_cost(collision_cost(preset, step))
+    if isinstance(batch, CurriculumPickBatch):
+        batch.starts = start_range(preset, step)
+
+
 class PickReporter(Reporter):
-    """Learning curve of the greedy environments; raises the collision cost.
+    """Learning curve of the greedy environments, or of greedy episodes for each point.
+
+    It also sets the collision cost and the starts of the present step.
 
     Args:
         run: The attempt.
@@ -184,12 +232,14 @@ class PickReporter(Reporter):
         self._monitor, self._preset, self._batch = monitor, run.preset, monitor.env.batch
         self._returns = np.zeros(run.preset.learning.n_envs)
         self._counts = np.zeros(len(OUTCOMES), dtype=np.int64)
-        self._total_return = 0.0
+        self._total_return, self._run = 0.0, run
+        n, usual = run.preset.learning.progress_episodes, settings_of(run.preset)
+        self._test_batch = PickBatch(run.cell, n, CURVE_SEED, usual) if n else None
 
     def load_state_dict(self, state: Mapping[str, Any]) -> None:
-        """Restore a state and the collision cost of its step."""
+        """Restore a state, and the collision cost and the starts of its step."""
         super().load_state_dict(state)
-        self._batch.set_collision_cost(collision_cost(self._preset, self._attempt.step))
+        follow_schedules(self._preset, self._batch, self._attempt.step)
 
     def watch(self, rewards: NDArray[np.floating]) -> None:
         """Count the episodes that ended, and update the training range."""
@@ -200,13 +250,16 @@ class PickReporter(Reporter):
         self._total_return += float(self._returns[:n][finished].sum())
         self._returns[ended > 0] = 0.0
         self._monitor.update_ranges(self.num_timesteps)
-        self._batch.set_collision_cost(collision_cost(self._preset, self.num_timesteps))
+        follow_schedules(self._preset, self._batch, self.num_timesteps)
 
     def rates(self) -> dict[str, Any]:
         """Return rates of the episodes since the last point.
 
         An episode that ends *unfeasible* counts in ``episodes`` and has no rate of its own.
         """
+        if self._test_batch is not None:
+            with self._run.untimed():
+                return outcome_rates(*play(self._monitor.actor, self._test_batch))
         episodes = int(self._counts.sum())
         shares = {
             name: int(self._counts[OUTCOMES.index(name)]) / episodes if episodes else None

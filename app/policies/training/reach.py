@@ -4,11 +4,9 @@ Each point of the curve is measured in greedy episodes of the preset's own start
 at every point. Their CPU time is not counted as training.
 """
 
-import time
 from typing import Any
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
 
 from app.policies.algorithms.exploration import Exploration, OUNoise, PerEnvAR1Noise
@@ -20,12 +18,18 @@ from app.policies.networks.actor_critic import Critics, PlainActor, ResidualActo
 from app.policies.networks.ddpg import DDPGActor, DDPGCritics, RunningNormalisation
 from app.policies.training.reporter import Callbacks, Reporter
 from app.policies.training.run import TrainingRun
-from app.policies.training.td3 import TD3Scenario, TrainingMonitor, start_td3
+from app.policies.training.td3 import (
+    CURVE_SEED,
+    TD3Scenario,
+    TrainingMonitor,
+    outcome_rates,
+    play,
+    start_td3,
+)
 from app.sim.cells.cell import Cell
 from app.sim.core.arrays import Vec
 from app.sim.envs.tasks import ArmTask
 from app.sim.people.kernels.pedestrian import VX, VY, R, X, Y
-from app.sim.pick.batch import OUTCOMES
 from app.sim.reach.batch import N_ACT, ReachSettings
 from app.sim.reach.blocked_batch import new_reach_batch
 from app.sim.reach.kernels.observation import BASE_START
@@ -34,9 +38,6 @@ from app.sim.reach.mixed_batch import MixedReachBatch, ReachEnvironments
 from app.sim.reach.monitored.batch import MonitoredReachBatch
 from app.sim.safety.layer import safety_settings
 from app.sim.scene.scene import HumanKind
-
-CURVE_SEED = 1_000_003
-"""Seed of the episodes behind a point of the curve; no evaluation uses it."""
 
 
 def settings_of(preset: ReachPreset) -> ReachSettings:
@@ -156,15 +157,8 @@ class ReachReporter(Reporter):
 
     def rates(self) -> dict[str, Any]:
         """Return rates of greedy episodes of the present actor."""
-        began = time.process_time()
-        ended, returns = play(self._monitor.actor, self._test_batch)
-        self._run.leave_out(time.process_time() - began)
-        shares = {name: float((ended == k).mean()) for k, name in enumerate(OUTCOMES)}
-        return {
-            "episodes": len(ended),
-            **{name: shares[name] for name in ("success", "collision", "timeout")},
-            "reward": float(returns.mean()),
-        }
+        with self._run.untimed():
+            return outcome_rates(*play(self._monitor.actor, self._test_batch))
 
 
 def visited_states(batch: ReachEnvironments) -> dict[str, Vec]:
@@ -181,23 +175,3 @@ def visited_states(batch: ReachEnvironments) -> dict[str, Vec]:
     if sum(len(rows) for rows in walkers):
         visited["human"] = np.concatenate(walkers)
     return visited
-
-
-def play(
-    actor: torch.nn.Module, batch: ReachEnvironments
-) -> tuple[NDArray[np.int64], NDArray[np.floating]]:
-    """Play one greedy episode in every row of a batch.
-
-    Returns:
-        Outcomes and undiscounted returns, each (n_envs,).
-    """
-    obs = batch.reset().copy()
-    ended, returns = np.zeros(batch.n_envs, dtype=np.int64), np.zeros(batch.n_envs)
-    act = np.zeros((batch.n_envs, N_ACT), dtype=np.float32)
-    while (live := np.flatnonzero(ended == 0)).size:
-        with torch.inference_mode():
-            act[live] = actor(torch.as_tensor(obs[live])).numpy()
-        result = batch.step(act, auto_reset=False)
-        obs, returns = result.obs.copy(), returns + result.rew
-        ended = np.where(result.ended > 0, result.ended, ended)
-    return ended, returns

@@ -2,7 +2,8 @@
 
 import logging
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -127,9 +128,12 @@ class TrainingRun:
         """Add a network to the policy's checkpoints."""
         self._parts.policy[name] = network
 
-    def leave_out(self, cpu_s: float) -> None:
-        """Do not count CPU time that went into measuring, not into training [s]."""
-        self._untimed += cpu_s
+    @contextmanager
+    def untimed(self) -> Iterator[None]:
+        """Do not count CPU time that goes into measuring, not into training."""
+        began = time.process_time()
+        yield
+        self._untimed += time.process_time() - began
 
     def keep_states(self, files: MemoryFiles) -> None:
         """Keep states to resume from; transitions go to files."""

@@ -44,8 +44,13 @@ def _bfloat16_products() -> Iterator[None]:
 
 
 def _keeps_precision(preset: Preset) -> bool:
-    """Return whether products are not rounded: ten layers lose small differences otherwise."""
-    return isinstance(preset, ReachPreset) and preset.networks.actor == "ddpg"
+    """Return whether products are not rounded.
+
+    Ten layers lose small differences otherwise, and raw states have no common unit.
+    """
+    if isinstance(preset, ReachPreset):
+        return preset.networks.actor == "ddpg"
+    return isinstance(preset, PickPreset) and preset.networks.actor == "plain"
 
 
 def train(
@@ -88,7 +93,8 @@ def train(
         run.restore(resume)
     with nullcontext() if _keeps_precision(preset) else _bfloat16_products():
         stopped = run.learn(reporter, reporter.report)
-    if not stopped and isinstance(preset, PickPreset):
+    features = isinstance(preset, PickPreset) and preset.episode.observation != "state"
+    if not stopped and isinstance(preset, PickPreset) and features:
         pick_training.add_outcomes(run, preset, seed, place, run.policy())
         run.save(on_checkpoint)
     elif run.step % preset.learning.checkpoint_steps:

@@ -6,8 +6,12 @@ candidate_observer
 case_verdict  Whether what happened in a case study is what it is for: expected, observed,
               verdict
 cases         The four case studies of task selection (docs/method.md 3.6, thesis table 5.3)
+curriculum_batch
+              Pick environments whose robots start part of the path to the target
+              (docs/method.md 3.5)
 monitored_batch
               The pick scenario under speed and separation monitoring
+raw_state     The raw state of (5.8) from the features that contain it
 task_policy   Interface of a policy that selects a task, and its decision
 kernels/      Compiled pick episodes
 """

@@ -54,6 +54,9 @@ def test_an_unknown_preset_names_the_known_ones():
         ({"action": {"bounds": "none"}}, "overrides.action.bounds"),
         ({"action": {"meaning": 1}}, "overrides.action.meaning"),
         ({"action": {"degree": 3, "bounds": "one-step"}}, "overrides.action.bounds"),
+        ({"networks": {"actor": "plain"}}, "overrides.networks.actor"),
+        ({"exploration": {"noise": "parameters"}}, "overrides.exploration.noise"),
+        ({"episode": {"curriculum_steps": 1000}}, "overrides.episode.curriculum_steps"),
         (
             {"learning": {"total_steps": 12_800, "progress_steps": 12_800}},
             "overrides.learning.learning_starts",

@@ -4,15 +4,20 @@ import numpy as np
 import onnx
 import onnxruntime
 import pytest
+import torch
 
 from app.errors import InvalidInput
+from app.policies.algorithms.td3 import critics_of
 from app.policies.checkpoints import pretrained
 from app.policies.checkpoints.checkpoint import Checkpoint, pack
 from app.policies.checkpoints.model_state import weights_of
+from app.policies.configs.pick import THESIS
 from app.policies.inference.onnx_export import LIMITS, export
 from app.policies.inference.reach_policy import LAYOUTS, PEOPLE_SET, ReachPolicy
 from app.policies.inference.value_networks import ValueNetworks
 from app.policies.networks.actor_critic import ResidualActor
+from app.policies.training.pick import start
+from app.sim.cells.cell import load_cell
 from app.sim.core.arrays import Vec
 from app.sim.reach.batch import N_ACT
 from app.sim.reach.kernels.observation import BASE_START
@@ -58,6 +63,21 @@ def test_exported_pick_policy_acts_and_values_as_the_checkpoint() -> None:
     expected = ValueNetworks(checkpoint).evaluate(obs)
     np.testing.assert_allclose(act, expected[0], atol=TOLERANCE)
     np.testing.assert_allclose(value[:, 0], expected[1], atol=TOLERANCE)
+
+
+def test_exported_policy_of_the_raw_state_acts_as_its_actor() -> None:
+    run, _ = start(THESIS, 4, load_cell(THESIS.cell))
+    checkpoint = run.policy()
+    obs = observations(checkpoint)
+    with torch.inference_mode():
+        rows = torch.as_tensor(obs)
+        expected = run.model.actor(rows)
+        least = critics_of(run.model.critic).least(rows, expected)
+    act, value = played(checkpoint, obs)
+    np.testing.assert_allclose(act, expected.numpy(), atol=TOLERANCE)
+    np.testing.assert_allclose(value[:, 0], least.numpy(), atol=TOLERANCE)
+    model = onnx.load_from_string(export(checkpoint))
+    assert all(one.doc_string for one in model.graph.input)
 
 
 def test_exported_reach_policy_acts_as_the_checkpoint() -> None:

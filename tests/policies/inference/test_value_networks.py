@@ -6,12 +6,14 @@ import torch
 
 from app.policies.checkpoints import pretrained
 from app.policies.checkpoints.model_state import under
+from app.policies.configs.pick import THESIS
 from app.policies.inference.value_networks import ValueNetworks, pick_preset_of
 from app.policies.networks.forward import FEW
 from app.policies.networks.outcome import OutcomeHead
 from app.policies.networks.pick import actor_of, critics_for
+from app.policies.training.pick import settings_of, start
 from app.sim.cells.cell import load_cell
-from app.sim.pick.batch import WHOLE_PICK, PickBatch
+from app.sim.pick.batch import WHOLE_PICK, PickBatch, PickSettings
 
 
 @pytest.mark.parametrize("n", [1, 3, FEW, FEW + 1, 200])
@@ -37,3 +39,22 @@ def test_the_shipped_policy_decides_as_its_modules_of_torch_do(n: int) -> None:
         head = parts["outcome"].predict(rows, torch.as_tensor(values))
     for one, other in zip(found, head, strict=True):
         np.testing.assert_allclose(one, other, atol=1e-4)
+
+
+@pytest.mark.parametrize("n", [2, FEW + 1])
+def test_a_policy_of_the_raw_state_decides_on_features(n: int) -> None:
+    cell = load_cell(THESIS.cell)
+    run, _ = start(THESIS, 4, cell)
+    checkpoint = run.policy()
+    actor, critics = run.model.actor.mu, critics_for(THESIS, 51)
+    critics.load_state_dict(under(checkpoint.arrays(), "critic"))
+    raw = PickBatch(cell, n, 5, settings_of(THESIS)).reset()
+    obs = PickBatch(cell, n, 5, PickSettings(observation="features")).reset()
+    act, values, found = ValueNetworks(checkpoint).evaluate(obs)
+    assert found is None
+    with torch.inference_mode():
+        rows = torch.as_tensor(raw)
+        expected = actor(rows)
+        least = critics.least(rows, expected)
+    np.testing.assert_allclose(act, expected.numpy(), atol=1e-5)
+    np.testing.assert_allclose(values, least.numpy(), atol=1e-4)

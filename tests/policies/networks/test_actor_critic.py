@@ -1,10 +1,14 @@
-"""Value functions and the values of targets."""
+"""Value functions, the values of targets, and the networks of the recipe of chapter 5."""
 
+import math
+
+import pytest
 import torch
+from torch import nn
 
-from app.policies.configs.pick import REACH_ONLY, PickPreset
+from app.policies.configs.pick import REACH_ONLY, THESIS, PickPreset
 from app.policies.networks.actor_critic import Critics, MeanCritics
-from app.policies.networks.pick import critics_for
+from app.policies.networks.pick import NormedActor, actor_of, critics_for
 
 
 def test_targets_are_the_least_or_the_mean_of_the_values():
@@ -18,3 +22,21 @@ def test_targets_are_the_least_or_the_mean_of_the_values():
 def test_the_preset_says_which():
     assert type(critics_for(PickPreset(), 12)) is MeanCritics
     assert type(critics_for(REACH_ONLY, 12)) is Critics
+
+
+def test_networks_of_the_recipe_are_glorot_uniform_and_normalised():
+    torch.manual_seed(0)
+    actor, critics = actor_of(THESIS, 51), critics_for(THESIS, 51)
+    assert type(actor) is NormedActor and type(critics) is Critics
+    for net, n_in, n_out in ((actor.net, 51, 5), (critics.q1, 56, 1), (critics.q2, 56, 1)):
+        kinds = [type(layer) for layer in net]
+        hidden = [nn.Linear, nn.LayerNorm, nn.ReLU]
+        assert kinds == [*hidden, *hidden, nn.Linear]
+        layers = [net[0], net[3], net[6]]
+        sizes = [(one.in_features, one.out_features) for one in layers]
+        assert sizes == [(n_in, 64), (64, 64), (64, n_out)]
+        for one in layers:
+            bound = math.sqrt(6.0 / (one.in_features + one.out_features))
+            assert one.weight.abs().max() <= bound
+            assert one.weight.std().item() == pytest.approx(bound / math.sqrt(3.0), rel=0.2)
+            assert not one.bias.any()

@@ -1,14 +1,17 @@
-"""Training on the pick scenario: the collision cost that grows, the layer."""
+"""Training on the pick scenario: collision cost, curriculum, layer, recipe of the thesis."""
 
 import numpy as np
 import pytest
 
-from app.policies.configs.pick import MONITORED, REACH_ONLY, PickPreset
-from app.policies.training.pick import batch_of, collision_cost, settings_of
+from app.policies.configs.pick import MONITORED, REACH_ONLY, THESIS, PickPreset
+from app.policies.inference.value_networks import ValueNetworks
+from app.policies.training.pick import batch_of, collision_cost, settings_of, start, start_range
 from app.sim.cells.cell import load_cell
-from app.sim.pick.batch import PickBatch
+from app.sim.pick.batch import DEFAULT_WEIGHTS, PickBatch
+from app.sim.pick.curriculum_batch import CurriculumPickBatch
 from app.sim.pick.monitored_batch import MonitoredPickBatch
-from app.sim.scenario.kernels.episode import COLLISION
+from app.sim.scenario.kernels.episode import COLLISION, TIMEOUT
+from tests.policies.conftest import Recorder, preset_of
 
 CELL = load_cell("pick-and-place")
 
@@ -47,3 +50,64 @@ def test_monitored_preset_steps_under_the_layer_with_the_settings_of_the_cell():
     ended = batch.episode > 0
     assert (runs.override[ended] <= 1.0 + 1e-9).all()
     assert not isinstance(batch_of(PickPreset(), CELL, 2, 3), MonitoredPickBatch)
+
+
+def test_the_recipe_is_tables_5_1_and_5_2():
+    learning, settings = THESIS.learning, settings_of(THESIS)
+    assert (learning.total_steps, learning.buffer_size) == (4_000_000, 500_000)
+    assert (learning.batch_size, learning.policy_delay) == (64, 3)
+    assert (learning.lr_start, learning.lr_end, learning.actor_lr_ratio) == (1e-4, 1e-4, 1.0)
+    assert (learning.gamma, learning.tau, learning.n_steps) == (0.99, 0.001, 1)
+    assert learning.gradient_steps == learning.n_envs  # one update per environment step
+    assert learning.alpha == 0.0  # table 5.2 has no priorities
+    assert (learning.progress_steps, learning.progress_episodes) == (50_000, 200)
+    assert THESIS.exploration.parameter_sigma == 0.5
+    assert (settings.time_limit_s, settings.observation) == (20.0, "state")
+    assert settings.action.meaning == "coefficient"
+    assert settings.weights == DEFAULT_WEIGHTS
+    assert (settings.target_jitter_m, settings.anywhere_share, settings.short_share) == (0,) * 3
+    assert settings.grasp.depth == 0.0
+    assert collision_cost(THESIS, 0) == collision_cost(THESIS, 4_000_000) == 1.0
+
+
+@pytest.mark.parametrize(
+    ("step", "low", "mode"),
+    [
+        (0, 0.05, 0.05),
+        (250_000, 0.05, 0.525),
+        (500_000, 0.05, 1.0),
+        (750_000, 0.525, 1.0),
+        (1_000_000, 1.0, 1.0),
+        (4_000_000, 1.0, 1.0),
+    ],
+)
+def test_the_mode_of_the_starts_moves_first_and_then_their_lower_limit(step, low, mode):
+    assert start_range(THESIS, step) == pytest.approx((low, mode))
+
+
+TINY_RECIPE = {
+    "learning.total_steps": 1200,
+    "learning.buffer_size": 2000,
+    "learning.progress_steps": 400,
+    "learning.progress_episodes": 8,
+    "learning.checkpoint_steps": 400,
+    "episode.curriculum_steps": 400,
+    "episode.time_limit_s": 2.0,
+    "episode.short_limit_s": 2.0,
+}
+
+
+def test_a_training_of_the_recipe_updates_once_per_step_and_moves_its_starts():
+    preset = preset_of("pick-td3-thesis", TINY_RECIPE)
+    run, monitor = start(preset, 1, CELL)
+    assert isinstance(monitor.env.batch, CurriculumPickBatch)
+    assert monitor.env._task.cut(np.array([TIMEOUT])).tolist() == [False]
+    recorder = Recorder()
+    result = recorder.run(preset)
+    assert [one.step for one in recorder.progress] == [400, 800, 1200]
+    assert [one.updates for one in recorder.progress] == [300, 700, 1100]
+    assert all(one.episodes == 8 for one in recorder.progress)
+    act, value, outcomes = ValueNetworks(result.checkpoint).evaluate(
+        PickBatch(CELL, 3, 1, settings_of(REACH_ONLY)).reset()
+    )
+    assert (act.shape, value.shape, outcomes) == ((3, 5), (3,), None)

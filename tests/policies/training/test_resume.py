@@ -57,10 +57,21 @@ DDPG = {
     "networks.n_critics": 1,
     "exploration.noise": "ou",
 }
+PARAMETERS = {
+    **ARM,
+    "learning.gradient_steps": 2,
+    "learning.progress_steps": 256,
+    "learning.progress_episodes": 2,
+    "episode.curriculum_steps": 300,
+    "episode.time_limit_s": 1.0,
+    "episode.short_limit_s": 1.0,
+}
+"""Perturbed actors, and a curriculum that ends within the training."""
 TRAININGS: dict[str, tuple[str, dict[str, Any]]] = {
     "DQN": ("sorting-e0-dqn", SORTING),
     "DDPG": ("reach-td3", DDPG),
     "TD3": ("pick-td3", ARM),
+    "parameter noise": ("pick-td3-thesis", PARAMETERS),
 }
 SEED = 3
 N_ENVS = 8
@@ -177,6 +188,7 @@ VARIANTS: list[tuple[str, dict[str, Any]]] = [
     ),
     ("pick-td3", ARM),
     ("pick-td3-monitored", ARM),
+    ("pick-td3-thesis", PARAMETERS),
 ]
 
 
