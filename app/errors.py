@@ -12,6 +12,7 @@
     │   ├── LeaseLost        a server no longer runs the jobs of its database
     │   └── StaleAttempt     a worker no longer holds its job
     ├── StorageUnavailable   the database does not answer for now
+    │   ├── ServerUnreachable  the server does not answer a worker on another machine
     │   └── StorageDamaged   its file has damaged pages: the remedy is a backup
     ├── StorageFull          the database or the disk is full
     ├── Damaged              stored data with a wrong digest: kind, name, remedy

@@ -51,6 +51,7 @@ from jobs.cell_catalog import CellCatalog
 from jobs.checkpoints import shipped
 from jobs.import_process import ImportProcess
 from jobs.recording_catalog import RecordingCatalog
+from jobs.remote.uploads import WorkerUploads
 from jobs.retention import Retention
 from jobs.supervisor import Supervisor
 from web.viewer.loop import LiveCell
@@ -128,30 +129,30 @@ class Service:
             keep_states=settings.keep_states,
             acting=lambda: acting_in(worlds),
         )
-        supervisor = Supervisor(store, settings.data, retention=retention, tracer=tracer)
+        supervisor = Supervisor(
+            store,
+            settings.data,
+            max_running=settings.max_jobs,
+            retention=retention,
+            tracer=tracer,
+        )
+        self._imports = ImportProcess()
+        recordings = RecordingCatalog(store, self._imports)
         try:
             supervisor.start()
-            names = CheckpointNames(store)
+            self.parts = assemble(
+                supervisor,
+                retention,
+                recordings,
+                data=settings.data,
+                worlds=worlds,
+                metrics=counts,
+                tracer=tracer,
+            )
         except BaseException:
             supervisor.stop()
             store.close()
             raise
-        self._imports = ImportProcess()
-        self.parts = Services(
-            store=store,
-            supervisor=supervisor,
-            retention=retention,
-            worlds=worlds,
-            checkpoints=names,
-            task_policies=PolicyRegistry(names, build_task_policy, DEFAULT_ALIAS),
-            sorting_policies=PolicyRegistry(names, build_sorting_policy, SORTING_ALIASES[0]),
-            reach_policies=PolicyRegistry(names, build_reach_policy, REACH_ALIAS),
-            cells=CellCatalog(store),
-            recordings=RecordingCatalog(store, self._imports),
-            start_world=start_world,
-            metrics=counts,
-            tracer=tracer,
-        )
         counts.watch(ServiceState(self.parts))
         self._warm_up = threading.Thread(target=self._start_cell, name="warm-up", daemon=True)
         self._warm_up.start()
@@ -224,6 +225,48 @@ class Service:
                 return
             if damage is not None:
                 names.mark_damaged(damage)
+
+
+def assemble(
+    supervisor: Supervisor,
+    retention: Retention,
+    recordings: RecordingCatalog,
+    *,
+    data: Path,
+    worlds: dict[str, LiveWorld],
+    metrics: Metrics,
+    tracer: Tracer,
+) -> Services:
+    """Return the parts that routes use, on a database with all tables.
+
+    Args:
+        supervisor: Runs the jobs.
+        retention: Removes ended jobs of the database.
+        recordings: Recordings of the database.
+        data: The data folder.
+        worlds: Live worlds by id.
+        metrics: Metrics of the application.
+        tracer: Makes the spans of decisions.
+    """
+    store = retention.store
+    names = CheckpointNames(store)
+    return Services(
+        store=store,
+        supervisor=supervisor,
+        retention=retention,
+        data=data,
+        worker_uploads=WorkerUploads(store, data),
+        worlds=worlds,
+        checkpoints=names,
+        task_policies=PolicyRegistry(names, build_task_policy, DEFAULT_ALIAS),
+        sorting_policies=PolicyRegistry(names, build_sorting_policy, SORTING_ALIASES[0]),
+        reach_policies=PolicyRegistry(names, build_reach_policy, REACH_ALIAS),
+        cells=CellCatalog(store),
+        recordings=recordings,
+        start_world=start_world,
+        metrics=metrics,
+        tracer=tracer,
+    )
 
 
 def acting_in(worlds: Mapping[str, LiveWorld]) -> dict[str, str]:

@@ -28,6 +28,12 @@ class Settings(BaseSettings):
     database_url: str | None = Field(
         None, min_length=1, description="SQLAlchemy URL; a SQLite file in `data` if unset."
     )
+    max_jobs: int = Field(1, ge=1, le=1000, description="Jobs that run at once.")
+    worker_url: str | None = Field(
+        None,
+        pattern=r"^https?://[^/?#]+(/[A-Za-z0-9._~-]+)*$",
+        description="Address of this server for workers on other machines.",
+    )
     token: SecretStr | None = Field(
         None, description="Bearer token; required for any address but loopback."
     )
@@ -58,6 +64,12 @@ class Settings(BaseSettings):
     def database(self) -> str:
         """The effective database URL."""
         return self.database_url or f"sqlite:///{self.data.resolve() / 'tandem.db'}"
+
+    @property
+    def worker_address(self) -> str:
+        """The effective address for workers on other machines."""
+        host = f"[{self.host}]" if ":" in self.host else self.host
+        return self.worker_url or f"http://{host}:{self.port}"
 
     @property
     def secret(self) -> str | None:

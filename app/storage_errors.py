@@ -65,6 +65,19 @@ class StorageUnavailable(ServiceError):
         return {"database": self.database, "reason": self.reason}
 
 
+class ServerUnreachable(StorageUnavailable):
+    """The server does not answer a worker on another machine for now.
+
+    Args:
+        address: Its address.
+        reason: The error.
+    """
+
+    def __init__(self, address: str, reason: str) -> None:
+        super().__init__(address, reason)
+        self.short = "server unreachable"
+
+
 class StorageDamaged(StorageUnavailable):
     """The file of the database is damaged, or is no database."""
 

@@ -1,5 +1,6 @@
 """Training and evaluation as jobs: specs, supervisor, executors and the one entry point.
 
+access             Access of a worker to its job: read it, report, end it
 attempt            One attempt of a job in its own process: arguments, logging, exit status
 cell_catalog       Work cells by name: the shipped ones, and the user's own from the database
 checkpoints        Reading of stored checkpoints; a damaged shipped one is restored
@@ -7,6 +8,8 @@ comparison         Comparison of jobs: the fields that differ, and learning curv
                    over seeds
 executor           Executors of attempts: the interface, and one local process per attempt
 import_process     Import of a file in its own process: ``python -m jobs.import_process``
+inputs             Inputs of a job: its cell, checkpoint and recordings, and the files of its
+                   replay memory
 recording_catalog  Stored recordings by name: files in, runs of the 18-DoF human model out
 recording_format   The stored form of a recording
 resume_files       Files that trainings need to resume: the transitions of their replay

@@ -1,6 +1,6 @@
 """One attempt of a job in its own process: arguments, logging, exit status.
 
-``jobs.run`` is the entry point and passes the runners.
+``jobs.run`` and ``jobs.remote.run`` are the entry points.
 """
 
 import argparse
@@ -8,34 +8,33 @@ import faulthandler
 import logging
 import os
 import signal
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from app import logs
 from app.errors import InvalidInput, ServiceError
 from app.storage_errors import StorageFull, StorageUnavailable
-from app.store.database.schema import check_schema
-from app.store.engine import Store
 from app.store.records import Claim
+from jobs.access import JobAccess
 from jobs.worker import JobWorker, Runner
 
 logger = logging.getLogger(__name__)
 
+Connect = Callable[[Claim], tuple[JobAccess, Mapping[str, Runner]]]
+"""Returns the access to the job of an attempt, and the runner of each kind of job."""
 NICENESS = 10
 """Niceness of a worker, below the priority of the server and its live cell."""
 
 
 def main(
-    runners: Mapping[str, Runner],
-    database_url: str,
+    connect: Connect,
     style: logs.Style = "text",
     arguments: Sequence[str] | None = None,
 ) -> int:
     """Run the attempt of the command line.
 
     Args:
-        runners: Runner of each kind of job.
-        database_url: The database with the job.
+        connect: Opens the access to the job.
         style: Form of the log's lines.
         arguments: Command line; that of the process by default.
 
@@ -51,9 +50,8 @@ def main(
     faulthandler.enable()
     logs.set_up(style, job_id=options.job, attempt=options.attempt)
     try:
-        store = Store(database_url)
-        check_schema(store)
-        worker = JobWorker(store, Claim(job_id=options.job, attempt=options.attempt))
+        access, runners = connect(Claim(job_id=options.job, attempt=options.attempt))
+        worker = JobWorker(access)
     except (StorageFull, StorageUnavailable) as error:
         logger.error("%s", error.message)
         return os.EX_TEMPFAIL

@@ -79,30 +79,35 @@ class LocalProcess:
     """Runs every attempt in its own process on this machine.
 
     Args:
-        database_url: The database, for the child.
+        database_url: The database, for the child; None: it has no access.
         data_dir: The data folder; output of job ``ID`` goes to ``logs/ID.log`` in it.
         module: Module of a worker, which takes ``--job`` and ``--attempt``.
+        settings: Further settings of the child, by variable.
     """
 
     def __init__(
         self,
-        database_url: str,
+        database_url: str | None,
         data_dir: Path,
         module: str = "jobs.run",
+        settings: Mapping[str, str] | None = None,
     ) -> None:
         self._module = module
         self._logs = data_dir.absolute() / "logs"
         self._environment = {
             **os.environ,
             "TANDEM_DATA": str(data_dir.absolute()),
-            "TANDEM_DATABASE_URL": database_url,
             "PYTHONPATH": search_path(os.environ),
             "PYTHONUNBUFFERED": "1",
             # One job trains on one core and leaves the others to the server.
             "OMP_NUM_THREADS": "1",
             "MKL_NUM_THREADS": "1",
             "NUMBA_NUM_THREADS": "1",
+            **(settings or {}),
         }
+        self._environment.pop("TANDEM_DATABASE_URL", None)
+        if database_url is not None:
+            self._environment["TANDEM_DATABASE_URL"] = database_url
 
     def start(self, claim: Claim) -> LocalHandle:
         """Start a worker process for the attempt."""

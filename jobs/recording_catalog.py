@@ -58,8 +58,16 @@ class RecordingCatalog:
         Raises:
             NotFound: No recording has that name.
         """
+        return self.with_runs(name)[0]
+
+    def with_runs(self, name: str) -> tuple[StoredRecording, bytes]:
+        """Return a recording with its runs as safetensors bytes.
+
+        Raises:
+            NotFound: No recording has that name.
+        """
         with self._known_names_in_error(name):
-            return stored.read_runs(self._store, name)[0]
+            return stored.read_runs(self._store, name)
 
     def get(self, name: str) -> tuple[Motion, ...]:
         """Return the runs of a recording, from memory where they are there.

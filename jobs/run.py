@@ -1,7 +1,7 @@
 """Entry point of a job's process: ``python -m jobs.run --job ID --attempt N``.
 
-Executors start it. Settings come from the environment, the spec from the job's row. This is the
-only module of ``jobs`` that imports learning libraries.
+Executors start it. Settings come from the environment, the spec from the job's row.
+``jobs.remote.run`` is the entry point on another machine. Both import the learning libraries.
 """
 
 import logging
@@ -14,7 +14,6 @@ from typing import Any
 import torch
 
 from app.errors import CheckpointMismatch, Damaged, InvalidInput
-from app.policies.checkpoints import checkpoint as formats
 from app.policies.checkpoints.checkpoint import Checkpoint
 from app.policies.configs import presets
 from app.policies.evaluation.registry import evaluate as run_protocol
@@ -24,27 +23,22 @@ from app.policies.training.memory_files import MemoryFiles
 from app.policies.training.progress import Progress
 from app.policies.training.state import TrainingState
 from app.policies.training.train import train as train_policy
-from app.settings import load_settings
-from app.store.engine import Store
-from app.store.records import NewCheckpoint, ResumeState
-from jobs import resume_files
+from app.settings import Settings, load_settings
+from app.store.records import Claim, NewCheckpoint, ResumeState
+from jobs.access import JobAccess, open_access
 from jobs.attempt import main
-from jobs.cell_catalog import CellCatalog
-from jobs.checkpoints import read_sound
-from jobs.recording_catalog import RecordingCatalog
+from jobs.inputs import JobInputs, StoreInputs
 from jobs.spec import EvaluateSpec, parse_spec
 from jobs.worker import JobWorker, Runner
 
 logger = logging.getLogger(__name__)
 
 
-def train(worker: JobWorker) -> dict[str, Any]:
+def train(inputs: JobInputs, worker: JobWorker) -> dict[str, Any]:
     """Train the job's preset, from the start or from the last checkpoint."""
     job = worker.job
     assert job.preset is not None
-    folder = resume_files.folder_of(load_settings().data, job.id)
-    worker.after_success = partial(resume_files.remove, folder)
-    memory = MemoryFiles(folder, worker.wait_to)
+    memory = MemoryFiles(inputs.memory, worker.wait_to)
     state = worker.resume(partial(_usable, memory))
     resume = None if state is None else states.load(dict(state.manifest), state.tensors)
 
@@ -70,7 +64,7 @@ def train(worker: JobWorker) -> dict[str, Any]:
         on_progress=on_progress,
         on_checkpoint=on_checkpoint,
         should_stop=worker.should_stop,
-        cell=CellCatalog(worker.store).to_train_in(preset),
+        cell=inputs.cell(preset),
     )
     if not saved:  # interrupted between the last checkpoint and the end
         worker.record_checkpoint(result.step, _new(result.checkpoint), None)
@@ -93,7 +87,7 @@ def _new(policy: Checkpoint) -> NewCheckpoint:
     return NewCheckpoint(sha256=policy.sha256, manifest=policy.manifest, tensors=policy.tensors)
 
 
-def evaluate(worker: JobWorker) -> dict[str, Any]:
+def evaluate(inputs: JobInputs, worker: JobWorker) -> dict[str, Any]:
     """Evaluate the job's checkpoint by its protocol; a step is a row of the result."""
     worker.end_at_once()
     spec = parse_spec(worker.job.spec)
@@ -104,10 +98,10 @@ def evaluate(worker: JobWorker) -> dict[str, Any]:
 
     return run_protocol(
         spec.protocol,
-        _stored(worker.store, spec.checkpoint),
+        inputs.checkpoint(spec.checkpoint),
         episodes=spec.episodes,
         seed=spec.seed,
-        motions=RecordingCatalog(worker.store).runs_of(spec.recordings),
+        motions=inputs.motions(spec.recordings),
         on_row=on_row,
     )
 
@@ -117,16 +111,18 @@ def _rates(row: Row) -> dict[str, float | None]:
     return {name: one["mean"] for name, one in row.items() if isinstance(one, Mapping)}
 
 
-def _stored(store: Store, reference: str) -> Checkpoint:
-    record, tensors = read_sound(store, reference)
-    return formats.load(dict(record.manifest), tensors)
+def runners(inputs: JobInputs) -> Mapping[str, Runner]:
+    """Return the runner of each kind of job."""
+    return {"train": partial(train, inputs), "evaluate": partial(evaluate, inputs)}
 
 
-RUNNERS: Mapping[str, Runner] = {"train": train, "evaluate": evaluate}
-"""Runner of each kind of job."""
+def connect(settings: Settings, claim: Claim) -> tuple[JobAccess, Mapping[str, Runner]]:
+    """Open the database for an attempt."""
+    access = open_access(settings.database, settings.data, claim)
+    return access, runners(StoreInputs(access.store, settings.data, claim.job_id))
 
 
 if __name__ == "__main__":
     torch.set_num_threads(1)
     settings = load_settings()
-    sys.exit(main(RUNNERS, settings.database, settings.log))
+    sys.exit(main(partial(connect, settings), settings.log))

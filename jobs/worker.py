@@ -16,10 +16,8 @@ from typing import Any
 
 from app.errors import ServiceError
 from app.storage_errors import StaleAttempt, StorageDamaged, StorageFull, StorageUnavailable
-from app.store import attempts, completion, fencing, metrics
-from app.store.engine import Store
-from app.store.jobs import get_job
-from app.store.records import Claim, JobRecord, NewCheckpoint, ResumeState, Spent
+from app.store.records import JobRecord, NewCheckpoint, ResumeState, Spent
+from jobs.access import JobAccess
 
 logger = logging.getLogger(__name__)
 
@@ -40,19 +38,15 @@ class JobWorker:
     """Interface of a runner to its job. Writes are fenced by the attempt.
 
     Args:
-        store: The database, opened by this process.
-        claim: The attempt of this process.
+        access: Access to the job for the attempt of this process.
 
     Raises:
-        NotFound: There is no such job.
         StaleAttempt: The attempt does not hold the job.
     """
 
-    def __init__(self, store: Store, claim: Claim) -> None:
-        get_job(store, claim.job_id)
-        self.job: JobRecord = fencing.peek(store, claim)
-        self.store = store
-        self._claim = claim
+    def __init__(self, access: JobAccess) -> None:
+        self.job: JobRecord = access.job()
+        self.access = access
         self._cancelled = threading.Event()
         self._interrupted = threading.Event()
         self._lost = threading.Event()
@@ -61,8 +55,6 @@ class JobWorker:
         self._spent: Spent | None = None
         self._budgeted = self.job
         self._run_before, self._started = self.job.run_s, time.monotonic()
-        self.after_success: Callable[[], None] = lambda: None
-        """Called once the job has succeeded, to remove what only its attempts need."""
 
     @property
     def run_s(self) -> float:
@@ -77,9 +69,10 @@ class JobWorker:
         Args:
             usable: Whether what a state refers to is there, such as its files.
         """
-        found = attempts.load_resume(self.store, self._claim.job_id, usable)
-        if self.job.step != (0 if found is None else found.step):
-            attempts.resume_earlier(self.store, self._claim, found)
+        found = self.access.load_resume(usable)
+        step = None if found is None else found.step
+        if self.job.step != (step or 0):
+            self.access.resume_earlier(step)
         return found
 
     def record_progress(
@@ -95,11 +88,9 @@ class JobWorker:
         """
 
         def write() -> None:
-            if self._waiting is not None and self._has_point(step):
+            if self._waiting is not None and self.access.has_point(step):
                 return  # the commit before was reported as failed, and took place
-            attempts.record_progress(
-                self.store, self._claim, step, values, total_steps=total_steps
-            )
+            self.access.record_progress(step, values, total_steps)
 
         self.wait_to(write)
         budget = self._budgeted.step_budget
@@ -115,9 +106,7 @@ class JobWorker:
             StaleAttempt: The attempt no longer holds the job.
             StorageFull: No room is left, and the runner must stop.
         """
-        self.wait_to(
-            lambda: attempts.record_checkpoint(self.store, self._claim, step, policy, resume)
-        )
+        self.wait_to(lambda: self.access.record_checkpoint(step, policy, resume))
 
     def should_stop(self) -> bool:
         """Whether the runner must write a last checkpoint and return; for every step."""
@@ -165,37 +154,27 @@ class JobWorker:
         self.wait_to(lambda: self._record_end(result))
 
     def _record_end(self, result: Mapping[str, Any] | None) -> None:
-        cancelled = fencing.peek(self.store, self._claim).cancel_requested
+        cancelled = self.access.job().cancel_requested
         if self._stop_seen and cancelled:
-            completion.finish(
-                self.store, self._claim, state="cancelled", result=result, run_s=self.run_s
-            )
+            self.access.end("cancelled", result=result, run_s=self.run_s)
             logger.info("cancelled")
         elif self._stop_seen:
-            completion.give_back(self.store, self._claim)
+            self.access.end("interrupted")
             logger.info("interrupted: the job resumes with the next attempt")
         else:
-            spent, run_s = self._spent, self.run_s
-            completion.finish(
-                self.store, self._claim, result=result, ended_by=spent, run_s=run_s
-            )
-            if spent is None:
-                self.after_success()
+            spent = self._spent
+            self.access.end("succeeded", result=result, ended_by=spent, run_s=self.run_s)
             logger.info("succeeded" if spent is None else f"ended by its {spent}")
 
     def _fail(self, message: str) -> int:
         try:
-            completion.fail(self.store, self._claim, message)
+            self.access.end("failed", error=message)
         except StaleAttempt as error:
             logger.warning("%s", error)
         except (StorageFull, StorageUnavailable) as error:
             logger.error("%s", error.message)
             return os.EX_TEMPFAIL
         return 0
-
-    def _has_point(self, step: int) -> bool:
-        rows = metrics.list_metrics(self.store, self._claim.job_id, after_step=step - 1)
-        return any(row.step == step for row in rows)
 
     def wait_to(self, write: Callable[[], None]) -> None:
         """Write; where database or disk take no writes, repeat it until the runner must stop.
@@ -225,21 +204,21 @@ class JobWorker:
     def _beat(self) -> None:
         next_heartbeat = time.monotonic() + HEARTBEAT_S
         recorded: str | None = None
+        silent = False
         while not self._lost.wait(CANCEL_CHECK_S):
             waiting = self._waiting
             due = time.monotonic() >= next_heartbeat or waiting != recorded
             try:
-                if due:
-                    job = attempts.heartbeat(self.store, self._claim, waiting, run_s=self.run_s)
-                else:
-                    job = fencing.peek(self.store, self._claim)
+                job = self.access.heartbeat(waiting, self.run_s) if due else self.access.job()
             except StaleAttempt:
                 self._lost.set()
                 return
             except (StorageUnavailable, StorageFull) as error:
-                logger.warning("no heartbeat this time: %s", error)
+                if not silent:
+                    logger.warning("no heartbeat for now: %s", error)
+                silent = True
                 continue
-            self._budgeted = job
+            self._budgeted, silent = job, False
             if due:
                 next_heartbeat, recorded = time.monotonic() + HEARTBEAT_S, waiting
             if job.cancel_requested:

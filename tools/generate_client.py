@@ -14,6 +14,8 @@ from app.settings import Settings
 TARGET = Path(__file__).parents[1] / "app" / "client" / "operations.py"
 MAX_VARIANTS = 4
 """Kinds of a body up to which each is named; above, their common base class."""
+FOR_WORKERS = {"attempts"}
+"""Tags of operations that are left out: only the process of an attempt can use them."""
 PLAIN = {"integer": "int", "number": "float", "boolean": "bool", "string": "str"}
 HEAD = '''"""One method per operation of the OpenAPI document; written by ``make client``.
 
@@ -67,6 +69,7 @@ class Writer:
             self._method(method, path, operation)
             for path, operations in self._document["paths"].items()
             for method, operation in operations.items()
+            if not FOR_WORKERS & set(operation["tags"])
         ]
         imports = "\n".join(
             f"from {one.__module__} import {one.__name__}"

@@ -16,6 +16,7 @@ from app.api.bodies import BodyRules
 from app.api.metrics import Metrics
 from app.api.routes import (
     aliases,
+    attempts,
     cells,
     checkpoints,
     health,
@@ -97,6 +98,7 @@ def build_app(
         worlds,
         jobs,
         job_actions,
+        attempts,
         results,
         checkpoints,
         aliases,
@@ -112,7 +114,7 @@ def build_app(
         app.include_router(part.router)
     description.install(app)
     add_page(app, static)
-    app.add_middleware(BodyRules, files=recordings.FILES | checkpoints.FILES)
+    app.add_middleware(BodyRules, files=recordings.FILES | checkpoints.FILES | attempts.FILES)
     open_paths = (SESSION_PATH, ICON_PATH, *health.PATHS)
     app.add_middleware(Guard, token=token, open_paths=open_paths)
     app.add_middleware(Answers, metrics=counts)

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 
 from starlette.datastructures import Headers
 from starlette.exceptions import HTTPException
+from starlette.routing import compile_path
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from app.api.problems import ProblemResponse, member_problem
@@ -31,7 +32,7 @@ class BodyRules:
     Args:
         app: The inner layers.
         max_bytes: Largest JSON body.
-        files: Routes that take files, each with its largest file [bytes].
+        files: Routes that take files by POST or PUT, each with its largest file [bytes].
     """
 
     def __init__(
@@ -43,7 +44,9 @@ class BodyRules:
     ) -> None:
         self.app = app
         self.max_bytes = max_bytes
-        self.files = dict(files or {})
+        self.files = [
+            (compile_path(path)[0], largest) for path, largest in (files or {}).items()
+        ]
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Pass a request on with a counted body, or answer it here."""
@@ -51,8 +54,9 @@ class BodyRules:
             await self.app(scope, receive, send)
             return
         path, headers = path_of(scope), Headers(scope=scope)
-        takes_file = scope["method"] == "POST" and path in self.files
-        max_bytes = self.files[path] if takes_file else self.max_bytes
+        largest = self._largest_file(scope["method"], path)
+        takes_file = largest is not None
+        max_bytes = self.max_bytes if largest is None else largest
         refused = _refused_head(scope, headers, takes_file, max_bytes)
         if refused is None and _has_body(headers) and not takes_file and not _is_form(headers):
             receive, body = await _whole(receive, max_bytes)
@@ -61,6 +65,12 @@ class BodyRules:
             await refused(scope, receive, send)
             return
         await self.app(scope, _counted(receive, max_bytes), send)
+
+    def _largest_file(self, method: str, path: str) -> int | None:
+        """Return the size of the largest file that a request may have; None: it takes none."""
+        if method not in ("POST", "PUT"):
+            return None
+        return next((size for pattern, size in self.files if pattern.match(path)), None)
 
 
 def _refused_head(

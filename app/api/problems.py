@@ -41,7 +41,7 @@ from app.errors import (
     SimulationError,
 )
 from app.logs import REQUEST_ID
-from app.storage_errors import StorageDamaged, StorageFull, StorageUnavailable
+from app.storage_errors import StaleAttempt, StorageDamaged, StorageFull, StorageUnavailable
 
 logger = logging.getLogger(__name__)
 
@@ -52,6 +52,7 @@ STATUS: tuple[tuple[type[ServiceError], int, str], ...] = (
     (InvalidInput, 422, "invalid-input"),
     (Damaged, 500, "damaged"),
     (CheckpointMismatch, 409, "checkpoint-mismatch"),
+    (StaleAttempt, 409, "stale-attempt"),
     (Conflict, 409, "conflict"),
     (NotReady, 503, "not-ready"),
     (MissingPackage, 501, "missing-package"),

@@ -1,7 +1,8 @@
 """Parts of the service that routes use; ``app.main`` creates them."""
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Protocol
@@ -26,6 +27,7 @@ from app.sim.sorting.sorting_values import SortingValues
 from app.store.engine import Store
 from jobs.cell_catalog import CellCatalog
 from jobs.recording_catalog import RecordingCatalog
+from jobs.remote.uploads import WorkerUploads
 from jobs.retention import Retention
 from jobs.supervisor import Supervisor
 
@@ -96,6 +98,10 @@ class Services:
     """Runs the jobs; woken when one is posted."""
     retention: Retention
     """Removes ended jobs."""
+    data: Path
+    """The data folder."""
+    worker_uploads: WorkerUploads
+    """Stores what workers on other machines send."""
     checkpoints: CheckpointNames
     """Stored checkpoints by name."""
     task_policies: PolicyRegistry[TaskPolicy]
@@ -134,6 +140,20 @@ class Services:
     """Held by every open viewer."""
     stopping: threading.Event = field(default_factory=threading.Event)
     """Set when the server stops; open streams end."""
+
+    @contextmanager
+    def upload(self) -> Iterator[None]:
+        """Hold one of the uploads.
+
+        Raises:
+            NotReady: All are held.
+        """
+        if not self.uploads.acquire(blocking=False):
+            raise NotReady(f"{MAX_UPLOADS} files are being read: send it again in a moment")
+        try:
+            yield
+        finally:
+            self.uploads.release()
 
     def world(self, world_id: str) -> LiveWorld:
         """Return a live world.

@@ -198,20 +198,31 @@ def has_resume(store: Store, job_id: str) -> bool:
         return connection.execute(query).first() is not None
 
 
-def resume_earlier(store: Store, claim: Claim, state: ResumeState | None) -> None:
+def resume_earlier(store: Store, claim: Claim, step: int | None) -> None:
     """Let a claimed attempt start from an earlier state than its claim states.
 
     The job's points and checkpoints beyond that state are deleted.
 
+    Args:
+        store: The database.
+        claim: The attempt.
+        step: Step of the state; None: the attempt starts without one.
+
     Raises:
         StaleAttempt: The attempt no longer holds the job.
     """
-    step = 0 if state is None else state.step
     with store.writing() as connection:
         fenced_update(connection, claim, {}, counts=False)
-        _forget_beyond(connection, claim.job_id, -1 if state is None else step)
-        data = {"attempt": claim.attempt, "resumed_from_step": step}
-        change_state(connection, claim.job_id, "running", {"step": step}, data)
+        _forget_beyond(connection, claim.job_id, -1 if step is None else step)
+        data = {"attempt": claim.attempt, "resumed_from_step": step or 0}
+        change_state(connection, claim.job_id, "running", {"step": step or 0}, data)
+
+
+def resume_manifests(store: Store, job_id: str) -> tuple[Mapping[str, Any], ...]:
+    """Return the manifests of a job's resume states, without their tensors."""
+    query = sa.select(resume_states.c.manifest).where(resume_states.c.job_id == job_id)
+    with store.reading() as connection:
+        return tuple(connection.execute(query).scalars())
 
 
 def running_jobs(store: Store) -> tuple[RunningJob, ...]:

@@ -19,9 +19,10 @@ from sqlalchemy import event
 
 from app.digests import digest
 from app.errors import InvalidInput
-from app.store.records import NewCheckpoint, ResumeState
+from app.store.records import Claim, NewCheckpoint, ResumeState
+from jobs.access import JobAccess, StoreAccess, open_access
 from jobs.attempt import main
-from jobs.worker import JobWorker
+from jobs.worker import JobWorker, Runner
 
 GRID = 5
 CHECKPOINT_EVERY = 20
@@ -81,12 +82,20 @@ def limit_database(worker: JobWorker, max_pages: str | None) -> None:
     if max_pages is None:
         return
 
+    assert isinstance(worker.access, StoreAccess)
+
     def limit(connection: sa.Connection) -> None:
         pages = int(Path(max_pages).read_text())
         connection.exec_driver_sql(f"PRAGMA max_page_count = {pages}")
 
-    event.listen(worker.store.engine, "begin", limit, insert=True)
+    event.listen(worker.access.store.engine, "begin", limit, insert=True)
+
+
+def connect(claim: Claim) -> tuple[JobAccess, Mapping[str, Runner]]:
+    data_dir = Path(os.environ["TANDEM_DATA"])
+    access = open_access(os.environ["TANDEM_DATABASE_URL"], data_dir, claim)
+    return access, {"count": count}
 
 
 if __name__ == "__main__":
-    sys.exit(main({"count": count}, os.environ["TANDEM_DATABASE_URL"]))
+    sys.exit(main(connect))

@@ -18,6 +18,7 @@ from app.store import attempts, completion, jobs
 from app.store.engine import Store
 from app.store.records import Claim
 from jobs import worker as jobs_worker
+from jobs.access import StoreAccess
 from jobs.executor import Handle, LocalProcess
 from jobs.supervisor import Supervisor
 from jobs.worker import JobWorker
@@ -197,12 +198,12 @@ ERRORS = ["database or disk is full", "disk I/O error", "database is locked"]
 @pytest.mark.parametrize("error", ERRORS)
 @pytest.mark.parametrize("place", WRITES)
 def test_error_at_any_write_of_a_worker_loses_nothing(
-    store: Store, monkeypatch: pytest.MonkeyPatch, place: str, error: str
+    store: Store, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, place: str, error: str
 ) -> None:
     job_id = queue(store, seed=7, steps=60)
     found = attempts.claim_next(store)
     assert found is not None
-    worker = JobWorker(store, found[0])
+    worker = JobWorker(StoreAccess(store, tmp_path, found[0]))
     monkeypatch.setattr(jobs_worker, "RETRY_S", 0.01)
     n, commit = 0, store.engine.dialect.do_commit
 

@@ -2,6 +2,7 @@
 
 import os
 import signal
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -17,7 +18,7 @@ from jobs.cell_catalog import CellCatalog
 from jobs.recording_catalog import RecordingCatalog
 from jobs.spec import parse_spec
 from jobs.supervisor import Supervisor
-from tests.jobs.machinery import PATIENCE, wait_for, wait_until_final, worker_pids
+from tests.jobs.machinery import PATIENCE, WAIT_S, wait_for, wait_until_final, worker_pids
 from tests.policies.evaluation.sorting_players import untrained
 from tests.sim.recorded_person import csv_text, working
 from tests.support import workshop
@@ -84,7 +85,10 @@ def test_killed_training_ends_with_the_checkpoints_of_one_that_was_not(
         for job in (whole, killed)
     ]
     assert ids[0] == ids[1] and len(ids[0]) == 8
-    assert not (tmp_path / "resume" / killed_id).exists()
+    deadline = time.monotonic() + WAIT_S
+    while (tmp_path / "resume" / killed_id).exists():  # removed after the end is recorded
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
 
 
 @pytest.mark.usefixtures("supervisor")

@@ -150,7 +150,7 @@ def test_attempt_may_start_from_an_earlier_state_than_its_claim(
     assert jobs.get_job(store, claim.job_id).step == 20
     earlier = attempts.load_resume(store, claim.job_id, lambda state: state.step < 20)
     assert earlier == resume(10)
-    attempts.resume_earlier(store, second, earlier)
+    attempts.resume_earlier(store, second, earlier.step)
     job, last = jobs.get_job(store, claim.job_id), events.list_events(store, claim.job_id)[-1]
     assert (job.state, job.step, curve(store, claim)) == ("running", 10, [5, 10])
     assert (last.kind, last.data["resumed_from_step"]) == ("state", 10)

@@ -10,8 +10,8 @@ from app.api.bodies import FILE_TYPES
 from app.api.description import CREATED
 from app.api.registry import PolicyRegistry
 from app.api.schemas.checkpoints import CheckpointList, CheckpointPublic
-from app.api.services import MAX_UPLOADS, Services, ServicesDep
-from app.errors import InvalidInput, NotFound, NotReady
+from app.api.services import Services, ServicesDep
+from app.errors import InvalidInput, NotFound
 from app.policies.checkpoints.checkpoint import CHOOSING, REACHING, SORTING, purpose_of
 from app.policies.checkpoints.upload import MAX_FILE, read_upload
 from app.store import checkpoints
@@ -72,12 +72,8 @@ async def upload_checkpoint(
 ) -> CheckpointPublic:
     """Check a policy completely and store it; the same one again answers 200."""
     services.readiness.require()
-    if not services.uploads.acquire(blocking=False):
-        raise NotReady(f"{MAX_UPLOADS} files are being read: post again in a moment")
-    try:
+    with services.upload():
         found = await run_in_threadpool(_store, await request.body(), sha256, services)
-    finally:
-        services.uploads.release()
     checkpoint, new = found
     if not new:
         response.status_code = 200

@@ -8,8 +8,7 @@ from starlette.concurrency import run_in_threadpool
 from app.api.bodies import FILE_TYPES
 from app.api.description import CREATED
 from app.api.schemas.recordings import RecordingItem, RecordingList, RecordingPublic
-from app.api.services import MAX_UPLOADS, Services, ServicesDep
-from app.errors import NotReady
+from app.api.services import Services, ServicesDep
 from app.sim.mocap.importer import FORMATS, MAX_BYTES
 from app.sim.mocap.read_options import UNITS, UP_AXES, ReadOptions, name_map
 from app.store.records import StoredRecording
@@ -126,11 +125,7 @@ async def _import(
 ) -> tuple[StoredRecording, bool]:
     """Import the body on a thread, a few at a time; names are checked before it is read."""
     checked_names(file_name, name)
-    if not services.uploads.acquire(blocking=False):
-        raise NotReady(f"{MAX_UPLOADS} files are being imported: post again in a moment")
-    try:
+    with services.upload():
         content = await request.body()
         add = services.recordings.add
         return await run_in_threadpool(add, content, file_name, name, options)
-    finally:
-        services.uploads.release()

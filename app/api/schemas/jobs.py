@@ -1,12 +1,13 @@
 """Jobs as they are shown."""
 
 from datetime import datetime
-from typing import Any, Self
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field
 
-from app.api.schemas.numbers import Answer
-from app.store.records import JobRecord, MetricRow
+from app.api.schemas.numbers import Answer, Body, Finite
+from app.store.cursors import MAX_INTEGER
+from app.store.records import JobRecord, MetricRow, Spent
 
 
 class JobPublic(Answer):
@@ -128,3 +129,46 @@ class MetricsPublic(Answer):
     def from_domain(cls, rows: tuple[MetricRow, ...]) -> Self:
         """Return the schema of the store's rows."""
         return cls(items=[{"step": row.step, **row.values, "at": row.at} for row in rows])
+
+
+Step = Annotated[int, Field(ge=0, le=MAX_INTEGER, description="environment steps done")]
+
+
+RunTime = Annotated[Finite, Field(ge=0, description="run time of all attempts [s]")]
+
+
+class AttemptHeartbeat(Body):
+    """A heartbeat of a worker."""
+
+    waiting: Annotated[str, Field(pattern=r"^[^\x00-\x1f]+$", max_length=80)] | None = Field(
+        description="reason for which the worker cannot write; null if it runs"
+    )
+    run_s: RunTime
+
+
+class AttemptProgress(Body):
+    """A point of a learning curve."""
+
+    step: Step
+    values: dict[str, int | Finite | None] = Field(
+        description="named numbers; null where not defined", max_length=200
+    )
+    total_steps: Step | None = Field(description="steps to do; null where not known")
+
+
+class AttemptStart(Body):
+    """The state from which an attempt starts."""
+
+    step: Step | None = Field(description="step of the state; null: it starts without one")
+
+
+class AttemptEnd(Body):
+    """The end of an attempt."""
+
+    state: Literal["succeeded", "cancelled", "failed", "interrupted"] = Field(
+        description="an interrupted attempt leaves its job to the next one"
+    )
+    result: dict[str, Any] | None = Field(None, description="result of the job")
+    error: str | None = Field(None, description="cause of a failure", max_length=100_000)
+    ended_by: Spent | None = Field(None, description="the budget that ended it")
+    run_s: RunTime | None = None

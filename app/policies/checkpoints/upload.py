@@ -5,6 +5,8 @@ tensors fit the networks of the manifest is checked by loading the policy.
 """
 
 import json
+from collections.abc import Mapping
+from typing import Any
 
 from app.digests import digest
 from app.errors import InvalidInput
@@ -29,11 +31,8 @@ def read_upload(content: bytes) -> Checkpoint:
         InvalidInput: A part is missing, too large, or not what it must be.
         CheckpointMismatch: The format is another one.
     """
-    line, separator, tensors = content[: MAX_MANIFEST + 1].partition(b"\n")
-    if not separator:
-        rule = f"must begin with a line of JSON, the manifest, of at most {MAX_MANIFEST} bytes"
-        raise InvalidInput("body", f"{len(content)} bytes", rule)
-    checkpoint = load(_manifest(line), content[len(line) + 1 :])
+    manifest, tensors = split(content, MAX_MANIFEST)
+    checkpoint = load(manifest, tensors)
     if (kind := checkpoint.manifest["kind"]) != "policy":
         raise InvalidInput("manifest.kind", kind, "cannot be uploaded", ("policy",))
     if not tensors:
@@ -41,6 +40,28 @@ def read_upload(content: bytes) -> Checkpoint:
     checkpoint.arrays()
     _check_size(checkpoint)
     return checkpoint
+
+
+def join(manifest: Mapping[str, Any], tensors: bytes) -> bytes:
+    """Return the file of a manifest and its tensors."""
+    return json.dumps(manifest, allow_nan=False).encode() + b"\n" + tensors
+
+
+def split(content: bytes, max_manifest: int) -> tuple[object, bytes]:
+    """Return the manifest and the tensors of a file; the tensors are not read.
+
+    Args:
+        content: The file.
+        max_manifest: Longest manifest [bytes].
+
+    Raises:
+        InvalidInput: The manifest is missing, too long, too deep, or not JSON.
+    """
+    line, separator, _ = content[: max_manifest + 1].partition(b"\n")
+    if not separator:
+        rule = f"must begin with a line of JSON, the manifest, of at most {max_manifest} bytes"
+        raise InvalidInput("body", f"{len(content)} bytes", rule)
+    return _manifest(line), content[len(line) + 1 :]
 
 
 def _manifest(line: bytes) -> object:

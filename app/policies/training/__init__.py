@@ -1,5 +1,6 @@
 """Training runs.
 
+file_store    Stores of files that are named by their SHA-256; a folder is one
 memory_files  Replay memory on disk: files of transitions named by their SHA-256, written
               incrementally
 pick          Training on the pick scenario: settings, networks, exploration and learning curve

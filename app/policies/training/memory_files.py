@@ -6,12 +6,9 @@ rows since the state before it. The next observation of a transition is nearly a
 observation of the next row, so that only the others are stored.
 """
 
-import errno
-import os
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from hashlib import sha256
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -21,59 +18,30 @@ from safetensors.numpy import save as save_arrays
 from stable_baselines3.common.buffers import ReplayBuffer
 
 from app.errors import Damaged
-from app.storage_errors import StorageFull
+from app.policies.training.file_store import FileStore
 
 FILE_BYTES = 32 * 1024 * 1024
 """Size of a file of transitions, approximately [bytes]."""
 STORED = ("observations", "actions", "rewards", "dones", "timeouts")
 """Arrays of a replay buffer that are stored row by row."""
-FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
-"""Errors of a full disk."""
-
 Files = list[dict[str, Any]]
 """Files of a replay memory: ``first`` and ``last`` (exclusive) row and ``sha256`` of each."""
-
-
-def write_durably(path: Path, content: bytes) -> None:
-    """Write a file that exists wholly or not at all, also after a power failure.
-
-    Raises:
-        StorageFull: No room is left.
-    """
-    unfinished = path.with_name(f"{path.name}.unfinished")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with unfinished.open("wb") as file:
-            file.write(content)
-            file.flush()
-            os.fsync(file.fileno())
-        unfinished.replace(path)
-        folder = os.open(path.parent, os.O_RDONLY)
-        try:
-            os.fsync(folder)
-        finally:
-            os.close(folder)
-    except OSError as error:
-        unfinished.unlink(missing_ok=True)
-        if error.errno in FULL:
-            raise StorageFull(str(path.parent)) from error
-        raise
 
 
 class MemoryFiles:
     """Files of one training's replay memory.
 
     Args:
-        folder: Folder of the files; no other files are in it.
+        store: Holds the files.
         write: Executes a write, and may repeat it where no room is left.
     """
 
     def __init__(
         self,
-        folder: Path,
+        store: FileStore,
         write: Callable[[Callable[[], None]], None] = lambda action: action(),
     ) -> None:
-        self._folder, self._write = folder, write
+        self._store, self._write = store, write
         self._files: Files = []
 
     def write(self, memory: ReplayBuffer, n_rows: int, following: NDArray[Any]) -> Files:
@@ -99,7 +67,7 @@ class MemoryFiles:
                 _rows_of(memory, row, last, following if last == n_rows else after)
             )
             entry = {"first": row, "last": last, "sha256": sha256(content).hexdigest()}
-            self._write(partial(write_durably, self._path(entry), content))
+            self._write(partial(self._store.write, entry["sha256"], content))
             self._files.append(entry)
         return [dict(one) for one in self._files]
 
@@ -112,7 +80,7 @@ class MemoryFiles:
         row = max(0, n_rows - memory.buffer_size)
         for entry in files:
             if not entry["first"] <= row < entry["last"]:
-                raise _damaged(self._path(entry))
+                raise _damaged(entry["sha256"])
             arrays = load_arrays(self._content(entry))
             skipped = row - entry["first"]
             rows = np.arange(row, entry["last"]) % memory.buffer_size
@@ -121,7 +89,7 @@ class MemoryFiles:
             memory.next_observations[rows] = _next_observations(arrays)[skipped:]
             row = entry["last"]
         if row != n_rows:
-            raise _damaged(self._folder)
+            raise _damaged(f"row {row}")
         memory.full, memory.pos = n_rows >= memory.buffer_size, n_rows % memory.buffer_size
         self._files = [dict(one) for one in files]
 
@@ -136,29 +104,22 @@ class MemoryFiles:
 
     def keep(self, states: Sequence[Mapping[str, Any] | None]) -> None:
         """Delete all files that the manifests of some states do not list."""
-        kept = {
-            self._path(entry).name for state in states if state for entry in state["memory"]
-        }
-        for path in self._folder.glob("*"):
-            if path.name not in kept:
-                path.unlink(missing_ok=True)
-
-    def _path(self, entry: Mapping[str, Any]) -> Path:
-        return self._folder / f"{entry['sha256']}.safetensors"
+        self._store.keep(
+            {one["sha256"] for state in states if state for one in state["memory"]}
+        )
 
     def _content(self, entry: Mapping[str, Any]) -> bytes:
-        path = self._path(entry)
         try:
-            content = path.read_bytes()
+            content = self._store.read(entry["sha256"])
         except OSError as error:
-            raise _damaged(path) from error
+            raise _damaged(entry["sha256"]) from error
         if sha256(content).hexdigest() != entry["sha256"]:
-            raise _damaged(path)
+            raise _damaged(entry["sha256"])
         return content
 
 
-def _damaged(path: Path) -> Damaged:
-    return Damaged("replay memory", str(path), "an earlier state is used")
+def _damaged(name: str) -> Damaged:
+    return Damaged("replay memory", name, "an earlier state is used")
 
 
 def _rows_of(

@@ -12,7 +12,8 @@ from pathlib import Path
 
 from app.digests import has_digest
 from app.errors import Damaged, InvalidInput
-from app.policies.training.memory_files import MemoryFiles, write_durably
+from app.policies.training.file_store import FileFolder, write_durably
+from app.policies.training.memory_files import MemoryFiles
 from app.policies.training.state import TrainingState, load
 
 logger = logging.getLogger(__name__)
@@ -30,7 +31,7 @@ class StateFolder:
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
-        self.memory = MemoryFiles(folder / "memory")
+        self.memory = MemoryFiles(FileFolder(folder / "memory"))
         """Files of the replay memory."""
 
     def write(self, state: TrainingState) -> None:

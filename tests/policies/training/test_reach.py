@@ -8,6 +8,7 @@ from app.errors import InvalidInput
 from app.policies.algorithms.vecenv import BatchVecEnv
 from app.policies.configs import presets
 from app.policies.inference.reach_policy import ReachPolicy
+from app.policies.training.file_store import FileFolder
 from app.policies.training.memory_files import MemoryFiles
 from app.policies.training.reach import batch_of, settings_of, start, visited_states
 from app.policies.training.td3 import play
@@ -152,7 +153,7 @@ def test_a_time_out_ends_an_episode_of_the_recipe_for_good():
 
 def test_a_recipe_resumes_with_its_normalisation(tmp_path):
     preset = preset_of("reach-ddpg-authors", {**TINY, "networks.layers": 2})
-    memory = MemoryFiles(tmp_path)
+    memory = MemoryFiles(FileFolder(tmp_path))
     recorder = Recorder(stop_at=512, memory=memory)
     stopped = recorder.run(preset)
     counted = stopped.checkpoint.arrays()["actor.norm.count"][0]
@@ -213,7 +214,7 @@ def test_every_option_trains_and_moves_the_actor(option):
 
 def test_averaged_weights_are_what_is_shown_and_kept(tmp_path):
     preset = preset_of("reach-td3", {**TINY, "learning.ema": 0.99})
-    stopped = Recorder(stop_at=768, memory=MemoryFiles(tmp_path))
+    stopped = Recorder(stop_at=768, memory=MemoryFiles(FileFolder(tmp_path)))
     stopped.run(preset)
     _, policy, state = stopped.checkpoints[-1]
     shown, networks = policy.arrays()["actor.net.0.weight"], under(state.entries(), "networks")

@@ -13,6 +13,7 @@ import torch
 from app.errors import CheckpointMismatch, Damaged, InvalidInput
 from app.policies.configs.presets import Preset
 from app.policies.training import state as states
+from app.policies.training.file_store import FileFolder
 from app.policies.training.memory_files import MemoryFiles
 from app.policies.training.progress import Progress, TrainResult
 from app.policies.training.reporter import Callbacks
@@ -205,14 +206,14 @@ def test_everything_that_a_training_changes_is_restored(
 ) -> None:
     """Compares all objects of a training with those of a restored one."""
     preset = preset_of(name, fields)
-    first, reporter = started(preset, MemoryFiles(tmp_path))
+    first, reporter = started(preset, MemoryFiles(FileFolder(tmp_path)))
     new = contents(first)
     steps = iter(range(N_ENVS, 10**9, N_ENVS))
     first.learn(reporter, lambda: next(steps) < 280)
     saved: list[TrainingState] = []
     first.save(lambda _step, _policy, state: saved.append(state))  # type: ignore[arg-type]
     worked, generators = contents(first), global_generators()
-    second, _ = started(preset, MemoryFiles(tmp_path))
+    second, _ = started(preset, MemoryFiles(FileFolder(tmp_path)))
     second.model._setup_learn(preset.learning.total_steps)
     second.restore(saved[0])
     restored = contents(second)

@@ -1,0 +1,93 @@
+"""Stores of files that are named by their SHA-256; a folder is one."""
+
+import errno
+import os
+from collections.abc import Collection
+from pathlib import Path
+from typing import Protocol
+
+from app.storage_errors import StorageFull
+
+FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+"""Errors of a full disk."""
+SUFFIX = ".safetensors"
+
+
+class FileStore(Protocol):
+    """Files of one training."""
+
+    def write(self, sha256: str, content: bytes) -> None:
+        """Store a file that exists wholly or not at all, also after a power failure.
+
+        Raises:
+            StorageFull: No room is left.
+        """
+
+    def read(self, sha256: str) -> bytes:
+        """Return a file, which may be damaged.
+
+        Raises:
+            OSError: It is missing or cannot be read.
+        """
+
+    def keep(self, names: Collection[str]) -> None:
+        """Delete all files except some, by SHA-256."""
+
+
+class FileFolder:
+    """A folder as a store; no other files are in it.
+
+    Args:
+        folder: The folder; made with the first file.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+
+    def path(self, sha256: str) -> Path:
+        """Return the path of a file."""
+        return self._folder / f"{sha256}{SUFFIX}"
+
+    def write(self, sha256: str, content: bytes) -> None:
+        """Store a file; see :class:`FileStore`."""
+        write_durably(self.path(sha256), content)
+
+    def read(self, sha256: str) -> bytes:
+        """Return a file; see :class:`FileStore`."""
+        return self.path(sha256).read_bytes()
+
+    def keep(self, names: Collection[str]) -> None:
+        """Delete all files except some; see :class:`FileStore`."""
+        for path in self._folder.glob("*"):
+            if path.name.removesuffix(SUFFIX) not in names:
+                path.unlink(missing_ok=True)
+
+    def size(self) -> int:
+        """Return the size of all files [bytes]."""
+        return sum(path.stat().st_size for path in self._folder.glob("*"))
+
+
+def write_durably(path: Path, content: bytes) -> None:
+    """Write a file that exists wholly or not at all, also after a power failure.
+
+    Raises:
+        StorageFull: No room is left.
+    """
+    unfinished = path.with_name(f"{path.name}.unfinished")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with unfinished.open("wb") as file:
+            file.write(content)
+            file.flush()
+            os.fsync(file.fileno())
+        unfinished.replace(path)
+        folder = os.open(path.parent, os.O_RDONLY)
+        try:
+            os.fsync(folder)
+        finally:
+            os.close(folder)
+    except OSError as error:
+        unfinished.unlink(missing_ok=True)
+        if error.errno in FULL:
+            raise StorageFull(str(path.parent)) from error
+        raise

@@ -1,0 +1,161 @@
+"""Access of a worker to its job: read it, report, end it. Writes are fenced by the attempt.
+
+``StoreAccess`` uses the database; ``jobs.remote.access`` uses the routes of the service.
+"""
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any, Literal, Protocol
+
+from app.store import attempts, completion, fencing, metrics
+from app.store.database.schema import check_schema
+from app.store.engine import Store
+from app.store.records import Claim, JobRecord, NewCheckpoint, ResumeState, Spent
+from jobs import resume_files
+
+EndState = Literal["succeeded", "cancelled", "failed", "interrupted"]
+"""Ends of an attempt; an interrupted one leaves its job to the next attempt."""
+
+
+class JobAccess(Protocol):
+    """Reads and writes of one attempt about its job.
+
+    Methods raise StaleAttempt where the attempt no longer holds the job, StorageFull where no
+    room is left, and StorageUnavailable where the database or the server does not answer.
+    """
+
+    def job(self) -> JobRecord:
+        """Return the job."""
+
+    def heartbeat(self, waiting: str | None, run_s: float) -> JobRecord:
+        """Record a heartbeat and return the job.
+
+        Args:
+            waiting: Reason for which the worker cannot write.
+            run_s: Run time of all attempts [s].
+        """
+
+    def load_resume(self, usable: Callable[[ResumeState], bool]) -> ResumeState | None:
+        """Return the newest undamaged and usable state to resume from; None: there is none."""
+
+    def resume_earlier(self, step: int | None) -> None:
+        """Start from an earlier state than the job's row states; None: from the beginning."""
+
+    def record_progress(
+        self, step: int, values: Mapping[str, float | None], total_steps: int | None
+    ) -> None:
+        """Add a point to the job's curve."""
+
+    def has_point(self, step: int) -> bool:
+        """Return whether the curve has a point of that step."""
+
+    def record_checkpoint(
+        self, step: int, policy: NewCheckpoint, resume: ResumeState | None
+    ) -> None:
+        """Store a policy and the state to resume from, both or neither."""
+
+    def end(
+        self,
+        state: EndState,
+        *,
+        result: Mapping[str, Any] | None = None,
+        error: str | None = None,
+        ended_by: Spent | None = None,
+        run_s: float | None = None,
+    ) -> None:
+        """End the attempt.
+
+        Args:
+            state: Its end.
+            result: Result of the job.
+            error: Cause of a failure.
+            ended_by: The budget that ended it.
+            run_s: Run time of all attempts; None leaves it [s].
+        """
+
+
+class StoreAccess:
+    """Access by the database.
+
+    Args:
+        store: The database.
+        data_dir: The data folder, with the files of the job's replay memory.
+        claim: The attempt.
+    """
+
+    def __init__(self, store: Store, data_dir: Path, claim: Claim) -> None:
+        self.store, self._claim = store, claim
+        self._files = resume_files.folder_of(data_dir, claim.job_id)
+
+    def job(self) -> JobRecord:
+        """Return the job."""
+        return fencing.peek(self.store, self._claim)
+
+    def heartbeat(self, waiting: str | None, run_s: float) -> JobRecord:
+        """Record a heartbeat and return the job."""
+        return attempts.heartbeat(self.store, self._claim, waiting, run_s=run_s)
+
+    def load_resume(self, usable: Callable[[ResumeState], bool]) -> ResumeState | None:
+        """Return the newest undamaged and usable state."""
+        return attempts.load_resume(self.store, self._claim.job_id, usable)
+
+    def resume_earlier(self, step: int | None) -> None:
+        """Start from an earlier state."""
+        attempts.resume_earlier(self.store, self._claim, step)
+
+    def record_progress(
+        self, step: int, values: Mapping[str, float | None], total_steps: int | None
+    ) -> None:
+        """Add a point to the job's curve."""
+        attempts.record_progress(self.store, self._claim, step, values, total_steps=total_steps)
+
+    def has_point(self, step: int) -> bool:
+        """Return whether the curve has a point of that step."""
+        rows = metrics.list_metrics(
+            self.store, self._claim.job_id, after_step=step - 1, limit=1
+        )
+        return any(row.step == step for row in rows)
+
+    def record_checkpoint(
+        self, step: int, policy: NewCheckpoint, resume: ResumeState | None
+    ) -> None:
+        """Store a policy and the state to resume from."""
+        attempts.record_checkpoint(self.store, self._claim, step, policy, resume)
+
+    def end(
+        self,
+        state: EndState,
+        *,
+        result: Mapping[str, Any] | None = None,
+        error: str | None = None,
+        ended_by: Spent | None = None,
+        run_s: float | None = None,
+    ) -> None:
+        """End the attempt; the files of a job that has succeeded are deleted."""
+        if state == "failed":
+            completion.fail(self.store, self._claim, error or "")
+        elif state == "interrupted":
+            completion.give_back(self.store, self._claim)
+        else:
+            completion.finish(
+                self.store,
+                self._claim,
+                state=state,
+                result=result,
+                ended_by=ended_by,
+                run_s=run_s,
+            )
+        if state == "succeeded" and ended_by is None:
+            resume_files.remove(self._files)
+
+
+def open_access(database_url: str, data_dir: Path, claim: Claim) -> StoreAccess:
+    """Open the database for an attempt.
+
+    Raises:
+        InvalidInput: The URL names no database that works here.
+        Conflict: The database is of another version.
+    """
+    store = Store(database_url)
+    check_schema(store)
+    return StoreAccess(store, data_dir, claim)

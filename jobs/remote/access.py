@@ -1,0 +1,99 @@
+"""Access of a worker to its job by the service."""
+
+from collections.abc import Callable, Mapping
+from hashlib import sha256
+from typing import Any
+
+from httpx import Response
+from pydantic import TypeAdapter
+
+from app.store.records import JobRecord, NewCheckpoint, ResumeState, Spent
+from jobs.access import EndState
+from jobs.remote.connection import ServiceConnection
+from jobs.remote.uploads import pack_upload, read_state
+
+_JOB = TypeAdapter(JobRecord)
+
+
+class ServiceAccess:
+    """Access by the routes of the service; see :class:`jobs.access.JobAccess`.
+
+    Args:
+        service: The connection of the attempt.
+    """
+
+    def __init__(self, service: ServiceConnection) -> None:
+        self._service = service
+
+    def job(self) -> JobRecord:
+        """Return the job."""
+        return _record(self._service.send("GET", self._service.attempt))
+
+    def heartbeat(self, waiting: str | None, run_s: float) -> JobRecord:
+        """Record a heartbeat and return the job."""
+        return _record(self._send("heartbeat", {"waiting": waiting, "run_s": run_s}))
+
+    def load_resume(self, usable: Callable[[ResumeState], bool]) -> ResumeState | None:
+        """Return the newest undamaged and usable state."""
+        query: dict[str, int] = {}
+        path = f"{self._service.attempt}/state"
+        while (content := self._service.find(path, query)) is not None:
+            state = read_state(content)
+            if usable(state):
+                return state
+            query = {"below": state.step}
+        return None
+
+    def resume_earlier(self, step: int | None) -> None:
+        """Start from an earlier state."""
+        self._send("start", {"step": step})
+
+    def record_progress(
+        self, step: int, values: Mapping[str, float | None], total_steps: int | None
+    ) -> None:
+        """Add a point to the job's curve."""
+        body = {"step": step, "values": dict(values), "total_steps": total_steps}
+        self._send("progress", body)
+
+    def has_point(self, step: int) -> bool:
+        """Return whether the curve has a point of that step."""
+        job = self._service.attempt.partition("/attempts/")[0]
+        query = {"after_step": step - 1, "limit": 1}
+        found = self._service.send("GET", f"{job}/metrics", query=query).json()
+        return any(one["step"] == step for one in found["items"])
+
+    def record_checkpoint(
+        self, step: int, policy: NewCheckpoint, resume: ResumeState | None
+    ) -> None:
+        """Store a policy and the state to resume from."""
+        content, policy_bytes = pack_upload(policy, resume)
+        query = {
+            "step": step,
+            "policy_bytes": policy_bytes,
+            "sha256": sha256(content).hexdigest(),
+        }
+        path = f"{self._service.attempt}/checkpoints"
+        self._service.send("POST", path, query=query, content=content)
+
+    def end(
+        self,
+        state: EndState,
+        *,
+        result: Mapping[str, Any] | None = None,
+        error: str | None = None,
+        ended_by: Spent | None = None,
+        run_s: float | None = None,
+    ) -> None:
+        """End the attempt."""
+        body = {"state": state, "result": result, "error": error}
+        self._send("end", {**body, "ended_by": ended_by, "run_s": run_s})
+
+    def _send(self, action: str, body: Mapping[str, Any]) -> Response:
+        return self._service.send("POST", f"{self._service.attempt}/{action}", body=body)
+
+
+def _record(answer: Response) -> JobRecord:
+    found = answer.json()
+    names = JobRecord.__dataclass_fields__
+    members = {name: found.get(name) for name in names}
+    return _JOB.validate_python(members)
