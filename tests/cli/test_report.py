@@ -68,6 +68,9 @@ def test_numbers_are_written_with_interval_deviation_or_unit():
     assert StoredValue("x", "a", "rate").value(found) == "50.00 % (25.00-75.00)"
     assert StoredValue("x", "a", "time_s", "s").value(found) == "0.50 ± 0.10 s"
     assert StoredValue("x", "a", "ms", "ms").value(found) == "2 ms"
+    assert StoredValue("x", "a", "rate", "1/h").value(found) == "0.5 (0.2 to 0.8) 1/h"
+    pair = {"results": [], "paired": [{"name": "a - b", "rate": rate}]}
+    assert StoredValue("x", "a - b", "rate").value(pair) == "50.00 % (25.00-75.00)"
     assert StoredValue("x", "b", "ms", "ms").value(found) is None
     ends = [{"step": 4_000_000, "success": share, "reward": -2.0} for share in (0.2, 0.4)]
     curves = [{"name": "p", "played": [one]} for one in ends]

@@ -12,9 +12,18 @@ from app.cli.report.parts import (
     rates,
     trained,
 )
+from app.policies.configs import presets
+from app.policies.configs.reach import ReachPreset
+from app.sim.cells.cell import load_cell
+from app.sim.people.pedestrian import PedestrianSettings
+from app.sim.scenario.kernels.episode import SUCCESS_DISTANCE
 
 MOTION = "Motion (chapter 4)"
 REACH = trained("reach-ddpg-authors", "thesis-reach")
+RECIPE = presets.get("reach-ddpg-thesis")
+assert isinstance(RECIPE, ReachPreset)
+CELL, WALK = load_cell(RECIPE.cell), PedestrianSettings()
+"""Cell of the recipe, and its people."""
 UNTRAINED = "no trained policy"
 """In place of evaluations of the recipe, which is not trained to its end."""
 
@@ -41,22 +50,38 @@ MOTION_ITEMS = (
     Item(
         chapter=MOTION,
         title="Figure 4.1: walks of the human occupancy model",
-        images=(("world/walker.png", "Path, speed and radius of a pedestrian"),),
+        images=(
+            ("reach/walks.png", "Four walks of 15 s; shaded: occupied; square: robot"),
+            ("world/walker.png", "Path, speed and radius of a pedestrian"),
+        ),
         agreement="the printed function (4.1) in both; the amplitudes are drawn as the "
-        "[method](../method.md#21-human-occupancy-model) says.",
+        "[method](../method.md#21-human-occupancy-model) says. The dashed line is the walking"
+        " area of the axis (`python -m tools.docs.reach.plots`).",
     ),
     Item(
         chapter=MOTION,
         title="Table 4.1: environment",
-        measures=configured(
-            "reach-ddpg-thesis",
-            ("success reward", "20", "reward.c_s"),
-            ("collision cost", "5", "reward.c_c"),
-            ("distance cost", "1", "reward.c_d"),
-            ("action cost", "0.1", "reward.c_u"),
+        measures=(
+            Measure("action", "joint speed", f"joint {RECIPE.action.meaning}"),
+            Measure("command frequency", "50 Hz", f"{1.0 / CELL.robot.dt:g} Hz"),
+            Measure("distance threshold", "0.1 m", f"{SUCCESS_DISTANCE:g} m"),
+            Measure("joint speed, at most", "1 rad/s", f"{max(CELL.robot.qd_max):g} rad/s"),
+            Measure(
+                "speed of the person", "0.3 to 1.0 m/s", f"{WALK.v_min:g} to {WALK.v_max:g} m/s"
+            ),
+            Measure(
+                "radius of the person", "0.2 to 0.5 m", f"{WALK.r_min:g} to {WALK.r_max:g} m"
+            ),
+            *configured(
+                "reach-ddpg-thesis",
+                ("success reward", "20", "reward.c_s"),
+                ("collision cost", "5", "reward.c_c"),
+                ("distance cost", "1", "reward.c_d"),
+                ("action cost", "0.1", "reward.c_u"),
+            ),
         ),
-        agreement="the preset is the table. The authors' code has an action cost of 0.01, and "
-        "the success reward alone; `reach-ddpg-authors` repeats that.",
+        agreement="preset and cell are the table. The authors' code has an action cost of "
+        "0.01, and the success reward alone; `reach-ddpg-authors` repeats that.",
     ),
     Item(
         chapter=MOTION,
@@ -64,6 +89,7 @@ MOTION_ITEMS = (
         measures=configured(
             "reach-ddpg-thesis",
             ("training steps", "4e6", "learning.total_steps"),
+            ("length of an episode [s]", "5", "episode.time_limit_s"),
             ("discount", "0.99", "learning.gamma"),
             ("actor learning rate", "1e-3", "learning.lr_start", 10.0),
             ("critic learning rate", "1e-4", "learning.lr_start"),
@@ -244,5 +270,42 @@ MOTION_ITEMS = (
         "Under worst-case speeds the layer stops policy and planner about equally "
         "long, so that their times differ little; with measured speeds the policy "
         "with rollout is stopped far less, as in the thesis, but is not faster.",
+    ),
+    Item(
+        chapter=MOTION,
+        title="Outlook (4.5): execution time of the robot beside a person",
+        measures=(
+            *(
+                Measure(
+                    f"{who}: parts per hour",
+                    "left to future work",
+                    "",
+                    StoredValue("sorting-cycle-time", row, "parts_per_hour", "1/h"),
+                )
+                for who, row in (
+                    ("policy, SSM", "policy-nearest"),
+                    ("policy, order by its critic, SSM", "policy"),
+                    ("planner, SSM", "planner"),
+                    ("policy less planner, SSM, paired", "policy-nearest - planner"),
+                    ("policy, SSM with 0.3 m", "policy-distance"),
+                    ("planner, SSM with 0.3 m", "planner-distance"),
+                    ("robot alone", "alone"),
+                )
+            ),
+            *(
+                Measure(
+                    f"{who}, SSM: tasks without contact of the moving robot",
+                    "",
+                    "",
+                    StoredValue("sorting-cycle-time", row, "without_moving_contact"),
+                )
+                for who, row in (("policy", "policy-nearest"), ("planner", "planner"))
+            ),
+        ),
+        agreement="the thesis has no number. Each task sorts ten objects, picked and set down,"
+        " beside a person who works on; the planner moves straight to the nearest object and"
+        " does not regard the person. All rows have the same tasks, grasps and person.",
+        command="python -m app evaluate sorting-cycle-time --json"
+        " > docs/results/sorting-cycle-time.json",
     ),
 )

@@ -16,7 +16,7 @@ class StoredValue:
 
     Args:
         file: Name of the file without ``.json``.
-        row: Name of its row.
+        row: Name of its row, or of a paired difference.
         key: Key in the row: a rate, a quantity with its interval, or a number.
         unit: Unit of a quantity; empty for a rate.
     """
@@ -28,11 +28,16 @@ class StoredValue:
 
     def value(self, found: Json) -> str | None:
         """Return the number as text; None where the row or the number is missing."""
-        rows = {one["name"]: one for one in reversed(found.get("results", ()))}
+        paired = [one for one in found.get("paired", ()) if isinstance(one, dict)]
+        listed = [*found.get("results", ()), *paired]
+        rows = {one["name"]: one for one in reversed(listed)}
         value = rows.get(self.row, {}).get(self.key)
         if isinstance(value, dict) and not self.unit:
             mean, low, high = (100.0 * value[key] for key in ("mean", "low", "high"))
             return f"{mean:.2f} % ({low:.2f}-{high:.2f})"
+        if isinstance(value, dict) and "sd" not in value:
+            mean, low, high = (f"{value[key]:.1f}" for key in ("mean", "low", "high"))
+            return f"{mean} ({low} to {high}) {self.unit}"
         if isinstance(value, dict):
             return f"{value['mean']:.2f} ± {value['sd']:.2f} {self.unit}"
         return None if value is None else f"{value:.3g} {self.unit}".rstrip()

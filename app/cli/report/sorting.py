@@ -82,7 +82,11 @@ SORTING_ITEMS = (
             )
             for number in range(1, 7)
         ),
-        agreement="both solve all tests with the fewest moves. Figure 3.3 shows frames of test"
-        " 4; the live sorting cell runs the same test.",
+        images=(("sorting/test-4.gif", "Test 4, state by state; dotted: goal"),),
+        agreement="both solve all tests with the fewest moves. The recording is the simulated"
+        " part of figure 3.3 with the shipped policy: a pick fails, a person adds a large block"
+        " at the goal, and a sorted block makes room for it; percentages are failure"
+        " probabilities (`python -m tools.docs.sorting.recording`). The live sorting cell runs"
+        " the same test with the arm; its real execution cannot be repeated.",
     ),
 )

@@ -2,14 +2,15 @@
 
     python -m tools.docs.reach.plots
 
-Writes ``docs/img/reach/*.png``: heat maps of success and collisions over the targets at three
-heights (thesis fig. 4.5 and 4.6), episode durations, goals between targets, other people and
-trackers, joint trajectories of an episode, and learning curves. Pictures without results are
-skipped.
+Writes ``docs/img/reach/*.png``: four walks (thesis fig. 4.1), heat maps of success and
+collisions over the targets at three heights (fig. 4.5 and 4.6), episode durations, goals
+between targets, other people and trackers, joint trajectories of an episode, and learning
+curves. Pictures without results are skipped.
 """
 
 import json
 from collections.abc import Sequence
+from itertools import count, islice
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +18,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import Colormap, LinearSegmentedColormap, Normalize
 from matplotlib.figure import Figure
+from matplotlib.patches import Circle, Rectangle
 
+from app.sim.people.kernels.pedestrian import WALKING
+from app.sim.people.pedestrian import PedestrianSettings, Walk, walk
 from tools.docs.reach.other_plots import curves, others, smoothness
 from tools.docs.reach.style import (
     BLUE,
@@ -244,8 +248,36 @@ def _by_distance(
     )
 
 
+def walks(four: Sequence[Walk], rules: PedestrianSettings) -> Figure:
+    """Draw walks of the human occupancy model, seen from above, as in thesis fig. 4.1."""
+    figure, axes = panels(2, 2, 6.4, sharex=True, sharey=True)
+    for axis, one in zip(axes.ravel(), four, strict=True):
+        for (x, y), radius in zip(one.position[::5], one.radius[::5], strict=True):
+            axis.add_patch(Circle((x, y), radius, fc="#dbe7f5", lw=0))
+        corner, size = (rules.x_min, rules.y_min), (rules.x_max, rules.y_max)
+        width, depth = size[0] - corner[0], size[1] - corner[1]
+        axis.add_patch(Rectangle(corner, width, depth, fill=False, ec=RED, ls="--"))
+        seen = axis.scatter(*one.position[::10].T, c=one.time[::10], s=9, cmap="viridis")
+        axis.plot(0.0, 0.0, "s", color=INK, ms=7)
+        axis.set(aspect="equal", xlim=(-2.6, 1.6), ylim=(-0.2, 2.6))
+    for axis in axes[1]:
+        axis.set_xlabel("x [m]")
+    for axis in axes[:, 0]:
+        axis.set_ylabel("y [m]")
+    figure.colorbar(seen, ax=axes, label="time [s]", shrink=0.7).outline.set_visible(False)
+    return figure
+
+
+def four_walks() -> tuple[list[Walk], PedestrianSettings]:
+    """Return the first four walks of seed 11 in which nobody stays, and their rules."""
+    rules = PedestrianSettings()
+    every = (walk(rules, 11, 15.0, episode=k) for k in count())
+    return list(islice((one for one in every if (one.gait == WALKING).all()), 4)), rules
+
+
 def main() -> None:
     """Draw the pictures of all existing results."""
+    save(walks, IMAGES / "walks.png", *four_walks())
     if targets := read("reach-targets"):
         save(heat_maps, IMAGES / "targets.png", targets)
         save(start_rules, IMAGES / "starts.png", targets)
