@@ -89,7 +89,7 @@ tables: $(VENV)/dev.stamp ## write the tables of README, docs and model cards fr
 world: $(VENV)/dev.stamp ## measure, draw and write docs/world.md
 	@$(PY) -m tools.docs.world.page
 
-client: $(VENV)/dev.stamp ## write app/client/operations.py from the OpenAPI document
+client: $(VENV)/dev.stamp ## write app/client/operations/ from the OpenAPI document
 	@$(PY) -m tools.generate_client
 
 lock: $(VENV)/dev.stamp ## resolve the lock files (UPGRADE=--upgrade: newest versions)

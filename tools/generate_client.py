@@ -1,4 +1,4 @@
-"""Writes ``app/client/operations.py`` from the OpenAPI document: ``make client``."""
+"""Writes ``app/client/operations/`` from the OpenAPI document: ``make client``."""
 
 import subprocess
 import sys
@@ -11,16 +11,13 @@ from pydantic import BaseModel
 from app.main import create_app
 from app.settings import Settings
 
-TARGET = Path(__file__).parents[1] / "app" / "client" / "operations.py"
+TARGET = Path(__file__).parents[1] / "app" / "client" / "operations"
 MAX_VARIANTS = 4
 """Kinds of a body up to which each is named; above, their common base class."""
 FOR_WORKERS = {"attempts"}
 """Tags of operations that are left out: only the process of an attempt can use them."""
 PLAIN = {"integer": "int", "number": "float", "boolean": "bool", "string": "str"}
-HEAD = '''"""One method per operation of the OpenAPI document; written by ``make client``.
-
-Bodies are the service's own schemas, or mappings of their JSON. A problem raises ``Refused``.
-"""
+HEAD = '''"""Operations with the tag {tag}; written by ``make client``."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Literal
@@ -28,9 +25,22 @@ from urllib.parse import quote
 
 {imports}
 
-class Client(Transport):
-    """The operations of a server."""
+class {name}(Transport):
+    """Operations with the tag {tag}."""
 
+'''
+CLIENT = '''"""One method per operation of the OpenAPI document; written by ``make client``.
+
+Bodies are the service's own schemas, or mappings of their JSON. A problem raises ``Refused``.
+"""
+
+{imports}
+
+__all__ = ["Client"]
+
+
+class Client({names}):
+    """The operations of a server."""
 '''
 
 Node = Mapping[str, Any]
@@ -63,20 +73,37 @@ class Writer:
         self._models = models()
         self._used: set[type] = set()
 
-    def module(self) -> str:
-        """Return the whole module."""
-        methods = [
-            self._method(method, path, operation)
-            for path, operations in self._document["paths"].items()
-            for method, operation in operations.items()
-            if not FOR_WORKERS & set(operation["tags"])
-        ]
+    def modules(self) -> dict[str, str]:
+        """Return the text of each module by its name."""
+        methods: dict[str, list[str]] = {}
+        for path, operations in self._document["paths"].items():
+            for method, operation in operations.items():
+                if not FOR_WORKERS & set(operation["tags"]):
+                    methods.setdefault(operation["tags"][0], []).append(f"{method} {path}")
+        names = {tag: _module(tag) for tag in sorted(methods)}
+        found = {names[tag]: self._module(tag, of) for tag, of in sorted(methods.items())}
+        imports = "\n".join(
+            f"from app.client.operations.{name} import {_class(tag)}"
+            for tag, name in names.items()
+        )
+        text = CLIENT.replace("{imports}", imports)
+        text = text.replace("{names}", ", ".join(map(_class, names)))
+        return {"__init__": _formatted(text), **found}
+
+    def _module(self, tag: str, operations: list[str]) -> str:
+        """Return the module of a tag; ``operations`` are method and path of each."""
+        self._used = set()
+        methods = []
+        for one in operations:
+            method, _, path = one.partition(" ")
+            methods.append(self._method(method, path, self._document["paths"][path][method]))
         imports = "\n".join(
             f"from {one.__module__} import {one.__name__}"
             for one in sorted(self._used, key=lambda one: (one.__module__, one.__name__))
         )
         imports += "\nfrom app.client.transport import StreamEvent, Transport\n"
-        return _formatted(HEAD.replace("{imports}", imports) + "\n".join(methods))
+        head = HEAD.replace("{imports}", imports).replace("{name}", _class(tag))
+        return _formatted(head.replace("{tag}", tag) + "\n".join(methods))
 
     def _method(self, method: str, path: str, operation: Node) -> str:
         parameters = operation.get("parameters", [])
@@ -161,6 +188,14 @@ class Writer:
         return f"{_name(parameter)}: {kind}{default}"
 
 
+def _module(tag: str) -> str:
+    return tag.replace(" ", "_").replace("-", "_")
+
+
+def _class(tag: str) -> str:
+    return "".join(word.capitalize() for word in _module(tag).split("_")) + "Operations"
+
+
 def _name(parameter: Node) -> str:
     return str(parameter["name"]).replace("-", "_")
 
@@ -178,7 +213,7 @@ def _type(schema: Node) -> str:
 
 def _formatted(text: str) -> str:
     """Return a module as ``ruff`` formats it, without unused imports."""
-    name = ["--stdin-filename", str(TARGET), "-"]
+    name = ["--stdin-filename", str(TARGET / "module.py"), "-"]
     for command in (["check", "--quiet", "--fix-only"], ["format", "--quiet"]):
         done = subprocess.run(
             [sys.executable, "-m", "ruff", *command, *name],
@@ -191,11 +226,15 @@ def _formatted(text: str) -> str:
     return text
 
 
-def render() -> str:
-    """Return the module of the present service."""
-    return Writer(create_app(Settings.model_validate({"data": "nowhere"})).openapi()).module()
+def render() -> dict[str, str]:
+    """Return the text of each module of the package, by its name, for the present service."""
+    return Writer(create_app(Settings.model_validate({"data": "nowhere"})).openapi()).modules()
 
 
 if __name__ == "__main__":
-    TARGET.write_text(render(), "utf-8")
-    print(f"wrote {TARGET}: {len(TARGET.read_text('utf-8').splitlines())} lines")
+    TARGET.mkdir(exist_ok=True)
+    for stale in TARGET.glob("*.py"):
+        stale.unlink()
+    for name, text in render().items():
+        (TARGET / f"{name}.py").write_text(text, "utf-8")
+        print(f"wrote {name}: {len(text.splitlines())} lines")

@@ -6,8 +6,8 @@ from typing import Any
 import pytest
 from playwright.sync_api import Page, expect
 
-from tests import patient_http
 from tests.browser.test_training import GROWTH_MS, open_form
+from tests.support import patient_http
 
 pytestmark = pytest.mark.browser
 
@@ -60,6 +60,38 @@ def test_training_ends_at_its_budget_and_goes_on_with_a_larger_one(
     expect(page.locator(".is-open [data-points]")).to_have_attribute(
         "data-points", "40", timeout=GROWTH_MS
     )
+    assert len(page.problems) == 2  # type: ignore[attr-defined]  # two refusals
+
+
+def test_evaluation_is_started_with_choices_of_the_server(
+    open_page: Callable[..., Page], server: str
+) -> None:
+    page = open_page((1280, 900), scene=False)
+    open_form(page)
+    page.click('[data-kind="evaluate"]')
+    page.select_option("#evaluate-protocol", "sorting-tests")
+    expect(page.locator("#evaluate-checkpoint")).to_contain_text("default: sorting-e0")
+    expect(page.locator("#evaluate-checkpoint")).to_contain_text("sorting-e1")
+    page.select_option("#evaluate-protocol", "pick-mocap")
+    expect(page.locator("form.train").first).to_contain_text("No recording is stored yet")
+    page.fill("#evaluate-episodes", "1000000")
+    page.click("form.train [type=submit]")
+    expect(page.locator("#evaluate-episodes-error")).to_contain_text("100000")
+    page.fill("#evaluate-episodes", "2")
+    page.click("form.train [type=submit]")
+    expect(page.locator(".field-list .field-error")).to_contain_text("at least one motion")
+    page.select_option("#evaluate-protocol", "pick-single")
+    page.fill("#evaluate-name", "a look")
+    page.click("form.train [type=submit]")
+    page.wait_for_selector(".job.is-open")
+    assert state_of(page) == "succeeded"
+    made = job(server, page.get_attribute(".job.is-open", "data-job"))
+    assert (made["name"], made["spec"]["protocol"], made["seed"]) == (
+        "a look",
+        "pick-single",
+        11,
+    )
+    expect(page.locator('.is-open [data-role="rows"]')).to_contain_text("success")
     assert len(page.problems) == 2  # type: ignore[attr-defined]  # two refusals
 
 

@@ -131,7 +131,7 @@ def evaluate(
 
 def default_checkpoint(name: str) -> str:
     """Return the alias of a protocol's default checkpoint."""
-    return {SORTING: "sorting-e0", REACHING: "reach", CHOOSING: "pick"}[_task_measured(name)]
+    return {SORTING: "sorting-e0", REACHING: "reach", CHOOSING: "pick"}[task_measured(name)]
 
 
 def most_episodes(name: str) -> int:
@@ -146,7 +146,7 @@ _POLICIES = {
 }
 
 
-def _task_measured(name: str) -> str:
+def task_measured(name: str) -> str:
     """Return the purpose of the policies that a protocol evaluates."""
     if name in OF_SORTING:
         return SORTING
@@ -157,11 +157,11 @@ def _check_task(name: str, checkpoint: Checkpoint | None) -> None:
     """Check that a checkpoint is of the scenario of a protocol."""
     if checkpoint is None or name in WITHOUT_CHECKPOINT:
         return
-    wanted, actual = _task_measured(name), task_of(checkpoint)
+    wanted, actual = task_measured(name), task_of(checkpoint)
     if wanted != actual:
         found = checkpoint.manifest["preset"].get("name") or checkpoint.sha256[:12]
         fitting = set(PROTOCOLS) - WITHOUT_CHECKPOINT
-        known = sorted(one for one in fitting if _task_measured(one) == actual)
+        known = sorted(one for one in fitting if task_measured(one) == actual)
         raise InvalidInput(
             "checkpoint", found, f"must be {_POLICIES[wanted]} for {name}", known
         )

@@ -1,6 +1,6 @@
 // Forms: what is typed, one submission at a time, and the faults that the service finds in it.
-import { html, useRef, useState } from "../vendor/htm-preact-standalone.module.js";
-import { Unreachable } from "../api.js";
+import { html, useEffect, useRef, useState } from "../vendor/htm-preact-standalone.module.js";
+import { get, Unreachable } from "../api.js";
 import { Icon } from "../icons.js";
 
 /**
@@ -41,6 +41,31 @@ export function useForm({ typed: first = {}, names, onDone, prefix = "train" }) 
   return { ref, typed, faults, busy, type, submit, row, start };
 }
 
+/** The answer of a route, asked for once the server is there: its items, or the error. */
+export function useItems(link, path) {
+  const [state, setState] = useState({ items: null, error: null });
+  useEffect(() => {
+    if (link !== "live" || state.items) return;
+    get(path).then(
+      (answer) => setState({ items: answer.items, error: null }),
+      (error) => setState({ items: null, error }));
+  }, [link]);
+  return state;
+}
+
+/** What a form shows while its choices are loaded, or could not be. */
+export function Loading({ what, error }) {
+  return error
+    ? html`<p class="notice bad" role="alert"><${Icon} name="alert" />
+        The ${what} could not be loaded: ${error.message}</p>`
+    : html`<div class="skeleton tall" aria-busy="true" aria-label=${`Loading ${what}`}></div>`;
+}
+
+export const OWN = [
+  { name: "seed", default: 1, help: "Runs are reproducible for a given seed." },
+  { name: "name", default: "", help: "For the list of jobs; may be empty." },
+];
+
 /** The head of a form, and what is wrong with it as a whole. */
 export function FormHead({ title, fault, onClose }) {
   return html`<div class="train-head"><h3>${title}</h3>
@@ -61,7 +86,7 @@ export function Field({ field, text, fault, onText, prefix }) {
       ? html`<select id=${id} name=${field.name} value=${text ?? String(field.default)}
           aria-describedby=${described} aria-invalid=${String(Boolean(fault))}
           onChange=${(e) => onText(e.target.value)}>
-          ${choices(field).map((c) => html`<option key=${c} value=${c}>${c}</option>`)}</select>`
+          ${choices(field).map((c) => html`<option key=${c} value=${c}>${field.labels?.[c] ?? c}</option>`)}</select>`
       : html`<input id=${id} name=${field.name} type="text" inputmode="decimal" spellcheck="false"
           autocomplete="off" value=${text ?? show(field.default)} aria-describedby=${described}
           aria-invalid=${String(Boolean(fault))} onInput=${(e) => onText(e.target.value)} />`}

@@ -1,32 +1,16 @@
 // The form that starts a training job; every field comes from GET /v1/presets.
 import { html, useEffect, useState } from "../vendor/htm-preact-standalone.module.js";
-import { get, post } from "../api.js";
+import { post } from "../api.js";
 import { Icon } from "../icons.js";
 import { BUDGETS, budgetBody, budgetTexts } from "./budgets.js";
-import { capital, changed, FormHead, parsed, show, useForm } from "./formfields.js";
+import { capital, changed, FormHead, Loading, OWN, parsed, show, useForm } from "./formfields.js";
 
 const FIRST_FIELDS = ["cell", "learning.total_steps", "learning.n_envs", "learning.lr_start"];
-const OWN = [
-  { name: "seed", default: 1, help: "Runs are reproducible for a given seed." },
-  { name: "name", default: "", help: "For the list of jobs; may be empty." },
-];
-
-export function usePresets(link) {
-  const [state, setState] = useState({ presets: null, error: null });
-  useEffect(() => {
-    if (link !== "live" || state.presets) return;
-    get("v1/presets").then(
-      (answer) => setState({ presets: answer.items, error: null }),
-      (error) => setState({ presets: null, error }));
-  }, [link]);
-  return state;
-}
-
 /**
  * The form; `cell` is the name of the cell that is shown: what is trained is for it. With
  * `from`, a job, it starts a job like that one with the changes that are made here.
  */
-export function TrainForm({ presets, error, cell, from, onStarted, onClose }) {
+export function TrainForm({ presets: { items: presets, error }, cell, from, onStarted, onClose }) {
   const [name, setName] = useState(from?.preset ?? null);
   const preset = presets?.find((p) => p.name === name)
     ?? presets?.find((p) => p.cell === cell) ?? presets?.[0] ?? null;
@@ -46,15 +30,11 @@ export function TrainForm({ presets, error, cell, from, onStarted, onClose }) {
       : post("v1/jobs", { kind: "train", preset: preset.name, ...body, overrides: own }, key);
   };
 
-  if (error) {
-    return html`<p class="notice bad" role="alert"><${Icon} name="alert" />
-      The presets could not be loaded: ${error.message}</p>`;
-  }
   if (from && presets && preset?.name !== from.preset) {
     return html`<p class="notice bad" role="alert"><${Icon} name="alert" />
       Job ${from.number} was trained with the preset ${from.preset}, which does not exist any more.</p>`;
   }
-  if (!preset) return html`<div class="skeleton tall" aria-busy="true"></div>`;
+  if (!preset) return html`<${Loading} what="presets" error=${error} />`;
   const rest = fields.filter((f) => !FIRST_FIELDS.includes(f.name));
   const inRest = rest.some((f) => form.faults[f.name] || changed(f, values));
   const title = from ? `Clone of job ${from.number}` : "New training job";

@@ -5,10 +5,14 @@ import { Comparison, MAX_JOBS } from "./compare.js";
 import { CheckpointCards } from "./checkpointcards.js";
 import { isActive } from "./jobactions.js";
 import { JobList, QueueWaits } from "./jobs.js";
-import { TrainForm, usePresets } from "./trainform.js";
+import { EvaluateForm } from "./evaluateform.js";
+import { useItems } from "./formfields.js";
+import { TrainForm } from "./trainform.js";
+
+const KINDS = { train: ["Training", TrainForm], evaluate: ["Evaluation", EvaluateForm] };
 
 export function Training({ link, cell, jobs, error, waiting, refresh, acting, onAct }) {
-  const presets = usePresets(link);
+  const presets = useItems(link, "v1/presets");
   const [form, setForm] = useState(null);
   const [open, setOpen] = useState(undefined);
   useEffect(() => {
@@ -25,8 +29,8 @@ export function Training({ link, cell, jobs, error, waiting, refresh, acting, on
     refresh();
   };
   return html`<div class="training">
-    ${form && html`<section class="card"><${TrainForm} key=${form.from?.id} ...${presets}
-      cell=${cell} from=${form.from} onStarted=${started} onClose=${() => setForm(null)} /></section>`}
+    ${form && html`<${NewJob} key=${form.from?.id} ...${{ link, presets, cell }} from=${form.from}
+      onStarted=${started} onClose=${() => setForm(null)} />`}
     <section class="card" aria-labelledby="jobs-title">
       <header class="card-head"><h2 id="jobs-title">Jobs</h2>
         <span class="spacer"></span>
@@ -38,7 +42,7 @@ export function Training({ link, cell, jobs, error, waiting, refresh, acting, on
           data-action="compare" onClick=${() => setChosen([])}>Compare …</button>`}
         ${!chosen && !form && jobs?.length > 0 && html`<button type="button" class="primary"
           data-action="new-job" onClick=${() => setForm({})}>
-          <${Icon} name="plus" />New training job</button>`}</header>
+          <${Icon} name="plus" />New job</button>`}</header>
       ${chosen && html`<p class="field-help">Choose up to ${MAX_JOBS} jobs. Jobs that differ only in
         their seed share one curve with a band.</p>`}
       ${compared && html`<${Comparison} ids=${compared} onClose=${() => setCompared(null)} />`}
@@ -51,4 +55,16 @@ export function Training({ link, cell, jobs, error, waiting, refresh, acting, on
     </section>
     <${CheckpointCards} link=${link} jobs=${jobs} acting=${acting} />
   </div>`;
+}
+
+/** The form of a new job: a choice of its kind, or a clone of a job, of the same kind. */
+function NewJob({ from, ...rest }) {
+  const [kind, setKind] = useState(from?.kind ?? "train");
+  const [, Form] = KINDS[kind];
+  return html`<section class="card" aria-label="New job">
+    ${!from && html`<div class="segmented" role="radiogroup" aria-label="Kind of job">
+      ${Object.entries(KINDS).map(([name, [label]]) => html`<button type="button" key=${name}
+        role="radio" data-kind=${name} aria-checked=${String(name === kind)} onClick=${() => setKind(name)}>
+        ${label}</button>`)}</div>`}
+    <${Form} from=${from} ...${rest} /></section>`;
 }

@@ -98,7 +98,7 @@ def run_safety(
     seed: int,
     on_row: OnRow = ignore_row,
 ) -> dict[str, Any]:
-    """Run all rows.
+    """Evaluate the safety layer beside adversarial people, without a policy.
 
     Args:
         _checkpoint: Not used; all protocols have the same signature.

@@ -1,0 +1,129 @@
+"""Operations with the tag jobs; written by ``make client``."""
+
+from collections.abc import Iterator, Mapping
+from typing import Any, Literal
+from urllib.parse import quote
+
+from app.api.schemas.jobs import JobList, JobPublic, MetricsPublic
+from app.api.schemas.presets import PresetList
+from app.api.schemas.protocols import ProtocolList
+from app.client.transport import StreamEvent, Transport
+from jobs.spec import Budget, EvaluateSpec, JobChanges, TrainSpec
+
+
+class JobsOperations(Transport):
+    """Operations with the tag jobs."""
+
+    def create_job(
+        self,
+        body: TrainSpec | EvaluateSpec | Mapping[str, Any],
+        *,
+        idempotency_key: str | None = None,
+    ) -> JobPublic:
+        """Post a job."""
+        return self._parsed(
+            JobPublic,
+            self._send(
+                "POST", "/v1/jobs", body=body, headers={"idempotency-key": idempotency_key}
+            ),
+        )
+
+    def list_jobs(
+        self,
+        *,
+        cursor: str | None = None,
+        limit: int | None = None,
+        state: Literal["queued", "running", "cancelling", "succeeded", "failed", "cancelled"]
+        | None = None,
+    ) -> JobList:
+        """List the jobs."""
+        return self._parsed(
+            JobList,
+            self._send(
+                "GET", "/v1/jobs", query={"cursor": cursor, "limit": limit, "state": state}
+            ),
+        )
+
+    def get_job(self, job_id: str) -> JobPublic:
+        """One job."""
+        return self._parsed(JobPublic, self._send("GET", f"/v1/jobs/{quote(job_id, safe='')}"))
+
+    def update_job(self, job_id: str, body: JobChanges | Mapping[str, Any]) -> JobPublic:
+        """Change name, notes, priority or budgets of a job."""
+        return self._parsed(
+            JobPublic, self._send("PATCH", f"/v1/jobs/{quote(job_id, safe='')}", body=body)
+        )
+
+    def delete_job(self, job_id: str) -> None:
+        """Delete an ended job."""
+        self._send("DELETE", f"/v1/jobs/{quote(job_id, safe='')}")
+
+    def get_job_metrics(
+        self, job_id: str, *, after_step: int | None = None, limit: int | None = None
+    ) -> MetricsPublic:
+        """A job's learning curve."""
+        return self._parsed(
+            MetricsPublic,
+            self._send(
+                "GET",
+                f"/v1/jobs/{quote(job_id, safe='')}/metrics",
+                query={"after_step": after_step, "limit": limit},
+            ),
+        )
+
+    def stream_job(
+        self, job_id: str, *, last_event_id: int | None = None
+    ) -> Iterator[StreamEvent]:
+        """Follow a job as it runs."""
+        return self._events(
+            f"/v1/jobs/{quote(job_id, safe='')}/events",
+            headers={"last-event-id": last_event_id},
+        )
+
+    def cancel_job(self, job_id: str) -> JobPublic:
+        """Cancel a job."""
+        return self._parsed(
+            JobPublic, self._send("POST", f"/v1/jobs/{quote(job_id, safe='')}/cancel")
+        )
+
+    def resume_job(
+        self, job_id: str, body: Budget | Mapping[str, Any] | None = None
+    ) -> JobPublic:
+        """Resume an ended job."""
+        return self._parsed(
+            JobPublic,
+            self._send("POST", f"/v1/jobs/{quote(job_id, safe='')}/resume", body=body),
+        )
+
+    def retry_job(self, job_id: str, *, idempotency_key: str | None = None) -> JobPublic:
+        """Run a cancelled or failed job again."""
+        return self._parsed(
+            JobPublic,
+            self._send(
+                "POST",
+                f"/v1/jobs/{quote(job_id, safe='')}/retry",
+                headers={"idempotency-key": idempotency_key},
+            ),
+        )
+
+    def clone_job(
+        self, job_id: str, body: Mapping[str, Any], *, idempotency_key: str | None = None
+    ) -> JobPublic:
+        """Start a job like another, with changes."""
+        return self._parsed(
+            JobPublic,
+            self._send(
+                "POST",
+                f"/v1/jobs/{quote(job_id, safe='')}/clone",
+                body=body,
+                headers={"idempotency-key": idempotency_key},
+            ),
+        )
+
+    def list_presets(self) -> PresetList:
+        """List the presets."""
+        return self._parsed(PresetList, self._send("GET", "/v1/presets"))
+
+    def list_protocols(self) -> ProtocolList:
+        """List the protocols."""
+        return self._parsed(ProtocolList, self._send("GET", "/v1/protocols"))

@@ -1,0 +1,54 @@
+"""Operations with the tag recordings; written by ``make client``."""
+
+from collections.abc import Sequence
+from urllib.parse import quote
+
+from app.api.schemas.recordings import RecordingList, RecordingPublic
+from app.client.transport import Transport
+
+
+class RecordingsOperations(Transport):
+    """Operations with the tag recordings."""
+
+    def list_recordings(self) -> RecordingList:
+        """List the recordings."""
+        return self._parsed(RecordingList, self._send("GET", "/v1/recordings"))
+
+    def create_recording(
+        self,
+        content: bytes,
+        *,
+        file_name: str,
+        name: str | None = None,
+        unit: str | None = None,
+        root_unit: str | None = None,
+        up: str | None = None,
+        map: Sequence[str] | None = None,
+    ) -> RecordingPublic:
+        """Import a recording."""
+        return self._parsed(
+            RecordingPublic,
+            self._send(
+                "POST",
+                "/v1/recordings",
+                content=content,
+                query={
+                    "file_name": file_name,
+                    "name": name,
+                    "unit": unit,
+                    "root_unit": root_unit,
+                    "up": up,
+                    "map": map,
+                },
+            ),
+        )
+
+    def get_recording(self, name: str) -> RecordingPublic:
+        """One recording."""
+        return self._parsed(
+            RecordingPublic, self._send("GET", f"/v1/recordings/{quote(name, safe='')}")
+        )
+
+    def delete_recording(self, name: str) -> None:
+        """Remove a recording."""
+        self._send("DELETE", f"/v1/recordings/{quote(name, safe='')}")

@@ -1,0 +1,54 @@
+"""Operations with the tag results; written by ``make client``."""
+
+from collections.abc import Sequence
+from urllib.parse import quote
+
+from app.api.schemas.comparison import ComparisonPublic
+from app.api.schemas.evaluations import EvaluationList, EvaluationPublic
+from app.client.transport import Transport
+
+
+class ResultsOperations(Transport):
+    """Operations with the tag results."""
+
+    def get_comparison(
+        self, *, job: Sequence[str], quantity: str | None = None
+    ) -> ComparisonPublic:
+        """Compare jobs."""
+        return self._parsed(
+            ComparisonPublic,
+            self._send("GET", "/v1/comparison", query={"job": job, "quantity": quantity}),
+        )
+
+    def get_comparison_csv(self, *, job: Sequence[str]) -> str:
+        """Download the curves of jobs."""
+        return self._send("GET", "/v1/comparison/csv", query={"job": job}).text
+
+    def list_all_evaluations(
+        self,
+        *,
+        protocol: str | None = None,
+        checkpoint: str | None = None,
+        cursor: str | None = None,
+        limit: int | None = None,
+    ) -> EvaluationList:
+        """List the evaluations."""
+        return self._parsed(
+            EvaluationList,
+            self._send(
+                "GET",
+                "/v1/evaluations",
+                query={
+                    "protocol": protocol,
+                    "checkpoint": checkpoint,
+                    "cursor": cursor,
+                    "limit": limit,
+                },
+            ),
+        )
+
+    def get_evaluation(self, job_id: str) -> EvaluationPublic:
+        """One evaluation."""
+        return self._parsed(
+            EvaluationPublic, self._send("GET", f"/v1/evaluations/{quote(job_id, safe='')}")
+        )

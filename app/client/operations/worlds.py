@@ -1,0 +1,43 @@
+"""Operations with the tag worlds; written by ``make client``."""
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+from urllib.parse import quote
+
+from app.api.schemas.worlds import CommandAccepted, WorldCell, WorldList, WorldSummary
+from app.client.transport import StreamEvent, Transport
+from app.live.commands import LiveCommand
+
+
+class WorldsOperations(Transport):
+    """Operations with the tag worlds."""
+
+    def list_worlds(self) -> WorldList:
+        """List the live worlds."""
+        return self._parsed(WorldList, self._send("GET", "/v1/worlds"))
+
+    def get_world(self, world_id: str) -> dict[str, Any]:
+        """One live world, with the state a decision needs."""
+        return dict(self._send("GET", f"/v1/worlds/{quote(world_id, safe='')}").json())
+
+    def command_world(
+        self, world_id: str, body: LiveCommand | Mapping[str, Any]
+    ) -> CommandAccepted:
+        """Change a live world."""
+        return self._parsed(
+            CommandAccepted,
+            self._send("POST", f"/v1/worlds/{quote(world_id, safe='')}/commands", body=body),
+        )
+
+    def stream_world(self, world_id: str) -> Iterator[StreamEvent]:
+        """Stream a live world, ten times a second."""
+        return self._events(f"/v1/worlds/{quote(world_id, safe='')}/events")
+
+    def set_world_cell(
+        self, world_id: str, body: WorldCell | Mapping[str, Any]
+    ) -> WorldSummary:
+        """Start a live world again in another cell."""
+        return self._parsed(
+            WorldSummary,
+            self._send("PUT", f"/v1/worlds/{quote(world_id, safe='')}/cell", body=body),
+        )

@@ -1,0 +1,75 @@
+// The form that starts an evaluation; its choices come from the server.
+import { html } from "../vendor/htm-preact-standalone.module.js";
+import { post } from "../api.js";
+import * as format from "../format.js";
+import { FormHead, Loading, OWN, parsed, useForm, useItems } from "./formfields.js";
+
+const SEED = { ...OWN[0], default: 11 };
+
+export function EvaluateForm({ link, onStarted, onClose }) {
+  const protocols = useItems(link, "v1/protocols");
+  const checkpoints = useItems(link, "v1/checkpoints?limit=200");
+  const recordings = useItems(link, "v1/recordings");
+  const form = useForm({
+    names: ["protocol", "checkpoint", "episodes", "seed", "name", "recordings"],
+    prefix: "evaluate", onDone: onStarted,
+  });
+  const error = protocols.error ?? checkpoints.error ?? recordings.error;
+  if (!protocols.items || !checkpoints.items || !recordings.items) {
+    return html`<${Loading} what="choices" error=${error} />`;
+  }
+  const { typed } = form;
+  const protocol = protocols.items.find(({ name }) => name === typed.protocol) ?? protocols.items[0];
+  const chosen = typed.recordings ?? [];
+  const send = (key) => post("v1/jobs", {
+    kind: "evaluate",
+    protocol: protocol.name,
+    checkpoint: typed.checkpoint || null,
+    episodes: typed.episodes?.trim() ? parsed(typed.episodes) : null,
+    seed: parsed(typed.seed ?? String(SEED.default)),
+    name: typed.name || null,
+    ...(protocol.recordings !== "none" && { recordings: chosen }),
+  }, key);
+  return html`<form class="train" ref=${form.ref} onSubmit=${form.submit(send)} noValidate
+    aria-label="New evaluation">
+    <${FormHead} title="New evaluation" fault=${form.faults[""]} onClose=${onClose} />
+    ${form.row({ name: "protocol", choices: protocols.items.map(({ name }) => name),
+      default: protocol.name, help: protocol.title }, { protocol: protocol.name })}
+    ${protocol.purpose && form.row(checkpointField(protocol, checkpoints.items))}
+    ${form.row({ name: "episodes", default: "", minimum: 1, maximum: protocol.max_episodes,
+      help: "Empty for the evaluation's own number" })}
+    ${[SEED, OWN[1]].map((field) => form.row(field))}
+    ${protocol.recordings !== "none" && html`<${Recordings} all=${recordings.items} chosen=${chosen}
+      required=${protocol.recordings === "required"} fault=${form.faults.recordings}
+      onChange=${(names) => form.type("recordings", names)} />`}
+    <div class="train-foot">
+      <button type="submit" class="primary" disabled=${form.busy}>
+        ${form.busy ? "Starting …" : "Start evaluation"}</button>
+      <span class="faint">Runs in its own process, beside the cell.</span>
+    </div>
+  </form>`;
+}
+
+/** Stored checkpoints of the purpose of a protocol; empty is the protocol's own. */
+export function checkpointField(protocol, checkpoints) {
+  const fitting = checkpoints.filter(({ purpose }) => purpose === protocol.purpose);
+  const labels = Object.fromEntries(fitting.map((one) => [one.sha256,
+    [one.aliases[0] ?? format.short(one.sha256), one.preset ?? one.manifest.preset?.name,
+      `${format.steps(one.step ?? one.manifest.step)} steps`].filter(Boolean).join(" · ")]));
+  return {
+    name: "checkpoint", choices: ["", ...fitting.map(({ sha256 }) => sha256)], default: "",
+    labels: { "": `default: ${protocol.checkpoint}`, ...labels },
+    help: fitting.length ? "" : "No stored checkpoint is of the kind that this protocol takes",
+  };
+}
+
+function Recordings({ all, chosen, required, fault, onChange }) {
+  const toggle = (name) => onChange(chosen.includes(name)
+    ? chosen.filter((one) => one !== name) : [...chosen, name]);
+  return html`<fieldset class="field-list"><legend>Recordings${required ? "" : " (optional)"}</legend>
+    ${all.length === 0 && html`<p class="field-help">No recording is stored yet: import one in the
+      Decision panel.</p>`}
+    ${all.map(({ name }) => html`<label key=${name}><input type="checkbox" data-recording=${name}
+      checked=${chosen.includes(name)} onChange=${() => toggle(name)} /> ${name}</label>`)}
+    ${fault && html`<p class="field-error" role="alert">${fault}</p>`}</fieldset>`;
+}
