@@ -8,7 +8,7 @@ description       The OpenAPI document: answers of every operation, access, and 
                   operations
 job_requests      Jobs of requests: the one a path names, checks before one is queued,
                   its answer
-json_route        Routes of decisions: bodies validated as JSON bytes
+direct_routes     ASGI layer that answers decision routes before the routing
 known_people      Conversion of the people of a request to person states
 metrics           Metrics for Prometheus that are counted at requests
 problems          Errors as problem documents (RFC 9457, ``application/problem+json``)

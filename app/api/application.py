@@ -5,6 +5,7 @@ from contextlib import AbstractAsyncContextManager
 from pathlib import Path
 
 from fastapi import FastAPI, Request
+from fastapi.routing import APIRoute
 from opentelemetry.trace import TracerProvider
 from starlette.middleware.gzip import GZipMiddleware
 from starlette.responses import FileResponse, Response
@@ -13,6 +14,7 @@ from starlette.staticfiles import StaticFiles
 from app.api import description, problems
 from app.api.answers import Answers
 from app.api.bodies import BodyRules
+from app.api.direct_routes import DirectRoutes
 from app.api.metrics import Metrics
 from app.api.routes import (
     aliases,
@@ -116,11 +118,23 @@ def build_app(
         app.include_router(part.router)
     description.install(app)
     add_page(app, static)
+    if traces is None:
+        app.add_middleware(DirectRoutes, routes=decision_routes())
     app.add_middleware(BodyRules, files=recordings.FILES | checkpoints.FILES | attempts.FILES)
     open_paths = (SESSION_PATH, ICON_PATH, *health.PATHS)
     app.add_middleware(Guard, token=token, open_paths=open_paths)
     app.add_middleware(Answers, metrics=counts)
     return app
+
+
+def decision_routes() -> list[APIRoute]:
+    """Return the routes of decisions, without the socket."""
+    return [
+        one
+        for part in (task_selection, motion, plan, risk_map, sorting)
+        for one in part.router.routes
+        if isinstance(one, APIRoute)
+    ]
 
 
 def add_page(app: FastAPI, static: Path) -> None:

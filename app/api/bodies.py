@@ -6,13 +6,12 @@ type or size and unstorable text or integers (``texts.py``) are answered by prob
 
 from collections.abc import Mapping
 
-from starlette.datastructures import Headers
 from starlette.exceptions import HTTPException
 from starlette.routing import compile_path
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from app.api.problems import ProblemResponse, member_problem
-from app.api.security import path_of
+from app.api.security import headers_of, path_of
 from app.api.texts import fault_in_address, fault_in_json
 from app.api.validation import member
 
@@ -53,7 +52,7 @@ class BodyRules:
         if scope["type"] != "http":
             await self.app(scope, receive, send)
             return
-        path, headers = path_of(scope), Headers(scope=scope)
+        path, headers = path_of(scope), headers_of(scope)
         largest = self._largest_file(scope["method"], path)
         takes_file = largest is not None
         max_bytes = self.max_bytes if largest is None else largest
@@ -74,7 +73,7 @@ class BodyRules:
 
 
 def _refused_head(
-    scope: Scope, headers: Headers, takes_file: bool, max_bytes: int
+    scope: Scope, headers: Mapping[str, str], takes_file: bool, max_bytes: int
 ) -> ProblemResponse | None:
     """Return the problem of address, size, encoding or type; None where there is none."""
     path = path_of(scope)
@@ -100,7 +99,7 @@ def _refused_head(
     return None
 
 
-def _has_body(headers: Headers) -> bool:
+def _has_body(headers: Mapping[str, str]) -> bool:
     return headers.get("content-length", "") not in ("", "0") or "transfer-encoding" in headers
 
 
@@ -154,7 +153,7 @@ def _media_type(content_type: str) -> str:
     return content_type.partition(";")[0].strip().lower()
 
 
-def _is_form(headers: Headers) -> bool:
+def _is_form(headers: Mapping[str, str]) -> bool:
     return _media_type(headers.get("content-type", "")) == FORM
 
 

@@ -9,13 +9,12 @@ event streams cannot set that header.
 import hashlib
 import hmac
 import ipaddress
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from functools import lru_cache
 from http.cookies import CookieError, SimpleCookie
 from importlib import resources
 from urllib.parse import urlsplit
 
-from starlette.datastructures import Headers
 from starlette.responses import HTMLResponse, Response
 from starlette.types import ASGIApp, Receive, Scope, Send
 
@@ -35,6 +34,12 @@ def path_of(scope: Scope) -> str:
     """Return the path of a request below the service's root path."""
     path: str = scope["path"]
     return path.removeprefix(scope.get("root_path", ""))
+
+
+def headers_of(scope: Scope) -> dict[str, str]:
+    """Return the headers of a request by lower-case name; of equal names the first."""
+    given = reversed(scope["headers"])
+    return {name.decode("latin-1"): value.decode("latin-1") for name, value in given}
 
 
 def session_value(token: str) -> str:
@@ -78,7 +83,7 @@ class Guard:
         if scope["type"] not in ("http", "websocket"):
             await self.app(scope, receive, send)
             return
-        refusal = self.refusal(scope, Headers(scope=scope))
+        refusal = self.refusal(scope, headers_of(scope))
         if refusal is None:
             await self.app(scope, receive, send)
             return
@@ -91,12 +96,12 @@ class Guard:
         answer: Response = problem(
             status, detail, kind=kind, instance=scope["path"], data=data, headers=headers
         )
-        if status == 401 and "text/html" in Headers(scope=scope).get("accept", ""):
+        if status == 401 and "text/html" in headers_of(scope).get("accept", ""):
             answer = HTMLResponse(_sign_in_page(scope.get("root_path", "")), 401, headers)
         await answer(scope, receive, send)
 
     def refusal(
-        self, scope: Scope, headers: Headers
+        self, scope: Scope, headers: Mapping[str, str]
     ) -> tuple[int, str, str, dict[str, object]] | None:
         """Return status, kind, detail and data of a refusal, or None."""
         host = headers.get("host", "")
@@ -114,7 +119,7 @@ class Guard:
             return 401, "token-needed", detail, {}
         return None
 
-    def _proves_token(self, headers: Headers) -> bool:
+    def _proves_token(self, headers: Mapping[str, str]) -> bool:
         assert self.token is not None
         scheme, _, given = headers.get("authorization", "").partition(" ")
         if scheme.lower() == "bearer":

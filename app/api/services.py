@@ -2,13 +2,13 @@
 
 import threading
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Protocol
 
 from fastapi import Depends
-from opentelemetry.trace import Tracer
+from opentelemetry.trace import NoOpTracer, Tracer
 from starlette.concurrency import run_in_threadpool
 from starlette.requests import HTTPConnection
 
@@ -154,6 +154,12 @@ class Services:
             yield
         finally:
             self.uploads.release()
+
+    def span(self, name: str) -> AbstractContextManager[object]:
+        """Return a context with a span of this name; without traces none is made."""
+        if isinstance(self.tracer, NoOpTracer):
+            return nullcontext()
+        return self.tracer.start_as_current_span(name)
 
     def world(self, world_id: str) -> LiveWorld:
         """Return a live world.

@@ -19,7 +19,9 @@ MAX_DEPTH = 64
 _TEXT_RULE = "must hold neither NUL nor half of a surrogate pair"
 _WRONG = re.compile("[\0\ud800-\udfff]")
 # Only bodies with one of these are parsed a second time.
-_SUSPECT = re.compile(rb"\\u(?:d[89a-f]|0000)|[0-9]{19}", re.IGNORECASE)
+_SUSPECT = re.compile(rb"\\u(?:d[89a-f]|0000)", re.IGNORECASE)
+_LONG = b"0" * len(str(MAX_INTEGER))
+_AS_DIGITS = bytes(b"0"[0] if one in b"0123456789" else b" "[0] for one in range(256))
 # An unterminated string ends with the body, so that matching takes linear time.
 _STRING = re.compile(rb'"(?:[^"\\]++|\\.)*+(?:"|\\?\Z)', re.DOTALL)
 _STEPS = bytes.maketrans(b"[{]}", b"\x01\x01\xff\xff")
@@ -43,7 +45,8 @@ def fault_in_json(body: bytes) -> Member | None:
             return member("body", f"byte {body.index(0)}", "must be text in UTF-8 without NUL")
     if (depth := _depth(body)) > MAX_DEPTH:
         return member("body", f"<{depth} levels>", f"must be nested at most {MAX_DEPTH} deep")
-    if _SUSPECT.search(body) is None:
+    has_long_number = _LONG in body.translate(_AS_DIGITS)
+    if not has_long_number and (b"\\u" not in body or _SUSPECT.search(body) is None):
         return None
     try:
         found = json.loads(body)

@@ -30,7 +30,7 @@ async def answer(request: MotionRequest, services: Services) -> MotionAnswer:
     require_cell(cell, decider.actor.cell, decider.actor.cell_sha256)
 
     def decided() -> MotionAnswer:
-        with services.tracer.start_as_current_span("decision"):
+        with services.span("decision"):
             return decide(request, cell, decider, services.trackers)
 
     # A decision takes less time than a change of thread usually does, on the event loop.

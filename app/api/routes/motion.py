@@ -14,7 +14,6 @@ from fastapi import APIRouter, Query
 from starlette.websockets import WebSocket
 
 from app.api.description import MISMATCH
-from app.api.json_route import JsonRoute
 from app.api.motion.decision import answer
 from app.api.motion.stream import MotionSocket, Which
 from app.api.schemas.motion import MotionAnswer, MotionRequest
@@ -23,7 +22,7 @@ from app.api.sockets import refuse
 
 logger = logging.getLogger(__name__)
 
-router = APIRouter(prefix="/v1/motion", tags=["deciding"], route_class=JsonRoute)
+router = APIRouter(prefix="/v1/motion", tags=["deciding"])
 
 
 @router.post("", summary="Decide how the robot moves next", responses=MISMATCH)

@@ -9,7 +9,6 @@ from fastapi import APIRouter
 from starlette.concurrency import run_in_threadpool
 
 from app.api.description import MISMATCH
-from app.api.json_route import JsonRoute
 from app.api.known_people import people_for_policy
 from app.api.schemas.plan import PlanAnswer, PlanRequest
 from app.api.services import ServicesDep
@@ -18,7 +17,7 @@ from app.policies.inference.sorting_plan import SortingPlanner
 from app.sim.sorting.batch import fail_of
 from app.sim.sorting.names import names_of
 
-router = APIRouter(prefix="/v1/plan", tags=["deciding"], route_class=JsonRoute)
+router = APIRouter(prefix="/v1/plan", tags=["deciding"])
 
 
 @router.post(

@@ -7,7 +7,6 @@ from fastapi import APIRouter
 from starlette.concurrency import run_in_threadpool
 
 from app.api.description import MISMATCH
-from app.api.json_route import JsonRoute
 from app.api.known_people import people_for_policy
 from app.api.schemas.risk_map import RiskMapAnswer, RiskMapRequest
 from app.api.services import ServicesDep
@@ -15,7 +14,7 @@ from app.api.world_policies import require_task_policy
 from app.errors import InvalidInput
 from app.sim.pick.task_policy import MovedPerson
 
-router = APIRouter(prefix="/v1/risk-map", tags=["deciding"], route_class=JsonRoute)
+router = APIRouter(prefix="/v1/risk-map", tags=["deciding"])
 
 
 @router.post(

@@ -10,7 +10,6 @@ from fastapi import APIRouter
 from starlette.concurrency import run_in_threadpool
 
 from app.api.description import MISMATCH
-from app.api.json_route import JsonRoute
 from app.api.registry import SORTING_ALIASES
 from app.api.schemas.sorting import SortingAnswer, SortingRequest, outside_of
 from app.api.services import Services, ServicesDep
@@ -21,7 +20,7 @@ from app.sim.sorting.decision import decide, takes_time
 from app.sim.sorting.names import SortingNames, names_of, plain_names
 from app.sim.sorting.sorting_values import SortingValues
 
-router = APIRouter(prefix="/v1/sorting", tags=["deciding"], route_class=JsonRoute)
+router = APIRouter(prefix="/v1/sorting", tags=["deciding"])
 
 
 @router.post("", summary="Choose the next move of a sorting task", responses=MISMATCH)

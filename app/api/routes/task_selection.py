@@ -9,7 +9,6 @@ from fastapi import APIRouter
 from starlette.concurrency import run_in_threadpool
 
 from app.api.description import MISMATCH
-from app.api.json_route import JsonRoute
 from app.api.known_people import people_for_policy, take_time
 from app.api.schemas.task_selection import TaskSelection, TaskSelectionRequest
 from app.api.services import ServicesDep
@@ -18,7 +17,7 @@ from app.api.world_policies import require_task_policy
 MAX_INLINE_CANDIDATES = 32
 """Larger requests are processed on a thread, so that the event loop is not blocked."""
 
-router = APIRouter(prefix="/v1/task-selection", tags=["deciding"], route_class=JsonRoute)
+router = APIRouter(prefix="/v1/task-selection", tags=["deciding"])
 
 
 @router.post("", summary="Choose what the robot does next", responses=MISMATCH)
@@ -45,7 +44,7 @@ async def select_task(request: TaskSelectionRequest, services: ServicesDep) -> T
 
     def answer() -> TaskSelection:
         people = people_for_policy(request.people, cell, services.trackers, q)
-        span = services.tracer.start_as_current_span("decision")
+        span = services.span("decision")
         with span, request.robot.faults_in_place():
             decision = people.in_request(decide(people.people))
         services.metrics.count_outside(

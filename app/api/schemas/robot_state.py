@@ -55,7 +55,8 @@ class RobotState(Body):
         Args:
             values: Numbers in the order of the request.
         """
-        return np.array(values)[self._order()]
+        given = np.array(values)
+        return given if self.names is None else given[self._order()]
 
     def _order(self) -> list[int]:
         """Return the indices of the joints, base to wrist 3, in the request."""

@@ -11,9 +11,8 @@ from fastapi import FastAPI
 from fastapi.testclient import TestClient
 
 from app.api import problems
+from app.api.application import decision_routes
 from app.api.bodies import BodyRules
-from app.api.json_route import JsonRoute
-from app.api.routes import motion, plan, risk_map, sorting, task_selection
 from app.api.schemas import examples
 from tests.api.conftest import ADDRESS
 
@@ -60,8 +59,7 @@ def plain(client: TestClient) -> Iterator[TestClient]:
     app = FastAPI()
     app.state.services = client.app.state.services  # type: ignore[attr-defined]
     problems.install(app)
-    routers = [one.router for one in (task_selection, motion, plan, risk_map, sorting)]
-    routes = [one for router in routers for one in router.routes if isinstance(one, JsonRoute)]
+    routes = decision_routes()
     assert [one.path for one in routes] == list(BODIES)
     for route in routes:
         app.add_api_route(route.path, route.endpoint, methods=["POST"])

@@ -1,0 +1,101 @@
+"""ASGI layer that answers decision routes before the framework's routing.
+
+The route is called with its body, validated as JSON bytes, and its answer is written once.
+Whatever is no success is left to the framework, which receives the body again, so that every
+problem is written in one place. With traces this layer is not used: the framework makes the
+spans of requests.
+"""
+
+from collections.abc import Awaitable, Callable, Iterable
+from typing import Any, NamedTuple, get_type_hints
+
+from fastapi.routing import APIRoute
+from pydantic import BaseModel, ValidationError
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from app.api.security import path_of
+from app.errors import ServiceError
+
+JSON_HEAD = (b"content-type", b"application/json")
+
+
+class _Direct(NamedTuple):
+    """A route of an asynchronous function of a body, ``request``, and the services."""
+
+    route: APIRoute
+    decide: Callable[..., Awaitable[BaseModel]]
+    model: type[BaseModel]
+    """Model of the body."""
+
+
+class DirectRoutes:
+    """ASGI layer around the framework.
+
+    Args:
+        app: The framework.
+        routes: The decision routes, with the method ``POST``.
+    """
+
+    def __init__(self, app: ASGIApp, *, routes: Iterable[APIRoute]) -> None:
+        self.app = app
+        self.routes = {
+            one.path: _Direct(one, one.endpoint, get_type_hints(one.endpoint)["request"])
+            for one in routes
+        }
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Answer a request, or pass it on."""
+        is_post = scope["type"] == "http" and scope["method"] == "POST"
+        found = self.routes.get(path_of(scope)) if is_post else None
+        if found is None:
+            await self.app(scope, receive, send)
+            return
+        messages: list[Message] = []
+        content = await _answer(found, scope, receive, messages)
+        if content is None:
+            await self.app(scope, _again(messages, receive), send)
+            return
+        scope["route"] = found.route
+        length = b"content-length", str(len(content)).encode()
+        await send(
+            {"type": "http.response.start", "status": 200, "headers": [length, JSON_HEAD]}
+        )
+        await send({"type": "http.response.body", "body": content})
+
+
+async def _answer(
+    found: _Direct, scope: Scope, receive: Receive, messages: list[Message]
+) -> bytes | None:
+    """Return the answer to a request; None where the framework is to answer.
+
+    Args:
+        found: The route.
+        scope: Scope of the request.
+        receive: Receives its messages.
+        messages: Filled with the messages of the body.
+    """
+    body, more = b"", True
+    while more:
+        message = await receive()
+        messages.append(message)
+        if message["type"] != "http.request":
+            return None
+        body += message.get("body", b"")
+        more = message.get("more_body", False)
+    try:
+        request = found.model.model_validate_json(body)
+        answer: Any = await found.decide(request, scope["app"].state.services)
+    except (ValidationError, ServiceError):
+        return None
+    content: bytes = answer.__pydantic_serializer__.to_json(answer)
+    return content
+
+
+def _again(messages: list[Message], receive: Receive) -> Receive:
+    """Return a ``receive`` that repeats messages first."""
+    left = messages[::-1]
+
+    async def receive_again() -> Message:
+        return left.pop() if left else await receive()
+
+    return receive_again
