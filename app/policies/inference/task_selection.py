@@ -25,6 +25,7 @@ from app.policies.networks.outcome import OutcomePrediction
 from app.policies.networks.pick import CLEARANCE
 from app.sim.cells.cell import Cell, require_cell
 from app.sim.core.arrays import Vec
+from app.sim.core.kernels.bounds import are_inside
 from app.sim.human import model as human
 from app.sim.human.person import Person
 from app.sim.perception.observed_people import (
@@ -64,6 +65,8 @@ LONGEST_S = 60.0
 MAX_CANDIDATES = 1000
 """Maximum number of candidates of one query."""
 
+_LOWEST, _HIGHEST = np.full(3, -10.0), np.full(3, 10.0)
+"""Bounds of the coordinates of a candidate [m]."""
 _FAR_PERSON = Person(q=human.rest_posture(*FAR_AWAY), qd=np.zeros(18))
 """Observed person of an empty cell."""
 
@@ -71,12 +74,12 @@ _FAR_PERSON = Person(q=human.rest_posture(*FAR_AWAY), qd=np.zeros(18))
 def estimates(predicted: OutcomePrediction) -> tuple[OutcomeEstimate, ...]:
     """Return predicted outcomes one by one, with the intervals of their probabilities."""
     mean, spread = predicted.probability, predicted.spread
-    low, high = (mean - spread).clip(0.0, 1.0), (mean + spread).clip(0.0, 1.0)
-    success, contact = (
-        (mean[:, k].tolist(), zip(low[:, k].tolist(), high[:, k].tolist(), strict=True))
-        for k in range(2)
+    low, high = np.maximum(mean - spread, 0.0).tolist(), np.minimum(mean + spread, 1.0).tolist()
+    rows = zip(mean.tolist(), low, high, predicted.time_s.tolist(), strict=True)
+    return tuple(
+        OutcomeEstimate(mean[0], (low[0], high[0]), mean[1], (low[1], high[1]), time_s)
+        for mean, low, high, time_s in rows
     )
-    return tuple(map(OutcomeEstimate, *success, *contact, predicted.time_s.tolist()))
 
 
 def select(
@@ -297,8 +300,8 @@ def _arrays(observed: list[tuple[int | None, Person]], body: Vec) -> tuple[Vec, 
     """Return joints, joint speeds and body dimensions of people, shape (P, ...) each."""
     people = [person for _, person in observed]
     sizes = [body if person.size is None else person.size for person in people]
-    q, qd = (np.stack([getattr(one, name) for one in people]) for name in ("q", "qd"))
-    return q, qd, np.stack(sizes)
+    q, qd = np.array([one.q for one in people]), np.array([one.qd for one in people])
+    return q, qd, np.array(sizes)
 
 
 def _check_candidates(candidates: Sequence[Candidate]) -> tuple[list[str], Vec]:
@@ -314,14 +317,14 @@ def _check_candidates(candidates: Sequence[Candidate]) -> tuple[list[str], Vec]:
 
 def _positions(candidates: Sequence[Candidate]) -> Vec:
     """Return the checked positions of candidates [m], shape (n, 3)."""
-    given, limit = [candidate.position for candidate in candidates], np.full(3, 10.0)
+    given = [candidate.position for candidate in candidates]
     if all(isinstance(one, np.ndarray) and one.shape == (3,) for one in given):
         goals = np.array(given, dtype=np.float64)
-        if (np.abs(goals) <= limit).all():
+        if are_inside(goals.ravel(), _LOWEST, _HIGHEST):
             return goals
     paths = (f"candidates[{i}].position" for i in range(len(given)))
     checked = [
-        checked_vector(path, one, 3, -limit, limit, "m")
+        checked_vector(path, one, 3, _LOWEST, _HIGHEST, "m")
         for path, one in zip(paths, given, strict=True)
     ]
     return np.array(checked)

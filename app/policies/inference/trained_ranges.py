@@ -8,6 +8,7 @@ from app.policies.checkpoints.checkpoint import Checkpoint
 from app.policies.inference.value_networks import pick_preset_of
 from app.policies.networks.pick import STATE_SIZES
 from app.sim.core.arrays import Vec
+from app.sim.core.kernels.bounds import are_inside
 from app.sim.core.out_of_range import OutsideField
 from app.sim.human import model as human
 from app.sim.human.person import Person
@@ -51,8 +52,7 @@ class TrainedRanges:
             person: The observed person.
             index: Index of that person; None: a person far away.
         """
-        state, (low, high) = np.concatenate([q, qd, person.q, person.qd]), self._state
-        if ((low <= state) & (state <= high)).all():
+        if are_inside(np.concatenate([q, qd, person.q, person.qd]), *self._state):
             return ()
         path = f"people[{index or 0}]"
         alone = (
@@ -69,8 +69,10 @@ class TrainedRanges:
 
     def of_goals(self, goals: Vec) -> tuple[tuple[OutsideField, ...], ...]:
         """Return the coordinates of each target outside the range, shape (n, 3) [m]."""
-        found: list[tuple[OutsideField, ...]] = [()] * len(goals)
         low, high = self._goal
+        if are_inside(goals.ravel(), low, high):
+            return ((),) * len(goals)
+        found: list[tuple[OutsideField, ...]] = [()] * len(goals)
         for i in np.flatnonzero(((goals < low) | (goals > high)).any(axis=1)).tolist():
             found[i] = self._outside("goal", goals[i], "position", ("x", "y", "z"))
         return tuple(found)

@@ -7,7 +7,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.policies.networks.actor_critic import BASE_WEIGHT
-from app.policies.networks.forward import FEW, Flags, Floats, Layers, forward_few, width_of
+from app.policies.networks.forward import (
+    FEW,
+    Flags,
+    Floats,
+    Layers,
+    UnitsWorkspace,
+    forward_few,
+    new_units,
+)
 from app.policies.networks.outcome import (
     CLIP,
     MEMBERS,
@@ -43,8 +51,8 @@ class ActorCritic(NamedTuple):
 class Workspace(NamedTuple):
     """Work space of one call."""
 
-    units: Floats
-    """Shape (3, width of the widest layer)."""
+    units: UnitsWorkspace
+    """Of the forward passes."""
     rows: Floats
     """Inputs of the critics, shape (FEW, n_obs + n_act)."""
     inputs: Floats
@@ -59,9 +67,9 @@ class Workspace(NamedTuple):
 
 def new_workspace(networks: ActorCritic, n_obs: int, n_act: int) -> Workspace:
     """Return work space for observations and actions of these lengths."""
-    layers = (networks.actor, *networks.critics, *networks.members)
+    every = (networks.actor, *networks.critics, *networks.members)
     return Workspace(
-        np.empty((3, max(map(width_of, layers))), dtype=np.float32),
+        new_units(every, FEW),
         np.empty((FEW, n_obs + n_act), dtype=np.float32),
         np.empty((FEW, n_obs + 1), dtype=np.float32),
         np.empty(n_obs + n_act, dtype=np.bool_),

@@ -1,8 +1,8 @@
 """Forward passes of small networks for decisions, without torch.
 
 Inputs that are equal in all rows are multiplied once. Up to ``FEW`` rows are evaluated by a
-compiled function that skips units that are zero; more rows are multiplied by the matrix library
-of numpy.
+compiled function that skips units that are zero in all rows; more rows are multiplied by the
+matrix library of numpy.
 """
 
 from collections.abc import Iterable
@@ -17,8 +17,9 @@ from app.sim.geometry.capsules import copy_values
 
 Floats = NDArray[np.float32]
 Flags = NDArray[np.bool_]
+Units = NDArray[np.int64]
 
-FEW = 12
+FEW = 48
 """Number of rows up to which the compiled function is faster."""
 QUICK = {*FAST, "reassoc"}
 """Fast-math flags; the order of sums is free."""
@@ -43,10 +44,27 @@ Layers = tuple[Layer, ...]
 """Layers of a network, rectified except for the last one."""
 
 
+class UnitsWorkspace(NamedTuple):
+    """Work space of :func:`forward_few`."""
+
+    rows: Floats
+    """Units of two layers, shape (2, rows, width of the widest layer)."""
+    units: Units
+    """Indices of inputs, shape (number of inputs or units of the widest layer,)."""
+
+
+def new_units(networks: Iterable[Layers], n_rows: int) -> UnitsWorkspace:
+    """Return work space for networks and a number of rows."""
+    layers = [layer for network in networks for layer in network]
+    n_in, n_out = (max(layer.weight.shape[axis] for layer in layers) for axis in range(2))
+    rows = np.empty((2, n_rows, n_out), dtype=np.float32)
+    return UnitsWorkspace(rows, np.empty(max(n_in, n_out), dtype=np.int64))
+
+
 @kernel(inline="always")
 def _activate(layer: Layer, last: bool, row: Floats) -> None:
-    """Normalise and rectify the sums of a layer in place, shape (n_out,)."""
-    n = row.shape[0]
+    """Normalise and rectify the sums of a layer in place, shape (n_out,) or longer."""
+    n = layer.bias.shape[0]
     if layer.gain.shape[0] > 0:
         mean, square = np.float32(0.0), np.float32(0.0)
         for j in range(n):
@@ -62,54 +80,104 @@ def _activate(layer: Layer, last: bool, row: Floats) -> None:
             row[j] = max(row[j], np.float32(0.0))
 
 
+@kernel(nogil=True, fastmath=QUICK)
+def _add(rows: int, x: Floats, units: Units, n: int, weights: Floats, sums: Floats) -> None:
+    """Add n inputs times their weights, shape (n_in, n_out), to the sums of each row.
+
+    Four inputs at once: a sum is read and written once for four products, and weights that
+    were read for one row are in the first cache for the next.
+
+    Args:
+        rows: Number of rows.
+        x: Inputs, shape (rows, n_in) or larger.
+        units: Indices of the inputs, of which the first n count.
+        n: Number of inputs.
+        weights: Weights, shape (n_in, n_out).
+        sums: Sums, shape (rows, n_out) or larger.
+    """
+    whole, n_out = n - n % 4, weights.shape[1]
+    for b in range(0, whole, 4):
+        k0, k1, k2, k3 = units[b], units[b + 1], units[b + 2], units[b + 3]
+        w0, w1, w2, w3 = weights[k0], weights[k1], weights[k2], weights[k3]
+        for i in range(rows):
+            x0, x1, x2, x3, row = x[i, k0], x[i, k1], x[i, k2], x[i, k3], sums[i]
+            for j in range(n_out):
+                row[j] += x0 * w0[j] + x1 * w1[j] + x2 * w2[j] + x3 * w3[j]
+    for b in range(whole, n):
+        for i in range(rows):
+            factor, weight, row = x[i, units[b]], weights[units[b]], sums[i]
+            for j in range(n_out):
+                row[j] += factor * weight[j]
+
+
 @kernel(inline="always")
-def _add(factor: np.float32, weights: Floats, row: Floats) -> None:
-    """Add multiples of the weights of one input, shape (n_out,), to the sums of a layer."""
-    for j in range(row.shape[0]):
-        row[j] += factor * weights[j]
+def _nonzero(rows: int, x: Floats, n_in: int, units: Units) -> int:
+    """Write the indices of the inputs that are not zero in all rows; return their number."""
+    n = 0
+    for k in range(n_in):
+        for i in range(rows):
+            if x[i, k] != 0.0:
+                units[n] = k
+                n += 1
+                break
+    return n
+
+
+@kernel(inline="always")
+def _inputs_where(varying: Flags, differs: bool, units: Units) -> int:
+    """Write the indices of the inputs that differ between rows, or do not; return how many."""
+    n = 0
+    for k in range(varying.shape[0]):
+        if varying[k] == differs:
+            units[n] = k
+            n += 1
+    return n
 
 
 @kernel(nogil=True, fastmath=QUICK)
-def forward_few(layers: Layers, x: Floats, varying: Flags, work: Floats, out: Floats) -> None:
+def forward_few(
+    layers: Layers, x: Floats, varying: Flags, work: UnitsWorkspace, out: Floats
+) -> None:
     """Write the outputs of a network for a few rows.
 
     Args:
         layers: The network.
         x: Inputs, shape (n, n_in).
         varying: Whether an input differs between rows, shape (n_in,).
-        work: Work space, shape (3, width of the widest layer).
+        work: Work space for n rows.
         out: Filled, shape (n, n_out).
     """
-    first, n_layers = layers[0], len(layers)
-    shared = work[0, : first.bias.shape[0]]
-    copy_values(first.bias, shared)
-    for k in range(x.shape[1]):
-        if not varying[k]:
-            _add(x[0, k], first.weight[k], shared)
-    for i in range(x.shape[0]):
-        now = work[1, : shared.shape[0]]
-        copy_values(shared, now)
-        for k in range(x.shape[1]):
-            if varying[k]:
-                _add(x[i, k], first.weight[k], now)
-        _activate(first, n_layers == 1, now)
-        for d in range(1, n_layers):
-            layer = layers[d]
-            after = work[1 + d % 2, : layer.bias.shape[0]]
-            copy_values(layer.bias, after)
-            for k in range(now.shape[0]):
-                if now[k] != 0.0:
-                    _add(now[k], layer.weight[k], after)
-            _activate(layer, d == n_layers - 1, after)
-            now = after
-        copy_values(now, out[i])
+    first, n_layers, rows = layers[0], len(layers), x.shape[0]
+    units, shared, now = work.units, work.rows[0], work.rows[1]
+    copy_values(first.bias, shared[0])
+    n = _inputs_where(varying, False, units)
+    _add(1, x, units, n, first.weight, shared)
+    n = _inputs_where(varying, True, units)
+    for i in range(rows):
+        copy_values(shared[0], now[i])
+    _add(rows, x, units, n, first.weight, now)
+    for i in range(rows):
+        _activate(first, n_layers == 1, now[i])
+    for d in range(1, n_layers):
+        layer, after = layers[d], work.rows[1 - d % 2]
+        n = _nonzero(rows, now, layer.weight.shape[0], units)
+        for i in range(rows):
+            copy_values(layer.bias, after[i])
+        _add(rows, now, units, n, layer.weight, after)
+        for i in range(rows):
+            _activate(layer, d == n_layers - 1, after[i])
+        now = after
+    for i in range(rows):
+        for j in range(out.shape[1]):
+            out[i, j] = now[i, j]
 
 
 @kernel(nogil=True, fastmath=QUICK)
 def _activate_rows(layer: Layer, sums: Floats, last: bool, rows: Floats) -> None:
     """Add ``sums``, shape (n_out,), to rows, shape (n, n_out); normalise and rectify them."""
     for i in range(rows.shape[0]):
-        _add(np.float32(1.0), sums, rows[i])
+        for j in range(sums.shape[0]):
+            rows[i, j] += sums[j]
         _activate(layer, last, rows[i])
 
 
@@ -125,11 +193,6 @@ def layers_of(modules: Iterable[nn.Module]) -> Layers:
             gain, shift = (p.detach().numpy().copy() for p in (module.weight, module.bias))
             layers[-1] = layers[-1]._replace(gain=gain, shift=shift)
     return tuple(layers)
-
-
-def width_of(layers: Layers) -> int:
-    """Return the number of units of the widest layer."""
-    return max(len(layer.bias) for layer in layers)
 
 
 def forward_many(layers: Layers, x: Floats, varying: Flags) -> Floats:

@@ -19,6 +19,7 @@ import numpy as np
 
 from app.errors import InvalidInput, digits, interval
 from app.sim.core.arrays import Vec, as_kernel_array
+from app.sim.core.kernels.bounds import are_inside
 from app.sim.human import model as human
 from app.sim.human.kernels.kinematics import N_SIZE, PELVIS_Z
 from app.sim.human.person import Person
@@ -170,7 +171,7 @@ def _brought_near(person: Person) -> Person:
     """Return a person within the known distance; the same object if it is within already."""
     cylinder = person.cylinder
     there = person.q[:2] if cylinder is None else cylinder[:2]
-    away, most = float(np.abs(there).max()), float(human.Q_MAX[0])
+    away, most = max(abs(float(there[0])), abs(float(there[1]))), float(human.Q_MAX[0])
     if away <= most + _SLACK:
         return person
     here = most / away * there
@@ -186,8 +187,8 @@ def _is_known(person: Person) -> bool:
         parts = (person.q, person.qd, person.cylinder)
     values = np.concatenate(parts)
     n = len(values)
-    inside = (_KNOWN_LOW[:n] <= values) & (values <= _KNOWN_HIGH[:n])
-    if not inside.all() or not abs(person.growth) <= KNOWN_GROWTH:
+    inside = are_inside(values, _KNOWN_LOW[:n], _KNOWN_HIGH[:n])
+    if not inside or not abs(person.growth) <= KNOWN_GROWTH:
         return False
     return person.past is None or bool((person.past <= _KNOWN_PAST).all())
 

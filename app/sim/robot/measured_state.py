@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike
 
 from app.errors import InvalidInput, interval
 from app.sim.core.arrays import Vec, as_kernel_array
+from app.sim.core.kernels.bounds import are_inside
 from app.sim.core.out_of_range import OutsideField
 from app.sim.robot.kernels.arm import Arm
 from app.sim.robot.kernels.joints import JointLimits
@@ -42,6 +43,7 @@ FREE = 1e3
 TURN = 2.0 * math.pi
 PARTS = (("q", "rad"), ("qd", "rad/s"), ("qdd", "rad/s^2"))
 """The vectors of a state, and their units."""
+_AT_REST = np.zeros(6)
 
 
 class Joints(NamedTuple):
@@ -80,6 +82,7 @@ class StateLimits:
         overrun = 0.5 * (1.0 + RATE_TOLERANCE) * arm.limits.qd_max * stop_s
         self._low = np.stack([arm.limits.q_min, -arm.limits.qd_max, -arm.limits.qdd_max])
         self._high = np.stack([arm.limits.q_max, arm.limits.qd_max, arm.limits.qdd_max])
+        self._bounds = (self._low - SLACK).ravel(), (self._high + SLACK).ravel()
         self._tolerance = np.stack(
             [
                 POSITION_TOLERANCE + np.minimum(overrun, LONGEST_OVERRUN),
@@ -102,12 +105,12 @@ class StateLimits:
             InvalidInput: Another number of joints, a number that is not finite, or one that is
                 farther outside its limits than a robot is measured.
         """
-        given = (q, qd, np.zeros(6) if qdd is None else qdd)
-        state = np.stack([_six(name, one) for (name, _), one in zip(PARTS, given, strict=True)])
+        given = (q, qd, _AT_REST if qdd is None else qdd)
+        state = np.array([_six(name, one) for (name, _), one in zip(PARTS, given, strict=True)])
         measured = Joints(*state)
-        inside = (self._low - SLACK <= state) & (state <= self._high + SLACK)
-        if inside.all():
+        if are_inside(state.ravel(), *self._bounds):
             return MeasuredState(measured, measured, ())
+        inside = (self._low - SLACK <= state) & (state <= self._high + SLACK)
         self._require_near(state)
         outside = tuple(
             OutsideField(

@@ -6,7 +6,7 @@ import torch
 from torch import nn
 
 from app.policies.networks.actor_critic import hidden
-from app.policies.networks.forward import forward_few, forward_many, layers_of, width_of
+from app.policies.networks.forward import forward_few, forward_many, layers_of, new_units
 
 
 @pytest.mark.parametrize("n", [1, 3, 300])
@@ -22,7 +22,7 @@ def test_outputs_are_those_of_torch(n: int, layers: int, normed: bool) -> None:
     with torch.inference_mode():
         expected = network(x).numpy()
     weights, found = layers_of(network), np.empty((n, 3), dtype=np.float32)
-    units = np.empty((3, width_of(weights)), dtype=np.float32)
+    units = new_units([weights], n)
     forward_few(weights, x.numpy(), varying, units, found)
     np.testing.assert_allclose(found, expected, atol=1e-5)
     np.testing.assert_allclose(forward_many(weights, x.numpy(), varying), expected, atol=1e-5)
