@@ -3,9 +3,9 @@
     python -m tools.docs.thesis_curves thesis-reach RUN ...
 
 A RUN is a folder with a ``curve.jsonl``, as written by ``training_curves.py``. Its points are
-greedy episodes during the training: in the reach recipes 20 for each of 54 targets by default.
-A reach curve also has the return of standing still in the same episodes. A curve of the same
-preset and seed replaces the one in the file.
+greedy episodes during the training: in the reach recipes 20 for each of 54 targets by default,
+in the pick recipe 200. Their curves also have the return of standing still in these episodes.
+A curve of the same preset and seed replaces the one in the file.
 """
 
 import argparse
@@ -17,9 +17,11 @@ import torch
 
 from app.policies.configs import presets
 from app.policies.configs.fields import read_config
+from app.policies.configs.pick import PickPreset
 from app.policies.configs.reach import ReachPreset
-from app.policies.training.reach import batch_of
-from app.policies.training.td3 import CURVE_SEED, play
+from app.policies.configs.sorting import SortingPreset
+from app.policies.training import pick, reach
+from app.policies.training.td3 import CURVE_SEED, PlayedBatch, play
 from app.provenance import describe
 from app.sim.cells.cell import load_cell
 from tools.docs.learning_curves import lines, merged
@@ -34,11 +36,19 @@ Json = dict[str, Any]
 
 
 class Still(torch.nn.Module):
-    """Actor that commands no motion."""
+    """Actor that commands no motion.
+
+    Args:
+        n_act: Length of an action.
+    """
+
+    def __init__(self, n_act: int) -> None:
+        super().__init__()
+        self._n_act = n_act
 
     def forward(self, obs: torch.Tensor) -> torch.Tensor:
-        """Return actions of 0, shape (n, 6)."""
-        return torch.zeros(len(obs), 6)
+        """Return actions of 0, shape (n, n_act)."""
+        return torch.zeros(len(obs), self._n_act)
 
 
 def curve_of(folder: Path) -> Json:
@@ -49,17 +59,23 @@ def curve_of(folder: Path) -> Json:
         "seed": points[0]["seed"],
         "played": [{key: one[key] for key in KEYS} for one in points],
     }
-    if isinstance(presets.get(curve["name"]), ReachPreset):
-        manifest = read(sorted(folder.glob("step-*.json"))[-1].with_suffix("")).manifest
-        preset = read_config(ReachPreset, manifest["preset"], "manifest.preset")
-        curve["standing_still"] = standing_still(preset)
+    manifest = read(sorted(folder.glob("step-*.json"))[-1].with_suffix("")).manifest
+    kind = type(presets.get(curve["name"]))
+    preset = read_config(kind, manifest["preset"], "manifest.preset")
+    if not isinstance(preset, SortingPreset):
+        if preset.learning.progress_episodes > 0:
+            curve["standing_still"] = standing_still(preset)
     return curve
 
 
-def standing_still(preset: ReachPreset) -> float:
+def standing_still(preset: ReachPreset | PickPreset) -> float:
     """Return the mean return of standing still in the episodes of the curve of a preset."""
-    n = preset.learning.progress_episodes
-    _, returns = play(Still(), batch_of(preset, load_cell(preset.cell), n, CURVE_SEED))
+    cell = load_cell(preset.cell)
+    if isinstance(preset, PickPreset):
+        batch: PlayedBatch = pick.curve_batch(preset, cell)
+    else:
+        batch = reach.curve_batch(preset, cell)
+    _, returns = play(Still(batch.n_act), batch)
     return float(returns.mean())
 
 

@@ -117,6 +117,12 @@ def batch_of(preset: PickPreset, cell: Cell, n_envs: int, seed: int) -> PickBatc
     return kind(cell, n_envs, seed, settings)
 
 
+def curve_batch(preset: PickPreset, cell: Cell) -> PickBatch:
+    """Return the environments of a point of the curve; robots start at the sampled starts."""
+    n = preset.learning.progress_episodes
+    return PickBatch(cell, n, CURVE_SEED, settings_of(preset))
+
+
 def exploration_of(preset: PickPreset, batch: PickBatch, seed: int) -> Exploration:
     """Return the exploration of a preset."""
     rng, config = np.random.default_rng(seed), preset.exploration
@@ -233,8 +239,8 @@ class PickReporter(Reporter):
         self._returns = np.zeros(run.preset.learning.n_envs)
         self._counts = np.zeros(len(OUTCOMES), dtype=np.int64)
         self._total_return, self._run = 0.0, run
-        n, usual = run.preset.learning.progress_episodes, settings_of(run.preset)
-        self._test_batch = PickBatch(run.cell, n, CURVE_SEED, usual) if n else None
+        plays = run.preset.learning.progress_episodes > 0
+        self._test_batch = curve_batch(run.preset, run.cell) if plays else None
 
     def load_state_dict(self, state: Mapping[str, Any]) -> None:
         """Restore a state, and the collision cost and the starts of its step."""

@@ -70,6 +70,11 @@ def batch_of(preset: ReachPreset, cell: Cell, n_envs: int, seed: int) -> ReachEn
     return new_reach_batch(cell, n_envs, seed, settings)
 
 
+def curve_batch(preset: ReachPreset, cell: Cell) -> ReachEnvironments:
+    """Return the environments of a point of the curve."""
+    return batch_of(preset, cell, preset.learning.progress_episodes, CURVE_SEED)
+
+
 def exploration_of(
     config: ReachExploration, batch: ReachEnvironments, seed: int
 ) -> Exploration:
@@ -148,8 +153,7 @@ class ReachReporter(Reporter):
         super().__init__(run, callbacks)
         self._run, self._monitor, preset = run, monitor, run.preset
         assert isinstance(preset, ReachPreset)
-        n = preset.learning.progress_episodes
-        self._test_batch = batch_of(preset, run.cell, n, CURVE_SEED)
+        self._test_batch = curve_batch(preset, run.cell)
 
     def watch(self, rewards: NDArray[np.floating]) -> None:
         """Update the training range."""

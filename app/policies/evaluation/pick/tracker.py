@@ -25,7 +25,7 @@ import numpy as np
 from app.policies.checkpoints.checkpoint import Checkpoint
 from app.policies.evaluation.pick import selection_rules as choice_rules
 from app.policies.evaluation.pick.episodes import Index, Seen, Sight, seen_exactly
-from app.policies.evaluation.pick.tasks import evaluator_of, settings_of
+from app.policies.evaluation.pick.tasks import evaluators_of, settings_of
 from app.policies.evaluation.rows import OnRow, ignore_row
 from app.policies.inference.task_selection import HYSTERESIS
 from app.sim.core.arrays import Vec
@@ -174,7 +174,7 @@ def run_tracker(
         seed: Seed of the episodes and of the disturbances.
         on_row: Callback for each finished row.
     """
-    evaluator = evaluator_of(checkpoint, (2, 3), episodes or DEFAULT_EPISODES, seed)
+    evaluator = evaluators_of(checkpoint, (2, 3), episodes or DEFAULT_EPISODES, seed)[""]
     rule, results = choice_rules.critic(HYSTERESIS), []
     looks: dict[str, Seen] = {"exact": seen_exactly}
     looks |= {name: KeypointObserver(row, seed) for name, row in ROWS.items()}

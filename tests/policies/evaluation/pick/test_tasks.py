@@ -7,11 +7,12 @@ import pytest
 
 from app.errors import InvalidInput, NotFound
 from app.policies.checkpoints import pretrained
-from app.policies.configs.pick import PickPreset
+from app.policies.configs.pick import THESIS, PickPreset
 from app.policies.evaluation.pick import selection_rules as choice_rules
 from app.policies.evaluation.pick.episodes import Evaluator, View, seen_exactly, settings_for
 from app.policies.evaluation.registry import evaluate
 from app.policies.inference.value_networks import ValueNetworks
+from app.policies.training.pick import start
 from app.sim.cells.cell import load_cell
 
 
@@ -146,3 +147,21 @@ def test_people_at_rest_do_not_move_and_timeouts_have_their_causes():
     for row in result["results"]:
         assert row["timeout_blocked"]["mean"] <= row["timeout"]["mean"]
         assert row["timeout_alone"]["mean"] <= row["timeout"]["mean"]
+
+
+def test_reaching_is_evaluated_within_10_s_and_20_s():
+    policy = start(THESIS, 4, load_cell(THESIS.cell))[0].policy()
+    single = evaluate("pick-single", policy, episodes=12, seed=3)
+    assert [row["name"] for row in single["results"]] == ["policy", "20 s policy"]
+    assert single["settings"]["time_limit_s"] == 10.0
+    assert single["settings"]["grasp"] == "reach only"
+    short, long = single["results"]
+    assert long["timeout"]["mean"] <= short["timeout"]["mean"]
+    assert single["fcl_recheck"]["episodes"] == 12
+    choice = evaluate("pick-choice", policy, episodes=4, seed=3)
+    names = [row["name"] for row in choice["results"]]
+    assert names[0] == "critic" and names[len(names) // 2] == "20 s critic"
+    assert {row["name"].split(" - ")[0] for row in choice["paired"]} == {
+        "critic",
+        "20 s critic",
+    }
