@@ -250,7 +250,7 @@ def _by_distance(
 
 def walks(four: Sequence[Walk], rules: PedestrianSettings) -> Figure:
     """Draw walks of the human occupancy model, seen from above, as in thesis fig. 4.1."""
-    figure, axes = panels(2, 2, 6.4, sharex=True, sharey=True)
+    figure, axes = panels(2, 2, 5.6, sharex=True, sharey=True)
     for axis, one in zip(axes.ravel(), four, strict=True):
         for (x, y), radius in zip(one.position[::5], one.radius[::5], strict=True):
             axis.add_patch(Circle((x, y), radius, fc="#dbe7f5", lw=0))
