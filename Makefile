@@ -43,7 +43,7 @@ SAY := @printf '==> %s\n'
 
 export PYTHONUNBUFFERED = 1
 
-.PHONY: help run setup test test-browser test-postgres test-slow check format bench tables world docs client lock clean
+.PHONY: help run setup test test-browser test-postgres test-ray test-slow check format bench tables world docs client lock clean
 
 help: ## list the targets
 	@grep -E '^[a-z-]+:.*## ' Makefile | sed -E 's/:.*## /\t/' | expand -t 16
@@ -61,6 +61,9 @@ test-browser: $(VENV)/dev.stamp ## the page in a real Chromium
 
 test-postgres: $(VENV)/dev.stamp ## store and supervisor on a PostgreSQL server of the tests
 	@$(PY) -m pytest -m 'postgres and not slow' $(SIDE_BY_SIDE) tests/store tests/jobs
+
+test-ray: $(VENV)/dev.stamp $(VENV)/setup.stamp ## jobs on a Ray cluster of two nodes on this machine
+	@$(PY) -m pytest -m ray tests/jobs
 
 test-slow: $(VENV)/dev.stamp ## tests that train
 	@$(PY) -m pytest -m slow
@@ -95,7 +98,7 @@ client: $(VENV)/dev.stamp ## write app/client/operations/ from the OpenAPI docum
 lock: $(VENV)/dev.stamp ## resolve the lock files (UPGRADE=--upgrade: newest versions)
 	@$(PIP) install --quiet uv==$(UV)
 	@$(RESOLVE) --extra postgres -o requirements.lock
-	@$(RESOLVE) --extra postgres --extra dev --extra docs --extra onnx --extra otel -c requirements.lock -o requirements-dev.lock
+	@$(RESOLVE) --extra postgres --extra ray --extra dev --extra docs --extra onnx --extra otel -c requirements.lock -o requirements-dev.lock
 
 clean: ## remove the virtual environment and the caches
 	rm -rf $(VENV) .mypy_cache .ruff_cache .pytest_cache .import_linter_cache

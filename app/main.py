@@ -6,6 +6,7 @@ applications may exist in one process.
 """
 
 import gc
+import importlib.util
 import logging
 import threading
 from collections.abc import AsyncIterator, Mapping
@@ -30,7 +31,7 @@ from app.api.registry import (
 )
 from app.api.service_state import ServiceState
 from app.api.services import LiveWorld, Services
-from app.errors import Damaged, NotReady, ServiceError
+from app.errors import Damaged, InvalidInput, MissingPackage, NotReady, ServiceError
 from app.live.reach.interfaces import LiveReachPolicy
 from app.policies.checkpoints import pretrained
 from app.policies.checkpoints.checkpoint import CHOOSING, SORTING, load, require_purpose
@@ -49,11 +50,12 @@ from app.store.checkpoints import find_damaged
 from app.store.engine import Store
 from jobs.cell_catalog import CellCatalog
 from jobs.checkpoints import shipped
+from jobs.executor import Executor, LocalProcess
 from jobs.import_process import ImportProcess
 from jobs.recording_catalog import RecordingCatalog
 from jobs.remote.uploads import WorkerUploads
 from jobs.retention import Retention
-from jobs.supervisor import Supervisor
+from jobs.supervisor import Supervisor, Timeouts
 from web.viewer.loop import LiveCell
 
 logger = logging.getLogger(__name__)
@@ -65,6 +67,8 @@ STOP_S = 5.0
 """Time for the compilation of kernels to end when the service stops [s]."""
 RETRY_S = 1.0
 """Time from a failed write of the start to its repetition [s]."""
+RAY_SHUTDOWN_S = 30.0
+"""Time for the last checkpoints of workers on a Ray cluster when the service stops [s]."""
 STATIC = Path(web.__file__).parent / "page"
 
 
@@ -133,6 +137,8 @@ class Service:
             store,
             settings.data,
             max_running=settings.max_jobs,
+            executor=executor_of(settings),
+            timeouts=Timeouts(shutdown_s=RAY_SHUTDOWN_S) if settings.ray else None,
             retention=retention,
             tracer=tracer,
         )
@@ -225,6 +231,28 @@ class Service:
                 return
             if damage is not None:
                 names.mark_damaged(damage)
+
+
+def executor_of(settings: Settings) -> Executor:
+    """Return the executor of jobs: a Ray cluster, or processes of this machine.
+
+    Raises:
+        MissingPackage: Ray is not installed.
+        InvalidInput: Workers cannot know the address of this server.
+    """
+    data = settings.data
+    if settings.ray is None:
+        return LocalProcess(settings.database, data)
+    if importlib.util.find_spec("ray") is None:
+        raise MissingPackage("ray", "TANDEM_RAY", "install the extra 'ray'")
+    unknown = settings.host in ("0.0.0.0", "::") or settings.port == 0
+    if settings.worker_url is None and unknown:
+        rule = "must be set for TANDEM_RAY: workers cannot know the address of this server"
+        raise InvalidInput("TANDEM_WORKER_URL", None, rule)
+    given = {"TANDEM_RAY": settings.ray, "TANDEM_WORKER_URL": settings.worker_address}
+    if settings.secret is not None:
+        given["TANDEM_TOKEN"] = settings.secret
+    return LocalProcess(settings.database, data, "jobs.remote.ray_driver", given)
 
 
 def assemble(

@@ -28,6 +28,9 @@ class Settings(BaseSettings):
     database_url: str | None = Field(
         None, min_length=1, description="SQLAlchemy URL; a SQLite file in `data` if unset."
     )
+    ray: str | None = Field(
+        None, min_length=1, description="Ray cluster that runs the jobs; this machine if unset."
+    )
     max_jobs: int = Field(1, ge=1, le=1000, description="Jobs that run at once.")
     worker_url: str | None = Field(
         None,

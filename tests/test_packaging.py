@@ -16,6 +16,8 @@ ROOTS = ("app", "jobs", "web")
 EXTRAS = {
     "app/client/transport.py": "client",
     "app/policies/inference/onnx_export.py": "onnx",
+    "jobs/remote/connection.py": "ray",
+    "jobs/remote/ray_driver.py": "ray",
     "tools/distance_fields.py": "dev",
 }
 """Modules that are imported only where an extra is installed."""
@@ -57,7 +59,10 @@ def test_every_declared_package_is_locked_but_torch() -> None:
     runtime, everything = pins("requirements.lock"), pins("requirements-dev.lock")
     for lines, lock in (
         (PROJECT["project"]["dependencies"], runtime),
-        (extras["dev"] + extras["client"] + extras["onnx"] + extras["otel"], everything),
+        (
+            extras["dev"] + extras["client"] + extras["onnx"] + extras["otel"] + extras["ray"],
+            everything,
+        ),
     ):
         for requirement in map(Requirement, lines):
             if requirement.name != "torch":

@@ -3,12 +3,22 @@ from pathlib import Path
 import pytest
 
 from app.errors import InvalidInput
+from app.main import executor_of
 from app.settings import Settings, check_access, load_settings
 
 
 @pytest.fixture(autouse=True)
 def no_settings(monkeypatch: pytest.MonkeyPatch) -> None:
-    for name in ("HOST", "PORT", "DATA", "DATABASE_URL", "TOKEN", "ROOT_PATH"):
+    for name in (
+        "HOST",
+        "PORT",
+        "DATA",
+        "DATABASE_URL",
+        "TOKEN",
+        "ROOT_PATH",
+        "RAY",
+        "WORKER_URL",
+    ):
         monkeypatch.delenv(f"TANDEM_{name}", raising=False)
 
 
@@ -72,3 +82,29 @@ def test_loopback_needs_no_token(host: str) -> None:
 
 def test_token_does_not_show_in_the_settings_text() -> None:
     assert "a-secret-of-some-length" not in repr(Settings(token="a-secret-of-some-length"))
+
+
+@pytest.mark.parametrize(
+    ("host", "expected"),
+    [("127.0.0.1", "http://127.0.0.1:8130"), ("::1", "http://[::1]:8130")],
+)
+def test_workers_find_the_server_by_host_and_port(host: str, expected: str) -> None:
+    assert load_settings(host=host, port=8130).worker_address == expected
+    proxy = "https://lab.example.org/tandem"
+    assert load_settings(host=host, worker_url=proxy).worker_address == proxy
+
+
+@pytest.mark.parametrize("value", ["lab:8000", "ftp://lab", "http://lab/", "http://lab?a=b"])
+def test_address_for_workers_that_is_none_is_refused(
+    monkeypatch: pytest.MonkeyPatch, value: str
+) -> None:
+    monkeypatch.setenv("TANDEM_WORKER_URL", value)
+    with pytest.raises(InvalidInput, match="TANDEM_WORKER_URL"):
+        load_settings()
+
+
+@pytest.mark.parametrize(("host", "port"), [("0.0.0.0", 8000), ("127.0.0.1", 0)])
+def test_cluster_needs_an_address_of_the_server(host: str, port: int, tmp_path: Path) -> None:
+    settings = load_settings(host=host, port=port, data=tmp_path, ray="10.0.0.5:6379")
+    with pytest.raises(InvalidInput, match="TANDEM_WORKER_URL = None must be set for"):
+        executor_of(settings)

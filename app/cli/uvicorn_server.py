@@ -10,6 +10,7 @@ from types import FrameType
 
 import uvicorn
 from fastapi import FastAPI
+from starlette.concurrency import run_in_threadpool
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from app.cli.http_limits import LimitedHttp
@@ -35,6 +36,13 @@ class Server(uvicorn.Server):
         if services is not None:
             services.stopping.set()
         super().handle_exit(sig, frame)
+
+    async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+        """Stop the jobs, whose workers may write over HTTP, then stop as uvicorn does."""
+        services = getattr(self._app.state, "services", None)
+        if services is not None:
+            await run_in_threadpool(services.supervisor.stop)
+        await super().shutdown(sockets)
 
 
 def new_server(

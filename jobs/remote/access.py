@@ -1,10 +1,10 @@
 """Access of a worker to its job by the service."""
 
+import json
 from collections.abc import Callable, Mapping
 from hashlib import sha256
 from typing import Any
 
-from httpx import Response
 from pydantic import TypeAdapter
 
 from app.store.records import JobRecord, NewCheckpoint, ResumeState, Spent
@@ -27,7 +27,7 @@ class ServiceAccess:
 
     def job(self) -> JobRecord:
         """Return the job."""
-        return _record(self._service.send("GET", self._service.attempt))
+        return _record(self._service.send("GET", self._service.attempt).content)
 
     def heartbeat(self, waiting: str | None, run_s: float) -> JobRecord:
         """Record a heartbeat and return the job."""
@@ -88,12 +88,13 @@ class ServiceAccess:
         body = {"state": state, "result": result, "error": error}
         self._send("end", {**body, "ended_by": ended_by, "run_s": run_s})
 
-    def _send(self, action: str, body: Mapping[str, Any]) -> Response:
-        return self._service.send("POST", f"{self._service.attempt}/{action}", body=body)
+    def _send(self, action: str, body: Mapping[str, Any]) -> bytes:
+        path = f"{self._service.attempt}/{action}"
+        return self._service.send("POST", path, body=body).content
 
 
-def _record(answer: Response) -> JobRecord:
-    found = answer.json()
+def _record(answer: bytes) -> JobRecord:
+    found = json.loads(answer)
     names = JobRecord.__dataclass_fields__
     members = {name: found.get(name) for name in names}
     return _JOB.validate_python(members)

@@ -12,5 +12,5 @@ __all__ = ["database_url", "migrated", "postgresql", "store"]
 
 @pytest.fixture
 def address(store: Store, tmp_path: Path) -> Iterator[str]:
-    with serving(store, tmp_path) as found:
+    with serving(store, tmp_path) as (found, _):
         yield found

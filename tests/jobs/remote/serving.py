@@ -9,6 +9,7 @@ from opentelemetry.trace import NoOpTracer
 
 from app.api.application import build_app
 from app.api.metrics import Metrics
+from app.api.services import Services
 from app.main import STATIC, assemble
 from app.store.engine import Store
 from jobs.recording_catalog import RecordingCatalog
@@ -20,8 +21,8 @@ TOKEN = "a-token-of-some-length"
 
 
 @contextmanager
-def serving(store: Store, data_dir: Path) -> Iterator[str]:
-    """Yield the address of a server of the routes."""
+def serving(store: Store, data_dir: Path) -> Iterator[tuple[str, Services]]:
+    """Yield the address of a server of the routes, and the parts that they use."""
     counts = Metrics("test")
     retention = Retention(
         store=store, logs=data_dir / "logs", keep_jobs=1000, keep_states=5, acting=dict
@@ -51,4 +52,4 @@ def serving(store: Store, data_dir: Path) -> Iterator[str]:
         traces=None,
     )
     with running(app) as (_, address):
-        yield address
+        yield address, parts

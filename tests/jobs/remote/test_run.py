@@ -2,16 +2,17 @@
 
 import os
 import signal
+from dataclasses import replace
 from pathlib import Path
 
-from app.store import checkpoints, jobs, metrics
+from app.store import attempts, checkpoints, jobs, metrics
 from app.store.engine import Store
 from app.store.records import JobRecord
 from jobs.executor import LocalProcess
 from jobs.spec import parse_spec
 from jobs.supervisor import Supervisor
 from tests.jobs.machinery import PATIENCE, wait_for, wait_until_final, worker_pids
-from tests.jobs.remote.serving import TOKEN
+from tests.jobs.remote.serving import TOKEN, serving
 from tests.jobs.test_run import train
 from tests.support.databases import SQLITE_ONLY
 
@@ -54,6 +55,19 @@ def test_training_over_http_killed_once_ends_with_the_checkpoints_of_a_local_one
     steps = [point.step for point in metrics.list_metrics(store, killed_id)]
     assert steps == list(range(128, 2049, 128))
     assert not (tmp_path / "elsewhere" / "resume").exists()
+
+
+def test_stopping_server_takes_the_last_state_over_http(store: Store, tmp_path: Path) -> None:
+    timeouts = replace(PATIENCE, shutdown_s=120.0)
+    with serving(store, tmp_path) as (address, parts):
+        executor = elsewhere(tmp_path, address)
+        parts.supervisor = Supervisor(store, tmp_path, executor=executor, timeouts=timeouts)
+        parts.supervisor.start()
+        job_id = train(store, **{"learning.total_steps": 200_000})
+        wait_for(store, job_id, lambda job: job.step >= 128)
+    job, state = jobs.get_job(store, job_id), attempts.load_resume(store, job_id)
+    assert (job.state, job.failures) == ("queued", 0)
+    assert state is not None and state.step >= job.step
 
 
 def test_evaluation_of_an_unknown_checkpoint_fails_over_http_as_locally(

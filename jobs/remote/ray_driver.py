@@ -1,0 +1,142 @@
+"""One attempt on a Ray cluster: ``python -m jobs.remote.ray_driver --job ID --attempt N``.
+
+Runs on the machine of the server in place of a local worker, so that the supervisor starts,
+watches and stops both alike, and no failure of Ray reaches the server. It starts a process on a
+free CPU of a node (``jobs.remote.ray_node``), copies its output, passes SIGTERM on, and ends
+with its exit status. Ray ends that process when this one is killed.
+"""
+
+import argparse
+import logging
+import os
+import signal
+import sys
+import threading
+import time
+from contextlib import closing, suppress
+from typing import Any
+
+import ray
+from ray.exceptions import ActorUnavailableError, RayError
+
+from app import logs
+from app.errors import ServiceError
+from app.provenance import describe
+from app.settings import Settings, load_settings
+from app.storage_errors import StaleAttempt, StorageFull, StorageUnavailable
+from app.store import attempts
+from app.store.engine import Store
+from app.store.records import Claim
+from jobs.executor import Exit
+from jobs.remote.ray_node import NodeWorker
+
+logger = logging.getLogger(__name__)
+
+POLL_S = 0.25
+"""Period of the polls [s]."""
+PATIENCE_S = 10.0
+"""Time until a job that finds no free CPU says so [s]."""
+HEARTBEAT_S = 5.0
+"""Period of heartbeats until the process has started [s]."""
+NO_CPU = "no free CPU in the Ray cluster"
+
+
+class RayDriver:
+    """Runs one attempt.
+
+    Args:
+        settings: Settings of the server.
+        claim: The attempt.
+    """
+
+    def __init__(self, settings: Settings, claim: Claim) -> None:
+        self._settings, self._claim = settings, claim
+        self._stopped = threading.Event()
+
+    def stop(self, *_: object) -> None:
+        """Stop the attempt at its next step."""
+        self._stopped.set()
+
+    def run(self) -> int:
+        """Run the attempt; return the exit status of its process.
+
+        ``EX_TEMPFAIL``, which queues the job again, where it was stopped before it had started.
+        """
+        given = {"TANDEM_WORKER_URL": self._settings.worker_address}
+        if self._settings.secret is not None:
+            given["TANDEM_TOKEN"] = self._settings.secret
+        actor = ray.remote(num_cpus=1, max_restarts=0)(NodeWorker)
+        node = actor.remote(self._claim, given)
+        if not self._wait_for_start(node):
+            return os.EX_TEMPFAIL
+        return self._watch(node)
+
+    def _wait_for_start(self, node: Any) -> bool:
+        """Return whether the process has started; False: it was stopped before."""
+        found = node.about.remote()
+        started = time.monotonic()
+        due = started + PATIENCE_S
+        with closing(Store(self._settings.database)) as store:
+            while not ray.wait([found], timeout=POLL_S)[0]:
+                if self._stopped.is_set():
+                    return False
+                if time.monotonic() < due:
+                    continue
+                due = time.monotonic() + HEARTBEAT_S
+                with suppress(StorageFull, StorageUnavailable):
+                    attempts.heartbeat(store, self._claim, NO_CPU)
+        name, commit = ray.get(found)
+        logger.info("runs on node %s", name)
+        if commit != (own := describe()["commit"]):
+            text = "node %s runs commit %s of this program, the server %s"
+            logger.warning(text, name, commit, own)
+        return True
+
+    def _watch(self, node: Any) -> int:
+        """Copy the output and pass a stop on, until the process has ended."""
+        sent = False
+        while True:
+            with suppress(ActorUnavailableError):  # it may answer again
+                output, code = ray.get(node.poll.remote())
+                sys.stdout.buffer.write(output)
+                sys.stdout.buffer.flush()
+                if code is not None:
+                    return self._exit_status(code)
+            if self._stopped.is_set() and not sent:
+                node.stop.remote()
+                sent = True
+            time.sleep(POLL_S)
+
+    def _exit_status(self, code: int) -> int:
+        if code >= 0:
+            return code
+        logger.error("%s", Exit(code=code, tail="").reason)
+        return os.EX_SOFTWARE
+
+
+def main() -> int:
+    """Run the attempt of the command line; return its exit status."""
+    parser = argparse.ArgumentParser(description="Run one attempt of a job on a Ray cluster.")
+    parser.add_argument("--job", required=True, help="id of the job")
+    parser.add_argument("--attempt", required=True, type=int, help="claimed attempt")
+    options = parser.parse_args()
+    settings = load_settings()
+    logs.set_up(settings.log, job_id=options.job, attempt=options.attempt)
+    driver = RayDriver(settings, Claim(job_id=options.job, attempt=options.attempt))
+    try:
+        ray.init(address=settings.ray, log_to_driver=False, logging_level=logging.ERROR)
+        signal.signal(signal.SIGTERM, driver.stop)
+        return driver.run()
+    except StaleAttempt as error:
+        logger.warning("%s", error)
+    except ServiceError as error:
+        logger.error("%s", error.message)
+        return os.EX_CONFIG
+    except (RayError, ConnectionError) as error:
+        logger.error("the Ray cluster or the node of the worker has failed: %s", error)
+        return os.EX_UNAVAILABLE
+    return os.EX_OK
+
+
+if __name__ == "__main__":
+    sys.exit(main())

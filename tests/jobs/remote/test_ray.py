@@ -1,0 +1,166 @@
+"""Jobs on a Ray cluster of two nodes: with the bits of local ones, whatever is killed."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from app.store import attempts, checkpoints, jobs, metrics
+from app.store.engine import Store
+from app.store.records import JobRecord
+from jobs.executor import PROJECT_ROOT, LocalProcess, search_path
+from jobs.supervisor import Supervisor
+from tests.jobs.machinery import PATIENCE, wait_for, wait_until_final
+from tests.jobs.remote.serving import TOKEN
+from tests.jobs.test_run import train
+from tests.support.databases import SQLITE_ONLY
+
+pytestmark = [pytest.mark.ray, SQLITE_ONLY]
+FIELDS: dict[str, float | str] = {
+    "learning.total_steps": 1024,
+    "learning.checkpoint_steps": 256,
+}
+PATIENCE_OF_RAY = replace(PATIENCE, cancel_s=60.0, shutdown_s=60.0)
+STEPS = list(range(128, 1025, 128))
+
+
+@contextmanager
+def ray_cluster(n_nodes: int) -> Iterator["subprocess.Popen[str]"]:
+    """Run a cluster; its address is the first line of the output."""
+    environment = {
+        **os.environ,
+        "PYTHONPATH": search_path(os.environ),
+        "RAY_USAGE_STATS_ENABLED": "0",
+        "RAY_worker_niceness": "0",
+    }
+    command = [sys.executable, "-m", "tests.jobs.remote.ray_cluster", str(n_nodes)]
+    with subprocess.Popen(
+        command,
+        cwd=PROJECT_ROOT,
+        env=environment,
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+    ) as process:
+        try:
+            yield process
+        finally:
+            assert process.stdin is not None
+            process.stdin.close()  # the cluster ends with it
+            process.wait()
+
+
+def line_of(process: "subprocess.Popen[str]") -> str:
+    assert process.stdout is not None
+    return process.stdout.readline().strip()
+
+
+@contextmanager
+def running_on(
+    ray_address: str, store: Store, folder: Path, address: str
+) -> Iterator[Supervisor]:
+    """Run a supervisor whose jobs run on a cluster."""
+    settings = {
+        "TANDEM_RAY": ray_address,
+        "TANDEM_WORKER_URL": address,
+        "TANDEM_TOKEN": TOKEN,
+    }
+    executor = LocalProcess(store.url, folder, "jobs.remote.ray_driver", settings)
+    supervisor = Supervisor(store, folder, executor=executor, timeouts=PATIENCE_OF_RAY)
+    supervisor.start()
+    try:
+        yield supervisor
+    finally:
+        supervisor.stop()
+
+
+def process_of(job_id: str, module: str = "jobs.remote.run") -> int | None:
+    """Return the process of a job by the module that it runs; None: there is none."""
+    for path in Path("/proc").glob("[0-9]*/cmdline"):
+        try:
+            words = path.read_bytes().split(b"\0")
+        except OSError:
+            continue
+        if module.encode() in words and job_id.encode() in words:
+            return int(path.parent.name)
+    return None
+
+
+def made_by(store: Store, job: JobRecord) -> list[tuple[int | None, str]]:
+    made = checkpoints.list_checkpoints(store, job_id=job.id).items
+    return [(one.step, one.sha256) for one in made]
+
+
+def test_stopped_server_keeps_the_last_step_and_a_killed_one_ends_its_worker(
+    store: Store, tmp_path: Path, address: str
+) -> None:
+    with ray_cluster(1) as cluster:
+        ray_address = line_of(cluster)
+        with running_on(ray_address, store, tmp_path, address):
+            job_id = train(store, **{**FIELDS, "learning.total_steps": 200_000})
+            wait_for(store, job_id, lambda job: job.step >= 128)
+        job = jobs.get_job(store, job_id)
+        state = attempts.load_resume(store, job_id)
+        assert (job.state, job.failures) == ("queued", 0)
+        assert state is not None and state.step >= job.step
+        with running_on(ray_address, store, tmp_path, address):
+            wait_for(store, job_id, lambda job: job.step > state.step)
+            driver = process_of(job_id, "jobs.remote.ray_driver")
+            worker = process_of(job_id)
+            assert driver is not None and worker is not None
+            jobs.request_cancel(store, job_id)
+            os.kill(driver, signal.SIGKILL)
+            while process_of(job_id) == worker:
+                time.sleep(0.05)
+            assert wait_until_final(store, job_id).state == "cancelled"
+
+
+def test_job_without_a_free_processor_waits_and_says_so(
+    store: Store, tmp_path: Path, address: str
+) -> None:
+    with (
+        ray_cluster(0) as cluster,
+        running_on(line_of(cluster), store, tmp_path, address) as supervisor,
+    ):
+        job_id = train(store, **FIELDS)
+        job = wait_for(store, job_id, lambda job: job.waiting is not None)
+        assert (job.state, job.waiting) == ("running", "no free CPU in the Ray cluster")
+        while supervisor.waiting != job.waiting:
+            time.sleep(0.05)
+        jobs.request_cancel(store, job_id)
+        assert wait_until_final(store, job_id).state == "cancelled"
+
+
+def test_training_whose_worker_and_node_fail_ends_with_the_checkpoints_of_a_local_one(
+    store: Store, tmp_path: Path, address: str
+) -> None:
+    local_supervisor = Supervisor(store, tmp_path, timeouts=PATIENCE)
+    local_supervisor.start()
+    local = wait_until_final(store, train(store, **FIELDS))
+    local_supervisor.stop()
+    with (
+        ray_cluster(2) as cluster,
+        running_on(line_of(cluster), store, tmp_path, address),
+    ):
+        job_id = train(store, **FIELDS)
+        wait_for(store, job_id, lambda job: job.step >= 384)
+        pid = process_of(job_id)
+        assert pid is not None
+        os.kill(pid, signal.SIGKILL)
+        wait_for(store, job_id, lambda job: job.attempt == 2 and job.step >= 640)
+        assert cluster.stdin is not None
+        cluster.stdin.write("the node\n")
+        cluster.stdin.flush()
+        assert line_of(cluster) == "removed"
+        job = wait_until_final(store, job_id)
+    assert (job.state, job.error) == ("succeeded", None)
+    assert job.result == local.result
+    assert made_by(store, job) == made_by(store, local) and len(made_by(store, job)) == 4
+    assert [point.step for point in metrics.list_metrics(store, job_id)] == STEPS
