@@ -9,10 +9,13 @@ import numpy as np
 import pytest
 from fastapi import FastAPI
 from fastapi.testclient import TestClient
+from starlette.responses import Response
+from starlette.types import Receive, Scope, Send
 
 from app.api import problems
 from app.api.application import decision_routes
 from app.api.bodies import BodyRules
+from app.api.direct_routes import DirectRoutes
 from app.api.schemas import examples
 from tests.api.conftest import ADDRESS
 
@@ -134,6 +137,32 @@ def test_texts_are_answered_as_by_a_plain_route(
         assert found == answered(plain, url, text, "application/json"), text
     for kind in ("application/vnd.a+json; charset=utf-8", "text/json", "text/plain", ""):
         assert answered(client, url, sound, kind) == answered(plain, url, sound, kind), kind
+
+
+def test_only_other_requests_and_failures_reach_the_framework(client: TestClient) -> None:
+    reached: list[bytes] = []
+
+    async def framework(scope: Scope, receive: Receive, send: Send) -> None:
+        reached.append((await receive())["body"])
+        await Response(status_code=204)(scope, receive, send)
+
+    layer = DirectRoutes(framework, routes=decision_routes())
+
+    async def served(scope: Scope, receive: Receive, send: Send) -> None:
+        await layer({**scope, "app": client.app}, receive, send)
+
+    alone = TestClient(served, base_url=ADDRESS)
+    for url, body in BODIES.items():
+        text = json.dumps(body)
+        answer = alone.post(url, content=text)
+        assert (answer.status_code, answer.headers["content-type"]) == (200, "application/json")
+        assert not reached
+        cell = json.dumps({**body, "cell": "nowhere"})
+        for sent in (text[:-1], cell):
+            assert alone.post(url, content=sent).status_code == 204
+            assert reached.pop() == sent.encode()
+        assert alone.put(url, content=text).status_code == 204
+        assert reached.pop() == text.encode()
 
 
 def test_decision_routes_are_documented_with_their_schemas(client: TestClient) -> None:

@@ -7,6 +7,7 @@ from fastapi.testclient import TestClient
 from starlette.routing import Mount, Route, WebSocketRoute
 from starlette.websockets import WebSocketDisconnect
 
+from app.api.security import headers_of
 from app.errors import InvalidInput
 from app.main import create_app
 from app.settings import Settings
@@ -76,6 +77,11 @@ def test_foreign_page_gets_no_viewer_socket(
         ),
     ):
         pass
+
+
+def test_first_of_equal_headers_counts() -> None:
+    given = [(b"host", b"127.0.0.1"), (b"accept", b"*/*"), (b"host", b"evil.example")]
+    assert headers_of({"headers": given}) == {"host": "127.0.0.1", "accept": "*/*"}
 
 
 def test_every_answer_carries_the_security_headers(client: TestClient) -> None:

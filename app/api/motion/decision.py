@@ -80,12 +80,13 @@ def decide(
     )
     with request.robot.faults_in_place():
         decision = decider.decide(question)
-    decision = replace(
-        decision,
-        seen=None if decision.seen is None else seen[decision.seen],
-        terms_of=None if decision.terms_of is None else monitored[decision.terms_of],
-        outside=renumbered(decision.outside, seen),
-    )
+    if not seen == monitored == list(range(len(people))):
+        decision = replace(
+            decision,
+            seen=None if decision.seen is None else seen[decision.seen],
+            terms_of=None if decision.terms_of is None else monitored[decision.terms_of],
+            outside=renumbered(decision.outside, seen),
+        )
     met = dict(zip(seen, decision.met, strict=True))
     uses = [
         PersonMet.from_use(

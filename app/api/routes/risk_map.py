@@ -7,12 +7,15 @@ from fastapi import APIRouter
 from starlette.concurrency import run_in_threadpool
 
 from app.api.description import MISMATCH
-from app.api.known_people import people_for_policy
+from app.api.known_people import people_for_policy, take_time
 from app.api.schemas.risk_map import RiskMapAnswer, RiskMapRequest
 from app.api.services import ServicesDep
 from app.api.world_policies import require_task_policy
 from app.errors import InvalidInput
 from app.sim.pick.task_policy import MovedPerson
+
+MAX_INLINE_ROWS = 48
+"""Larger maps are made on a thread: positions times candidates."""
 
 router = APIRouter(prefix="/v1/risk-map", tags=["deciding"])
 
@@ -52,4 +55,6 @@ async def map_risk(request: RiskMapRequest, services: ServicesDep) -> RiskMapAns
         uses = people.uses(seen)
         return RiskMapAnswer.from_domain(found, reached, request, uses, policy.checkpoint)
 
-    return await run_in_threadpool(answer)
+    n_rows = request.grid.nx * request.grid.ny * len(candidates)
+    long = n_rows > MAX_INLINE_ROWS or take_time(request.people)
+    return await run_in_threadpool(answer) if long else answer()

@@ -278,10 +278,11 @@ class MotionAnswer(Answer):
             segment = SegmentPublic.executed(safe, question, dt)
         to_people, to_cell, to_itself = decision.clearance
         return cls(
+            joints=list(ROS_NAMES),  # pydantic copies a default deeply
             dt=dt,
             segment=segment,
             commanded=commanded,
-            act=_numbers(decision.act),
+            act=decision.act.tolist(),
             inference_mode=decision.inference_mode,
             rollout=decision.rollout,
             alternative=decision.candidate,
@@ -301,7 +302,3 @@ class MotionAnswer(Answer):
             elapsed_ms=decision.elapsed_ms,
             stamp=stamp,
         )
-
-
-def _numbers(values: Vec) -> list[float]:
-    return [float(value) for value in values]

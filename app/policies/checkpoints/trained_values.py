@@ -9,6 +9,7 @@ from collections.abc import Iterable, Mapping, Sequence
 import numpy as np
 
 from app.sim.core.arrays import Vec
+from app.sim.core.kernels.bounds import are_inside
 from app.sim.core.out_of_range import OutsideField
 from app.sim.human.person import Person
 
@@ -64,9 +65,9 @@ class TrainedValues:
     ) -> list[OutsideField]:
         """Return the variables of the state and of one person outside the range."""
         values = np.concatenate((state, seen))
-        inside = (self._least <= values) & (values <= self._most)
-        if inside.all():
+        if are_inside(values, self._least, self._most):
             return []
+        inside = (self._least <= values) & (values <= self._most)
         names = ROBOT
         if who is not None:
             names += tuple(f"people[{order[who]}].{name}" for name in HUMAN)
@@ -97,7 +98,9 @@ def as_given(
         viewed: The same people as policies observe them.
     """
     return [
-        (who, view if who is None else view + _cylinder(given[who]) - _cylinder(viewed[who]))
+        (who, view)
+        if who is None or given[who] is viewed[who]
+        else (who, view + _cylinder(given[who]) - _cylinder(viewed[who]))
         for who, view in seen
     ]
 

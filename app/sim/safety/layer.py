@@ -15,6 +15,7 @@ the uncertainty ``Z_r`` and the reaction time.
 Source: docs/method.md 2.7; ISO/TS 15066:2016.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, fields
 
 import numpy as np
@@ -23,6 +24,7 @@ from app.errors import InvalidInput
 from app.sim.cells.cell import Cell
 from app.sim.collision.checker import Shapes
 from app.sim.core.arrays import Vec, as_kernel_array
+from app.sim.core.jit import direct
 from app.sim.geometry.capsules import distances, least
 from app.sim.geometry.cylinder import cylinder_clearance, swept_clearance
 from app.sim.human.kernels import kinematics as body
@@ -190,6 +192,7 @@ class SafetyLayer:
         self.arm, self.settings = arm, settings
         self._shape = (-1, -1)
         self._known = False
+        self._call: Callable[..., float] | None = None
 
     def decide(
         self, q: Vec, qd: Vec, c: Vec, d: Vec, people: Shapes, age: float = 0.0
@@ -221,7 +224,10 @@ class SafetyLayer:
             as_kernel_array(people.columns), as_kernel_array(people.cylinders)
         )
         arm = admitting(self.arm, path.q, path.qd)
-        chosen = ssm.decide(arm, self._rule, age, shapes, path, self._space)
+        arguments = (arm, self._rule, float(age), shapes, path, self._space)
+        if self._call is None:
+            self._call = direct(ssm.decide, arguments)
+        chosen = self._call(*arguments)
         return self._decision(chosen, path.qd, people, age)
 
     def _load_people(self, people: Shapes) -> None:
@@ -230,7 +236,7 @@ class SafetyLayer:
         going = people.going if self.settings.use_measured_velocity else None
         known = going is not None
         if (shape, known) != (self._shape, self._known):
-            self._shape, self._known = shape, known
+            self._shape, self._known, self._call = shape, known, None
             self._space = watch_kernel.new_ssm_workspace(self.arm, *shape)
             self._rule = separation_rule(self.settings, *shape, known)
         if going is not None:
