@@ -14,6 +14,7 @@ from pydantic import BaseModel, ConfigDict, Field, TypeAdapter
 
 from app.errors import InvalidInput
 from app.policies.configs import presets
+from app.policies.configs.fields import entries
 from app.policies.evaluation.registry import (
     PROTOCOLS,
     check_motions,
@@ -26,6 +27,18 @@ MAX_SEED = 2**31 - 1
 """Greatest seed; every random stream accepts it."""
 MAX_RECORDINGS = 32
 """Most recordings of one evaluation."""
+MAX_RANGES = 8
+"""Most fields that a sweep draws."""
+MAX_TRIALS = 200
+"""Most trials of a sweep."""
+MAX_PARALLEL = 8
+"""Most trials of a sweep at once."""
+OBJECTIVES: Mapping[str, tuple[str, ...]] = {
+    "pick": ("pick-single", "pick-choice"),
+    "reach": ("reach-random", "reach-targets"),
+    "sorting": ("sorting-grid", "sorting-tests"),
+}
+"""Evaluations that a sweep can use, by scenario: each states rates in its first row."""
 MAX_STEPS = 1_000_000_000
 """Greatest step budget."""
 MAX_TIME_S = 366 * 86_400.0
@@ -162,11 +175,139 @@ class EvaluateSpec(_Spec):
         return NewJob(kind=self.kind, spec=spec, seed=self.seed, **self.labels())
 
 
-JobSpec = Annotated[TrainSpec | EvaluateSpec, Field(discriminator="kind")]
-_JOB_SPEC: TypeAdapter[TrainSpec | EvaluateSpec] = TypeAdapter(JobSpec)
+class Range(BaseModel):
+    """Values of one field of a sweep: from ``low`` to ``high``, or some ``choices``."""
+
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False, frozen=True, strict=True)
+
+    low: float | None = Field(None, description="least value")
+    high: float | None = Field(None, description="greatest value")
+    log: bool = Field(False, description="draw the logarithm uniformly; `low` must be above 0")
+    choices: Annotated[list[int | float | str], Field(min_length=2, max_length=16)] | None = (
+        Field(None, description="2 to 16 values instead of `low` and `high`")
+    )
+
+    def ends(self, field: str) -> dict[str, float | str]:
+        """Return the values to check, by the name of their member.
+
+        Raises:
+            InvalidInput: Members are missing, or contradict each other.
+        """
+        if self.choices is not None:
+            if self.low is not None or self.high is not None:
+                raise InvalidInput(f"{field}.choices", self.choices, "stands without low, high")
+            return {f"choices[{place}]": one for place, one in enumerate(self.choices)}
+        if self.low is None or self.high is None:
+            name = "low" if self.low is None else "high"
+            raise InvalidInput(f"{field}.{name}", None, "must be given, or choices instead")
+        if self.low >= self.high:
+            raise InvalidInput(f"{field}.high", self.high, f"must be above low = {self.low}")
+        if self.log and self.low <= 0:
+            raise InvalidInput(f"{field}.low", self.low, "must be above 0 with log")
+        return {"low": self.low, "high": self.high}
 
 
-def parse_spec(body: Mapping[str, Any]) -> TrainSpec | EvaluateSpec:
+class Objective(BaseModel):
+    """What the trials of a sweep are compared by: a rate of an evaluation."""
+
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False, frozen=True, strict=True)
+
+    protocol: Name = Field(description="an evaluation of the preset's scenario")
+    quantity: Literal["success", "collision", "timeout"] = Field(
+        "success", description="a rate; success is maximised, the others are minimised"
+    )
+    row: Name | None = Field(None, description="row of the result; the first if null")
+    episodes: int | None = Field(None, ge=1, description="the protocol's own if null")
+    seed: Seed = Field(11, description="seed of the episodes, the same for all trials")
+
+    @property
+    def maximised(self) -> bool:
+        """Whether a greater value is better."""
+        return self.quantity == "success"
+
+
+class SweepSpec(_Spec):
+    """Train a preset with drawn fields, several times, and evaluate each."""
+
+    kind: Literal["sweep"]
+    preset: Name = Field(description="name of GET /v1/presets")
+    seed: Seed = Field(0, description="seed of the drawing and of every training")
+    overrides: dict[str, Any] = Field(
+        default_factory=dict, description="fields that differ from the preset in all trials"
+    )
+    ranges: Annotated[dict[Name, Range], Field(min_length=1, max_length=MAX_RANGES)] = Field(
+        description="range of each drawn field, by its name such as `learning.gamma`"
+    )
+    trials: Annotated[int, Field(ge=2, le=MAX_TRIALS)] = Field(description="number of trials")
+    parallel: Annotated[int, Field(ge=1, le=MAX_PARALLEL)] = Field(
+        1, description="trials that are queued or run at once"
+    )
+    prune: bool = Field(
+        True, description="stop trainings that are below the median of those before"
+    )
+    objective: Objective
+
+    def new_job(self) -> NewJob:
+        """Return the job to queue.
+
+        Raises:
+            InvalidInput: An unknown preset, field or protocol, or a value outside its bounds.
+        """
+        if self.preset not in presets.PRESETS:
+            raise InvalidInput("preset", self.preset, "is no preset", tuple(presets.PRESETS))
+        presets.resolve(self.preset, self.overrides)
+        self._check_ranges()
+        self._check_objective()
+        return NewJob(
+            kind=self.kind,
+            spec=self._body(),
+            preset=self.preset,
+            seed=self.seed,
+            overrides=self.overrides,
+            total_steps=self.trials,
+            **self.labels(),
+        )
+
+    def with_fields(self, fields: Mapping[str, object]) -> dict[str, Any]:
+        """Return the overrides of a trial, whose drawn fields have dotted names."""
+        return merge(self.overrides, presets.nested(fields))
+
+    def _check_ranges(self) -> None:
+        known = [one.path for one in entries(presets.get(self.preset))]
+        for path, drawn in self.ranges.items():
+            field = f"ranges.{path}"
+            if path not in known:
+                raise InvalidInput(field, path, "is no field of the preset", known)
+            for name, value in drawn.ends(field).items():
+                try:
+                    presets.resolve(self.preset, self.with_fields({path: value}))
+                except InvalidInput as error:
+                    rule, choices = error.rule, error.choices
+                    raise InvalidInput(f"{field}.{name}", value, rule, choices) from None
+
+    def _check_objective(self) -> None:
+        scenario = self.preset.partition("-")[0]
+        fitting, protocol = OBJECTIVES.get(scenario, ()), self.objective.protocol
+        if protocol not in fitting:
+            rule = f"must be an evaluation that sweeps of {scenario} presets can use"
+            raise InvalidInput("objective.protocol", protocol, rule, fitting)
+        most = most_episodes(protocol)
+        if self.objective.episodes is not None and self.objective.episodes > most:
+            rule = f"must lie in [1, {most}]"
+            raise InvalidInput("objective.episodes", self.objective.episodes, rule)
+
+
+AnySpec = TrainSpec | EvaluateSpec | SweepSpec
+JobSpec = Annotated[AnySpec, Field(discriminator="kind")]
+_JOB_SPEC: TypeAdapter[AnySpec] = TypeAdapter(JobSpec)
+_TYPES: Mapping[str, type[AnySpec]] = {
+    "train": TrainSpec,
+    "evaluate": EvaluateSpec,
+    "sweep": SweepSpec,
+}
+
+
+def parse_spec(body: Mapping[str, Any]) -> AnySpec:
     """Return the spec of a stored or posted body.
 
     Raises:
@@ -175,9 +316,9 @@ def parse_spec(body: Mapping[str, Any]) -> TrainSpec | EvaluateSpec:
     return _JOB_SPEC.validate_python(body)
 
 
-def spec_type(kind: str) -> type[TrainSpec] | type[EvaluateSpec]:
+def spec_type(kind: str) -> type[AnySpec]:
     """Return the type of a kind's specs."""
-    return TrainSpec if kind == "train" else EvaluateSpec
+    return _TYPES[kind]
 
 
 def budgets(job: JobRecord) -> dict[str, Any]:

@@ -9,7 +9,7 @@ from app.api.services import Services, ServicesDep
 from app.policies.configs import presets
 from app.store import job_actions, jobs, metrics
 from app.store.records import JobRecord, MetricRow, NewJob
-from jobs.spec import EvaluateSpec, TrainSpec
+from jobs.spec import AnySpec, EvaluateSpec
 
 
 def job_of_path(job_id: str, services: ServicesDep) -> JobRecord:
@@ -23,7 +23,7 @@ IdempotencyKey = Annotated[
 ]
 
 
-def checked(body: TrainSpec | EvaluateSpec, services: Services) -> NewJob:
+def checked(body: AnySpec, services: Services) -> NewJob:
     """Return the job to queue; everything that it names exists.
 
     Raises:

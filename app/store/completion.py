@@ -14,7 +14,7 @@ from app.store.database.tables import jobs, resume_states
 from app.store.engine import Store
 from app.store.fencing import change_state, fenced_update, peek
 from app.store.jobs import read_job
-from app.store.records import Claim, JobRecord, Spent
+from app.store.records import SWEEP, Claim, JobRecord, Spent
 
 MAX_ERROR = 4000
 """Longest error text of a job [characters]."""
@@ -45,10 +45,9 @@ def finish(
         StaleAttempt: The attempt no longer holds the job.
         StorageFull: No room is left.
     """
-    changes: dict[str, Any] = {
-        "result": None if result is None else dict(result),
-        "ended_by": ended_by,
-    }
+    changes: dict[str, Any] = {"result": None if result is None else dict(result)}
+    if ended_by is not None:
+        changes["ended_by"] = ended_by
     if run_s is not None:
         changes["run_s"] = run_s
 
@@ -123,7 +122,8 @@ def requeue_orphans(store: Store) -> tuple[str, ...]:
     Raises:
         StorageFull: No room is left.
     """
-    running = sa.select(jobs.c.id).where(jobs.c.state == "running").order_by(jobs.c.number)
+    running = sa.select(jobs.c.id).where(jobs.c.state == "running", jobs.c.kind != SWEEP)
+    running = running.order_by(jobs.c.number)
 
     def requeue(connection: sa.Connection) -> tuple[str, ...]:
         orphans = connection.execute(running).scalars().all()

@@ -16,8 +16,11 @@ JobState = Literal["queued", "running", "cancelling", "succeeded", "failed", "ca
 FINAL_STATES: tuple[JobState, ...] = ("succeeded", "failed", "cancelled")
 """Final states."""
 
-Spent = Literal["step budget", "time budget"]
-"""The budget that ended a job before its last step."""
+Spent = Literal["step budget", "time budget", "pruned"]
+"""What ended a job before its last step: a budget, or the pruner of its sweep."""
+
+SWEEP = "sweep"
+"""The kind of job that has no worker: the supervisor starts its trials."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -58,6 +61,10 @@ class NewJob:
     """Steps after which the job ends and keeps its state."""
     time_budget_s: float | None = None
     """Run time after which the job ends and keeps its state [s]."""
+    sweep: str | None = None
+    """Id of the sweep that it is part of."""
+    trial: int | None = None
+    """Number of its trial in the sweep, from 1."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -125,7 +132,11 @@ class JobRecord:
     run_s: float
     """Run time of all its attempts, at the last heartbeat [s]."""
     ended_by: Spent | None
-    """The budget that ended it; it can be resumed with a larger one."""
+    """The budget that ended it, or that the pruner of its sweep did; it can be resumed."""
+    sweep: str | None
+    """Id of the sweep that it is part of; it may be deleted."""
+    trial: int | None
+    """Number of its trial in the sweep, from 1."""
 
     @property
     def is_final(self) -> bool:

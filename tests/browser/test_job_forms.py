@@ -98,3 +98,44 @@ def test_evaluation_is_started_with_choices_of_the_server(
 def job(server: str, job_id: str | None) -> dict[str, Any]:
     found: dict[str, Any] = patient_http.get(f"{server}/v1/jobs/{job_id}").json()
     return found
+
+
+def test_sweep_shows_its_trials_and_marks_the_best(
+    open_page: Callable[..., Page], server: str
+) -> None:
+    page = open_page((1280, 900), scene=False)
+    open_form(page)
+    page.click('[data-kind="sweep"]')
+    page.fill("#sweep-learning-total_steps", "51200")
+    page.fill("#sweep-trials", "2")
+    page.fill("#sweep-objective-episodes", "5")
+    page.fill('[data-range="high"]', "1")
+    page.click("form.train [type=submit]")
+    expect(page.locator('[data-path="learning.lr_start"] .field-error')).to_contain_text("0.01")
+    page.fill('[data-range="low"]', "0.0001")
+    page.fill('[data-range="high"]', "0.001")
+    page.check('[data-range="log"]')
+    page.click('[data-action="add-range"]')
+    page.locator(".range select").last.select_option("networks.width")
+    page.locator(".range").last.locator('[data-range="low"]').fill("16")
+    page.locator(".range").last.locator('[data-range="high"]').fill("32")
+    page.click("form.train [type=submit]")
+    page.wait_for_selector(".job.is-open [data-trial]", timeout=GROWTH_MS)
+    job_id = page.get_attribute(".job.is-open", "data-job")
+    made = job(server, job_id)
+    assert made["spec"]["ranges"]["learning.lr_start"] == {
+        "low": 1e-4,
+        "high": 1e-3,
+        "log": True,
+    }
+    page.wait_for_selector('.job.is-open[data-state="succeeded"]', timeout=4 * GROWTH_MS)
+    rows = page.locator('[data-role="trials"] tbody tr')
+    expect(rows).to_have_count(2)
+    expect(page.locator('[data-best="true"]')).to_have_count(1)
+    expect(page.locator('[data-role="trials"] thead')).to_contain_text("lr_start")
+    expect(page.locator(".is-open .plot canvas")).to_have_count(1)
+    best = job(server, job_id)["result"]["trial"]
+    expect(page.locator('[data-best="true"]')).to_have_attribute("data-trial", str(best))
+    page.locator(f'[data-trial="{best}"] button').click()
+    expect(page.locator(".job.is-open .job-name")).to_contain_text(f"trial {best}")
+    assert len(page.problems) == 1  # type: ignore[attr-defined]  # one refusal

@@ -6,11 +6,13 @@ from fastapi import APIRouter, Query, Response
 
 from app.api.schemas.comparison import ComparisonPublic
 from app.api.schemas.evaluations import EvaluationList, EvaluationPublic
+from app.api.schemas.sweeps import TrialList
 from app.api.services import ServicesDep
 from app.errors import InvalidInput, NotFound
 from app.policies.evaluation.registry import PROTOCOLS
 from app.store.jobs import get_job, list_evaluations
 from jobs.comparison import MAX_JOBS, compare, curves_as_csv
+from jobs.sweeps import trials_of
 
 JobIds = Annotated[
     list[str], Query(max_length=MAX_JOBS, description="id of a job; repeated, 1 to 20 times")
@@ -68,6 +70,13 @@ def list_all_evaluations(
         services.store, protocol=protocol, checkpoint=sha256, cursor=cursor, limit=limit
     )
     return EvaluationList.from_domain(page)
+
+
+@router.get("/jobs/{job_id}/trials", summary="The trials of a sweep")
+def list_trials(job_id: str, services: ServicesDep) -> TrialList:
+    """Return the trials with their drawn fields and values; `best` marks the best one."""
+    job = get_job(services.store, job_id)
+    return TrialList.from_domain(job, trials_of(services.store, job))
 
 
 @router.get("/evaluations/{job_id}", summary="One evaluation")

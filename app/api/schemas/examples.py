@@ -71,6 +71,17 @@ JOBS: dict[str, Any] = {
         "overrides": {"learning": {"total_steps": 102400}},
     },
     "evaluate": {"kind": "evaluate", "protocol": "pick-single", "episodes": 100},
+    "sweep": {
+        "kind": "sweep",
+        "preset": "pick-td3",
+        "overrides": {"learning": {"total_steps": 1024000}},
+        "ranges": {
+            "learning.lr_start": {"low": 1e-4, "high": 1e-3, "log": True},
+            "networks.width": {"choices": [128, 256]},
+        },
+        "trials": 20,
+        "objective": {"protocol": "pick-single", "quantity": "success", "episodes": 1000},
+    },
 }
 BUDGET: dict[str, Any] = {"step_budget": 204800, "time_budget_s": None}
 LABELS: dict[str, Any] = {"name": "baseline", "notes": "to compare with", "priority": 5}

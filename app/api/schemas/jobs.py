@@ -43,8 +43,10 @@ class JobPublic(Answer):
     )
     run_s: float = Field(description="run time of all its attempts [s]")
     ended_by: str | None = Field(
-        description="the budget that ended it: `step budget` or `time budget`; null otherwise"
+        description="what ended it early: `step budget`, `time budget` or `pruned`; else null"
     )
+    sweep: str | None = Field(description="id of the sweep that it is part of")
+    trial: int | None = Field(description="number of its trial in the sweep")
     progress: float | None = Field(
         description="done share of its steps, or of the budget that is nearer to its end"
     )

@@ -8,6 +8,7 @@ from pydantic import Field
 from app.api.schemas.numbers import Answer
 from app.policies.configs.fields import PresetEntry, entries
 from app.policies.configs.presets import PRESETS
+from jobs.spec import OBJECTIVES
 
 
 class PresetField(Answer):
@@ -48,6 +49,7 @@ class PresetPublic(Answer):
     name: str
     cell: str = Field(description="work cell of the training")
     fields: list[PresetField]
+    objectives: Sequence[str] = Field(description="protocols that a sweep can use")
 
     @classmethod
     def from_name(cls, name: str, cells: Sequence[str]) -> Self:
@@ -72,7 +74,8 @@ class PresetPublic(Answer):
                 choices=list(cells),
             )
             listed.insert(0, choice)
-        return cls(name=name, cell=own, fields=listed)
+        objectives = OBJECTIVES.get(name.partition("-")[0], ())
+        return cls(name=name, cell=own, fields=listed, objectives=objectives)
 
 
 class PresetList(Answer):

@@ -5,6 +5,7 @@ from urllib.parse import quote
 
 from app.api.schemas.comparison import ComparisonPublic
 from app.api.schemas.evaluations import EvaluationList, EvaluationPublic
+from app.api.schemas.sweeps import TrialList
 from app.client.transport import Transport
 
 
@@ -45,6 +46,12 @@ class ResultsOperations(Transport):
                     "limit": limit,
                 },
             ),
+        )
+
+    def list_trials(self, job_id: str) -> TrialList:
+        """The trials of a sweep."""
+        return self._parsed(
+            TrialList, self._send("GET", f"/v1/jobs/{quote(job_id, safe='')}/trials")
         )
 
     def get_evaluation(self, job_id: str) -> EvaluationPublic:

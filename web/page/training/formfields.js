@@ -144,7 +144,8 @@ function faultsOf(problem) {
 /** Name of the form's field that a fault is about; "" where it is none of them. */
 function fieldOf(fault, names) {
   const name = String(fault.field ?? "").replace(/^overrides\./, "");
-  return names.includes(name) ? name : "";
+  return names.find((one) => name === one)
+    ?? names.find((one) => name.startsWith(`${one}.`) || name.startsWith(`${one}[`)) ?? "";
 }
 
 /** What is left of a problem once a field was edited: the faults of the other fields. */

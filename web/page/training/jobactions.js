@@ -51,10 +51,10 @@ export function JobActions({ job, onChanged, onOpen, onClone }) {
   const repeatable = REPEATABLE.has(job.state);
   const act = (name) => again.run(() => post(`v1/jobs/${job.id}/${name}`));
   return html`
-    ${repeatable && job.resume_step !== null && html`<button type="button" class="tool"
+    ${repeatable && (job.resume_step !== null || job.kind === "sweep") && html`<button type="button" class="tool"
       data-action="resume" disabled=${again.busy} onClick=${() => act("resume")}
       title="Continue this job from its last state">
-      Resume at ${format.steps(job.resume_step)} steps</button>`}
+      ${job.kind === "sweep" ? "Resume" : `Resume at ${format.steps(job.resume_step)} steps`}</button>`}
     ${repeatable && html`<button type="button" class="tool" data-action="retry"
       disabled=${again.busy} onClick=${() => act("retry")}
       title="Run a new job with the same values from its start">Retry</button>`}

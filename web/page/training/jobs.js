@@ -7,6 +7,7 @@ import { CurvePlot } from "../plots.js";
 import { EndedByBudget } from "./budgets.js";
 import { MAX_JOBS } from "./compare.js";
 import { JobActions, Labels, isActive } from "./jobactions.js";
+import { SweepDetail } from "./sweep.js";
 
 const POLL_MS = 2000;
 const TONES = { queued: "quiet", running: "accent", cancelling: "warn", succeeded: "good",
@@ -16,6 +17,7 @@ const OUTCOMES = [
   { key: "collision", label: "collision", colour: "bad" },
   { key: "timeout", label: "time-out", colour: "warn" },
 ];
+const UNITS = { evaluate: "rows", sweep: "trials" };
 const REWARD = [{ key: "reward", label: "mean reward of an episode", colour: "accent" }];
 
 /** All jobs, newest first, asked for again every two seconds while the server is there. */
@@ -70,8 +72,10 @@ export function JobList({ jobs, error, onNew, ...rest }) {
       ${onNew && html`<button type="button" class="primary" data-action="new-job" onClick=${onNew}>
         <${Icon} name="plus" />Start one</button>`}</div>`;
   }
+  const sweeps = new Set(jobs.filter(({ kind }) => kind === "sweep").map(({ id }) => id));
+  const listed = jobs.filter(({ id, sweep }) => !sweeps.has(sweep) || id === rest.open || rest.chosen);
   return html`<ul class="jobs">
-    ${jobs.map((job) => html`<${Job} key=${job.id} job=${job} jobs=${jobs} ...${rest}
+    ${listed.map((job) => html`<${Job} key=${job.id} job=${job} jobs=${jobs} ...${rest}
       open=${rest.open === job.id} />`)}
   </ul>`;
 }
@@ -96,11 +100,11 @@ function Job({ job, jobs, open, chosen, onChoose, ...rest }) {
     html`<div class="progress" role="progressbar" aria-label=${`Progress of ${title(job)}`}
       aria-valuemin="0" aria-valuemax="100" aria-valuenow=${Math.round(share * 100)}>
       <i style=${{ transform: `scaleX(${share})` }}></i></div>`}
-    ${open && (job.kind === "evaluate"
-      ? html`<${Evaluation} job=${job} ...${rest} />`
-      : html`<${JobDetail} job=${job} ...${rest} />`)}
+    ${open && html`<${DETAILS[job.kind] ?? JobDetail} job=${job} ...${rest} />`}
   </li>`;
 }
+
+const DETAILS = { evaluate: Evaluation, sweep: SweepDetail };
 
 function stateOf(job) {
   return job.ended_by ? `${job.state}: ${job.ended_by}` : job.state;
@@ -117,7 +121,7 @@ function subtitle(job, jobs) {
   const parent = job.parent && jobs.find(({ id }) => id === job.parent);
   if (parent) parts.push(`from job ${parent.number}`);
   if (job.state === "queued" && job.priority) parts.push(`priority ${format.number(job.priority)}`);
-  const unit = job.kind === "evaluate" ? "rows" : "steps";
+  const unit = UNITS[job.kind] ?? "steps";
   const last = lastStep(job);
   if (isActive(job) && last) {
     const budget = last < job.total_steps ? " (budget)" : "";
@@ -165,7 +169,7 @@ function JobDetail({ job, onChanged, onOpen, onClone, onAct, acting }) {
       <p class="plot-foot"><span data-points=${rows.length}>${rows.length} points</span>
         <span data-role="point">${row && `${readout ? "" : "last: "}${format.steps(row.step)} steps,
           ${episodes(row)}`}</span></p>`}
-    ${job.ended_by && html`<${EndedByBudget} key=${job.attempt} job=${job} onChanged=${onChanged} />`}
+    ${job.ended_by && job.ended_by !== "pruned" && html`<${EndedByBudget} key=${job.attempt} job=${job} onChanged=${onChanged} />`}
     ${lost && html`<p class="notice warn" role="status"><${Icon} name="alert" />
       Lost the stream of this job; trying again.</p>`}
     <${Speed} job=${job} row=${rows?.at(-1)} />

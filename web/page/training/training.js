@@ -7,9 +7,11 @@ import { isActive } from "./jobactions.js";
 import { JobList, QueueWaits } from "./jobs.js";
 import { EvaluateForm } from "./evaluateform.js";
 import { useItems } from "./formfields.js";
+import { SweepForm } from "./sweepform.js";
 import { TrainForm } from "./trainform.js";
 
-const KINDS = { train: ["Training", TrainForm], evaluate: ["Evaluation", EvaluateForm] };
+const KINDS = { train: ["Training", TrainForm], evaluate: ["Evaluation", EvaluateForm],
+  sweep: ["Sweep", SweepForm] };
 
 export function Training({ link, cell, jobs, error, waiting, refresh, acting, onAct }) {
   const presets = useItems(link, "v1/presets");

@@ -1,0 +1,182 @@
+"""Sweeps, looked at by a new server each time; their trials are ended by the test."""
+
+from typing import Any
+
+import pytest
+
+from app.errors import InvalidInput
+from app.store import attempts, completion, job_actions, jobs, metrics, sweeps
+from app.store.engine import Store
+from app.store.records import JobRecord
+from jobs.spec import parse_spec
+from jobs.sweeps import Sweeps, SweepTrial, trials_of
+from tests.support.databases import SQLITE_ONLY
+
+SWEEP: dict[str, Any] = {
+    "kind": "sweep",
+    "preset": "pick-td3",
+    "seed": 3,
+    "overrides": {"learning": {"total_steps": 128_000}},
+    "ranges": {
+        "learning.lr_start": {"low": 1e-4, "high": 1e-3, "log": True},
+        "networks.width": {"choices": [64, 128]},
+        "learning.n_steps": {"low": 1, "high": 5},
+    },
+    "trials": 4,
+    "objective": {"protocol": "pick-single", "episodes": 10},
+}
+
+
+def post(store: Store, **changes: Any) -> JobRecord:
+    return jobs.create_job(store, parse_spec({**SWEEP, **changes}).new_job())
+
+
+def look(store: Store, sweep: JobRecord) -> tuple[JobRecord, tuple[SweepTrial, ...]]:
+    """Let a server that has just started look at the sweeps."""
+    Sweeps().advance(store)
+    now = jobs.get_job(store, sweep.id)
+    return now, trials_of(store, now)
+
+
+def run_one(store: Store, success: float) -> JobRecord:
+    """Run the next queued job to its end."""
+    found = attempts.claim_next(store)
+    assert found is not None
+    claim, job = found
+    if job.kind == "train":
+        for step in (51_200, 102_400):
+            attempts.record_progress(store, claim, step, {"success": success})
+        completion.finish(store, claim, result={"checkpoint": "ab" * 32, "step": 128_000})
+    else:
+        rate = {"mean": success, "low": success - 0.1, "high": success + 0.1}
+        row = {"name": "pick", "n": 10, "success": rate}
+        completion.finish(store, claim, result={"results": [row]})
+    return job
+
+
+def run_trial(store: Store, sweep: JobRecord, success: float) -> None:
+    look(store, sweep)
+    assert run_one(store, success).kind == "train"
+    look(store, sweep)
+    assert run_one(store, success).kind == "evaluate"
+
+
+def test_trials_are_trained_evaluated_and_compared(store: Store) -> None:
+    sweep = post(store)
+    for success in (0.2, 0.9, 0.4, 0.3):
+        run_trial(store, sweep, success)
+    job, trials = look(store, sweep)
+    assert (job.state, job.step, job.total_steps) == ("succeeded", 4, 4)
+    assert [one.state for one in trials] == ["succeeded"] * 4
+    assert job.result is not None
+    assert (job.result["trial"], job.result["value"]["mean"]) == (2, 0.9)
+    assert job.result["parameters"] == trials[1].parameters
+    assert [row.values["best"] for row in metrics.list_metrics(store, job.id)] == [
+        0.2,
+        0.9,
+        0.9,
+        0.9,
+    ]
+    for one in trials:
+        drawn = one.parameters
+        assert 1e-4 <= float(drawn["learning.lr_start"]) <= 1e-3
+        assert drawn["networks.width"] in (64, 128)
+        assert drawn["learning.n_steps"] in range(1, 6)
+        assert one.training.seed == 3 and one.training.overrides["learning"]["total_steps"]
+    assert len({str(one.parameters) for one in trials}) == 4
+
+
+def test_so_many_trials_as_allowed_wait_at_once(store: Store) -> None:
+    sweep = post(store, parallel=2)
+    for _ in range(4):
+        _, trials = look(store, sweep)
+    assert [one.state for one in trials] == ["queued", "queued"]
+    assert trials[0].parameters != trials[1].parameters
+
+
+def test_training_below_the_median_is_pruned(store: Store) -> None:
+    sweep = post(store, trials=6)
+    for success in (0.8, 0.9, 0.7, 0.8):
+        run_trial(store, sweep, success)
+    look(store, sweep)
+    found = attempts.claim_next(store)
+    assert found is not None
+    attempts.record_progress(store, found[0], 51_200, {"success": 0.1})
+    look(store, sweep)
+    pruned = jobs.get_job(store, found[0].job_id)
+    assert (pruned.state, pruned.ended_by) == ("cancelling", "pruned")
+    completion.finish(store, found[0], state="cancelled")
+    job, trials = look(store, sweep)
+    assert (trials[4].state, trials[5].state, job.state) == ("pruned", "queued", "running")
+
+
+def test_cancelled_sweep_ends_with_its_trials_and_goes_on_when_resumed(store: Store) -> None:
+    sweep = post(store, trials=2)
+    run_trial(store, sweep, 0.5)
+    look(store, sweep)
+    jobs.request_cancel(store, sweep.id)
+    look(store, sweep)
+    job, trials = look(store, sweep)
+    assert (job.state, trials[1].state) == ("cancelled", "cancelled")
+    assert job_actions.resume_job(store, sweep.id).state == "queued"
+    run_trial(store, sweep, 0.6)
+    job, trials = look(store, sweep)
+    assert (job.state, [one.number for one in trials]) == ("succeeded", [1, 2, 3])
+
+
+def test_sweep_without_any_value_fails_with_the_reason(store: Store) -> None:
+    sweep = post(store, trials=2)
+    for _ in range(2):
+        look(store, sweep)
+        found = attempts.claim_next(store)
+        assert found is not None
+        completion.fail(store, found[0], "out of memory")
+    job, _ = look(store, sweep)
+    assert (job.state, job.error) == ("failed", "no trial has a value; trial 2: out of memory")
+
+
+@SQLITE_ONLY
+def test_sweep_is_no_work_for_a_worker_and_outlives_its_server(store: Store) -> None:
+    sweep = post(store)
+    assert attempts.claim_next(store) is None
+    look(store, sweep)
+    assert attempts.running_jobs(store) == ()
+    assert completion.requeue_orphans(store) == ()
+    assert [one.id for one in sweeps.open_sweeps(store)] == [sweep.id]
+
+
+@pytest.mark.parametrize(
+    ("changes", "field"),
+    [
+        ({"ranges": {"learning.gama": {"low": 0, "high": 1}}}, "ranges.learning.gama"),
+        (
+            {"ranges": {"learning.gamma": {"low": 0.9, "high": 2.0}}},
+            "ranges.learning.gamma.high",
+        ),
+        ({"ranges": {"learning.gamma": {"low": 0.9}}}, "ranges.learning.gamma.high"),
+        (
+            {"ranges": {"learning.gamma": {"low": 0.99, "high": 0.9}}},
+            "ranges.learning.gamma.high",
+        ),
+        (
+            {"ranges": {"learning.target_noise": {"low": 0.0, "high": 0.1, "log": True}}},
+            "ranges.learning.target_noise.low",
+        ),
+        (
+            {"ranges": {"networks.width": {"choices": [64, 3]}}},
+            "ranges.networks.width.choices[1]",
+        ),
+        (
+            {"ranges": {"networks.width": {"choices": [64, 65], "low": 1}}},
+            "ranges.networks.width.choices",
+        ),
+        ({"objective": {"protocol": "reach-random"}}, "objective.protocol"),
+        ({"objective": {"protocol": "pick-single", "episodes": 10**6}}, "objective.episodes"),
+        ({"preset": "pick-td4"}, "preset"),
+        ({"overrides": {"learning": {"gamma": 2.0}}}, "overrides.learning.gamma"),
+    ],
+)
+def test_bad_sweep_is_refused_by_field(changes: dict[str, Any], field: str) -> None:
+    with pytest.raises(InvalidInput) as refused:
+        parse_spec({**SWEEP, **changes}).new_job()
+    assert refused.value.field == field

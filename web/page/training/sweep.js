@@ -1,0 +1,106 @@
+// A sweep: its trials as a table and a plot, the best one marked.
+import { html, useEffect, useMemo, useState } from "../vendor/htm-preact-standalone.module.js";
+import { get } from "../api.js";
+import * as format from "../format.js";
+import { Icon } from "../icons.js";
+import { axis, Plot, useTheme } from "../plots.js";
+import { JobActions, Labels, isActive } from "./jobactions.js";
+
+const LABELS = { success: "success", collision: "collision", timeout: "time-out" };
+
+export function SweepDetail({ job, onChanged, onOpen, onClone }) {
+  const { found, error } = useTrials(job);
+  const trials = found?.items ?? [];
+  return html`<div class="job-detail">
+    ${(job.error || error) && html`<p class="notice bad" role="alert"><${Icon} name="alert" />
+      <span>${job.error ?? error.message}</span></p>`}
+    ${!found && !error && html`<div class="skeleton tall" aria-busy="true" aria-label="Loading the trials"></div>`}
+    ${found && trials.length === 0 && html`<p class="empty">${isActive(job)
+      ? "The first trial is drawn in a moment." : "It ended before its first trial."}</p>`}
+    ${trials.some((one) => one.value) && html`<${TrialPlot} found=${found} />
+      <p class="plot-foot"><span>${LABELS[found.quantity]} [%] by trial, with 95 % intervals</span>
+        <span>line: best so far</span></p>`}
+    ${trials.length > 0 && html`<${TrialTable} found=${found} onOpen=${onOpen} />`}
+    ${job.notes && html`<p class="notes" data-role="notes">${job.notes}</p>`}
+    <div class="job-actions"><${JobActions} ...${{ job, onChanged, onOpen, onClone }} /></div>
+    <${Labels} job=${job} onChanged=${onChanged} />
+  </div>`;
+}
+
+/** The trials of a sweep, asked for again whenever the list of jobs was. */
+function useTrials(job) {
+  const [state, setState] = useState({ found: null, error: null });
+  useEffect(() => {
+    const stop = new AbortController();
+    get(`v1/jobs/${job.id}/trials`, { signal: stop.signal }).then(
+      (found) => setState({ found, error: null }),
+      (error) => error.name !== "AbortError" && setState((now) => ({ ...now, error })));
+    return () => stop.abort();
+  }, [job.id, isActive(job) ? job : job.state]);
+  return state;
+}
+
+function TrialTable({ found, onOpen }) {
+  const names = Object.keys(found.items[0].parameters);
+  return html`<div class="scrolled"><table class="trials" data-role="trials">
+    <thead><tr><th scope="col">Trial</th>
+      ${names.map((name) => html`<th scope="col" key=${name} title=${name}>${name.split(".").at(-1)}</th>`)}
+      <th scope="col">State</th><th scope="col">${LABELS[found.quantity]} (95 %)</th></tr></thead>
+    <tbody>${found.items.map((one) => html`<tr key=${one.trial} class=${one.best ? "is-best" : ""}
+      data-trial=${one.trial} data-best=${String(one.best)}>
+      <th scope="row"><button type="button" class="quiet-button" title=${`Show job ${one.number}`}
+        onClick=${() => onOpen(one.job)}>${one.trial}${one.best ? " ★" : ""}</button></th>
+      ${names.map((name) => html`<td key=${name}>${shown(one.parameters[name])}</td>`)}
+      <td title=${one.error ?? ""}>${stateOf(one)}</td>
+      <td>${one.value ? format.interval(one.value) : "–"}</td></tr>`)}</tbody></table></div>`;
+}
+
+function shown(v) {
+  return typeof v === "number" ? format.number(v, 4) : v;
+}
+
+function stateOf(one) {
+  const share = one.total_steps ? Math.round((100 * one.step) / one.total_steps) : 0;
+  return one.state === "running" ? `running, ${share} %` : one.state;
+}
+
+function TrialPlot({ found }) {
+  const theme = useTheme();
+  const options = useMemo(() => plotOptions(theme, LABELS[found.quantity]), [theme, found.quantity]);
+  const data = useMemo(() => columns(found), [found]);
+  return html`<${Plot} options=${options} data=${data} height=${200}
+    label=${`${LABELS[found.quantity]} in percent of ${found.items.length} trials`} />`;
+}
+
+function columns({ items, maximised }) {
+  const better = maximised ? Math.max : Math.min;
+  let best = null;
+  const soFar = items.map(({ value }) => {
+    if (value) best = best === null ? value.mean : better(best, value.mean);
+    return best;
+  });
+  const row = (key) => items.map(({ value }) => value?.[key] ?? null);
+  const marked = items.map((one) => (one.best ? one.value.mean : null));
+  return [items.map((one) => one.trial), soFar, row("mean"), row("low"), row("high"), marked];
+}
+
+function plotOptions(theme, label) {
+  const dots = (colour, size) => ({ stroke: colour, width: 0, paths: () => null,
+    points: { show: true, size, fill: colour } });
+  const end = { stroke: theme.faint, width: 0, paths: () => null, points: { show: true, size: 3 } };
+  return {
+    legend: { show: false },
+    padding: [8, 16, 0, 0],
+    cursor: { show: false },
+    scales: { x: { time: false, range: (_, low, high) => [(low ?? 1) - 0.5, (high ?? 1) + 0.5] },
+      y: { range: [0, 1] } },
+    axes: [
+      axis(theme, { size: 38, label: "trial", labelSize: 14, labelFont: "11px Inter, system-ui",
+        incrs: [1, 2, 5, 10, 20, 50], values: (_, t) => t.map((v) => String(v)) }),
+      axis(theme, { size: 46, label: `${label} [%]`, labelSize: 16, labelFont: "11px Inter, system-ui",
+        values: (_, t) => t.map((v) => String(Math.round(100 * v))) }),
+    ],
+    series: [{}, { stroke: theme.faint, width: 1.25, spanGaps: true, points: { show: false } },
+      dots(theme.accent, 7), end, end, dots(theme.good, 11)],
+  };
+}

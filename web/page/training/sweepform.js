@@ -1,0 +1,123 @@
+// The form that starts a sweep: drawn fields with their ranges, trials and objective.
+import { html, useState } from "../vendor/htm-preact-standalone.module.js";
+import { post } from "../api.js";
+import { Icon } from "../icons.js";
+import { FormHead, Loading, OWN, parsed, useForm } from "./formfields.js";
+
+const MAX_RANGES = 8;
+const COUNTS = [
+  { name: "trials", title: "Trials", default: 20, minimum: 2, maximum: 200,
+    help: "Trainings with drawn fields, each evaluated" },
+  { name: "parallel", title: "Parallel trials", default: 1, minimum: 1, maximum: 8,
+    help: "Queued or run at once" },
+];
+const QUANTITY = { name: "objective.quantity", title: "Objective", default: "success",
+  choices: ["success", "collision", "timeout"],
+  labels: { success: "most success", collision: "least collision",
+    timeout: "least time-out" } };
+const EPISODES = { name: "objective.episodes", title: "Episodes", default: "",
+  help: "Of each evaluation; empty for its own number" };
+const PRUNE = { name: "prune", title: "Pruning", default: "true", choices: ["true", "false"],
+  labels: { true: "median rule", false: "none" },
+  help: "Stops trainings that are below the median of those before" };
+
+export function SweepForm({ presets: { items: presets, error }, cell, onStarted, onClose }) {
+  const [name, setName] = useState(null);
+  const [ranges, setRanges] = useState([{ path: "learning.lr_start" }]);
+  const preset = presets?.find((p) => p.name === name)
+    ?? presets?.find((p) => p.cell === cell) ?? presets?.[0];
+  const total = preset?.fields.find((f) => f.name === "learning.total_steps");
+  const own = [...OWN, ...COUNTS, QUANTITY, EPISODES, PRUNE].map((f) => f.name);
+  const form = useForm({
+    names: ["preset", "objective.protocol", "learning.total_steps", ...own,
+      ...ranges.map(({ path }) => `ranges.${path}`), "ranges"],
+    prefix: "sweep", onDone: onStarted,
+  });
+  if (!preset) return html`<${Loading} what="presets" error=${error} />`;
+  const value = (field) => form.typed[field.name] ?? String(field.default);
+  const send = (key) => post("v1/jobs", {
+    kind: "sweep", preset: preset.name, seed: parsed(value(OWN[0])), name: value(OWN[1]) || null,
+    overrides: { ...(cellOf(preset, cell)), learning: { total_steps: parsed(value(total)) } },
+    ranges: Object.fromEntries(ranges.map((one) => [one.path, rangeOf(one, preset)])),
+    trials: parsed(value(COUNTS[0])), parallel: parsed(value(COUNTS[1])),
+    prune: value(PRUNE) === "true",
+    objective: {
+      protocol: form.typed["objective.protocol"] ?? preset.objectives[0],
+      quantity: value(QUANTITY), episodes: value(EPISODES).trim() ? parsed(value(EPISODES)) : null,
+    },
+  }, key);
+  const change = (place, more) => {
+    form.type(`ranges.${ranges[place].path}`, "");
+    setRanges((now) => now.map((one, k) => (k === place ? { ...one, ...more } : one)));
+  };
+  const free = preset.fields.filter((f) => !["cell", total.name].includes(f.name) && !ranges.some((r) => r.path === f.name));
+  return html`<form class="train" ref=${form.ref} onSubmit=${form.submit(send)} noValidate
+    aria-label="New sweep">
+    <${FormHead} title="New sweep" fault=${form.faults[""]} onClose=${onClose} />
+    <div class="field"><label for="sweep-preset">Preset</label>
+      <select id="sweep-preset" value=${preset.name} onChange=${(e) => {
+        setName(e.target.value);
+        setRanges([{ path: "learning.lr_start" }]);
+        form.start({});
+      }}>${presets.map((p) => html`<option key=${p.name} value=${p.name}>${p.name}</option>`)}</select>
+    </div>
+    ${OWN.map((field) => form.row(field))}
+    ${form.row(total)}
+    <fieldset class="field-list"><legend>Drawn fields</legend>
+      ${ranges.map((one, place) => html`<${RangeRow} key=${one.path} one=${one} preset=${preset} free=${free}
+        fault=${form.faults[`ranges.${one.path}`]} onChange=${(more) => change(place, more)}
+        onRemove=${ranges.length > 1 ? () => setRanges((now) => now.filter((_, k) => k !== place)) : null} />`)}
+      ${form.faults.ranges && html`<p class="field-error" role="alert">${form.faults.ranges}</p>`}
+      ${ranges.length < MAX_RANGES && html`<button type="button" class="tool" data-action="add-range"
+        onClick=${() => setRanges((now) => [...now, { path: free[0].name }])}>
+        <${Icon} name="plus" />Add a field</button>`}
+    </fieldset>
+    ${COUNTS.map((field) => form.row(field))}
+    ${form.row({ name: "objective.protocol", title: "Evaluation", choices: preset.objectives,
+      default: preset.objectives[0] })}
+    ${[QUANTITY, EPISODES, PRUNE].map((field) => form.row(field))}
+    <div class="train-foot">
+      <button type="submit" class="primary" disabled=${form.busy}>
+        ${form.busy ? "Starting …" : "Start sweep"}</button>
+      <span class="faint">Its trainings wait in the queue like others.</span>
+    </div>
+  </form>`;
+}
+
+function cellOf(preset, cell) {
+  const field = preset.fields.find((f) => f.name === "cell");
+  return field?.choices?.includes(cell) ? { cell } : {};
+}
+
+/** The range of a row; empty ends are the limits of the field. */
+function rangeOf({ path, low, high, log, choices }, preset) {
+  const field = preset.fields.find((f) => f.name === path);
+  if (field?.choices) return { choices: choices ?? field.choices };
+  const end = (text, limit) => (text?.trim() ? parsed(text) : limit);
+  return { low: end(low, field.minimum), high: end(high, field.maximum), ...(log && { log: true }) };
+}
+
+function RangeRow({ one, preset, free, fault, onChange, onRemove }) {
+  const field = preset.fields.find((f) => f.name === one.path);
+  const chosen = one.choices ?? field?.choices;
+  const toggle = (choice) => onChange({ choices: chosen.includes(choice)
+    ? chosen.filter((c) => c !== choice) : [...chosen, choice] });
+  const input = (name, label, limit) => html`<input type="text" inputmode="decimal" value=${one[name] ?? ""}
+    data-range=${name} placeholder=${String(limit)} aria-label=${`${label} of ${field.title}`}
+    aria-invalid=${String(Boolean(fault))} onInput=${(e) => onChange({ [name]: e.target.value })} />`;
+  return html`<div class="range" data-path=${one.path}>
+    <select value=${one.path} aria-label="Drawn field"
+      onChange=${(e) => onChange({ path: e.target.value, low: "", high: "", choices: undefined })}>
+      ${[field, ...free].map((f) => html`<option key=${f.name} value=${f.name}>${f.name}${
+        f.unit && ` [${f.unit}]`}</option>`)}</select>
+    ${onRemove && html`<button type="button" class="quiet-button" aria-label=${`Remove ${one.path}`}
+      onClick=${onRemove}><${Icon} name="close" /></button>`}
+    <div class="range-ends">${field.choices
+      ? field.choices.map((c) => html`<label key=${c}><input type="checkbox" checked=${chosen.includes(c)}
+          onChange=${() => toggle(c)} /> ${c}</label>`)
+      : html`<span>from</span>${input("low", "Least value", field.minimum)}
+        <span>to</span>${input("high", "Greatest value", field.maximum)}
+        <label><input type="checkbox" checked=${Boolean(one.log)} data-range="log"
+          onChange=${() => onChange({ log: !one.log })} /> log</label>`}</div>
+    ${fault && html`<p class="field-error" role="alert">${fault}</p>`}</div>`;
+}
