@@ -304,8 +304,11 @@ MOTION_ITEMS = (
         ),
         agreement="the thesis has no number. Each task sorts ten objects, picked and set down,"
         " beside a person who works on; the planner moves straight to the nearest object and"
-        " does not regard the person. All rows have the same tasks, grasps and person.",
-        command="python -m app evaluate sorting-cycle-time --json"
+        " does not regard the person. All rows have the same tasks, grasps and person. Beside"
+        " the person, the layer costs 42 % of the throughput of the robot alone. Without a"
+        " protective distance the policy is not faster than the planner; with 0.3 m"
+        " it sets down a third more parts, but few tasks are finished in time.",
+        command="python -m app evaluate sorting-cycle-time --episodes 100 --json"
         " > docs/results/sorting-cycle-time.json",
     ),
 )
