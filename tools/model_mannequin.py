@@ -65,14 +65,14 @@ def _sleeves() -> list[Cone]:
 
 
 def _jacket() -> Surface:
-    grid = Grid((-0.2, -0.74, -0.16), (0.2, 0.74, 0.55), 0.012)
+    grid = Grid((-0.2, -0.74, -0.16), (0.2, 0.74, 0.55), 0.018)
     collar = _cone((-0.012, 0.0, 0.45), (-0.002, 0.0, 0.485), 0.068, 0.06, blend=0.03)
     return grid.mesh(grid.union([*_trunk(), *_sleeves(), collar]))
 
 
 def _vest() -> tuple[Surface, Surface]:
     """Return vest and reflecting stripes: the trunk, inflated and cut to shape."""
-    grid = Grid((-0.22, -0.26, -0.1), (0.22, 0.26, 0.52), 0.0092)
+    grid = Grid((-0.22, -0.26, -0.1), (0.22, 0.26, 0.52), 0.0138)
     trunk = grid.union(_trunk())
     x, y, z = np.moveaxis(grid.sample(lambda points: points), -1, 0)
     sleeve_hole = 0.155 - 0.35 * np.maximum(0.30 - z, 0.0) * -1.0
@@ -88,7 +88,7 @@ def _vest() -> tuple[Surface, Surface]:
 
 
 def _trousers() -> Surface:
-    grid = Grid((-0.18, -0.24, -0.93), (0.18, 0.24, 0.08), 0.013)
+    grid = Grid((-0.18, -0.24, -0.93), (0.18, 0.24, 0.08), 0.0195)
     cones = [_cone((0.0, 0.0, -0.05), (0.0, 0.0, 0.01), 0.15, 0.146, (0.72, 1.0, 0.85))]
     for sign in (-1.0, 1.0):
         hip, knee = (-0.005, sign * 0.085, -0.1), (0.012, sign * 0.095, -0.47)
@@ -105,7 +105,7 @@ def _trousers() -> Surface:
 
 def _shoe() -> Surface:
     """Return the left shoe in the foot's frame, the ankle at the origin."""
-    grid = Grid((-0.12, -0.08, -0.1), (0.24, 0.08, 0.06), 0.008)
+    grid = Grid((-0.12, -0.08, -0.1), (0.24, 0.08, 0.06), 0.011)
     upper = grid.union(
         [
             _cone((-0.03, 0.0, -0.045), (-0.01, 0.0, 0.02), 0.046, 0.047, blend=0.03),
@@ -137,7 +137,7 @@ def _hand() -> Surface:
             _cone((x, 0.0, -0.095), middle, 0.0115, 0.0108, blend=0.008),
             _cone(middle, tip, 0.0108, 0.0092, blend=0.008),
         ]
-    grid = Grid((-0.07, -0.07, -0.2), (0.085, 0.06, 0.06), 0.005)
+    grid = Grid((-0.07, -0.07, -0.2), (0.085, 0.06, 0.06), 0.007)
     glove = grid.mesh(grid.union(cones), 0.5)
     c, s = np.cos(0.8), np.sin(0.8)
     turn = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
@@ -157,7 +157,7 @@ def _head() -> tuple[Surface, Surface]:
     for sign in (-1.0, 1.0):
         ear = (-0.008, sign * 0.083, 0.185), (-0.002, sign * 0.081, 0.155)
         skull.append(_cone(ear[0], ear[1], 0.021, 0.014, (1.0, 0.45, 1.0), 0.012))
-    grid = Grid((-0.15, -0.13, -0.06), (0.17, 0.13, 0.34), 0.0075)
+    grid = Grid((-0.15, -0.13, -0.06), (0.17, 0.13, 0.34), 0.011)
     head = grid.mesh(grid.union(skull), 0.8)
     return head, _helmet()
 
@@ -174,7 +174,7 @@ def _glasses() -> Surface:
 
 
 def _helmet() -> Surface:
-    grid = Grid((-0.17, -0.15, 0.16), (0.23, 0.15, 0.39), 0.0075)
+    grid = Grid((-0.17, -0.15, 0.16), (0.23, 0.15, 0.39), 0.011)
     dome = grid.union(
         [
             _cone((0.005, 0.0, 0.225), (0.0, 0.0, 0.245), 0.128, 0.125, (1.0, 0.84, 0.92)),
