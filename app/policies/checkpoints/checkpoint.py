@@ -1,6 +1,6 @@
 """Checkpoint format: tensors as safetensors, everything else as a JSON manifest.
 
-Loading never executes code, because nothing is unpickled. The id of a checkpoint is the SHA-256
+The id of a checkpoint is the SHA-256
 of its canonical manifest followed by its tensors. Both state what was learned and from what
 (configuration, seed, cell, step, commits and versions), nothing that differs between equal
 trainings: equal trainings give equal ids.
@@ -43,8 +43,8 @@ REQUIRED = {
 
 
 @dataclass(frozen=True)
-class Checkpoint:
-    """A manifest and its tensors."""
+class TensorFile:
+    """A manifest and its tensors: the form of checkpoints and of states of trainings."""
 
     manifest: dict[str, Any]
     """Description of the tensors; JSON."""
@@ -53,8 +53,53 @@ class Checkpoint:
 
     @cached_property
     def sha256(self) -> str:
-        """Id of the checkpoint, 64 hexadecimal digits."""
+        """Digest of both, 64 hexadecimal digits; the id of a checkpoint."""
         return digest(self.manifest, self.tensors)
+
+    def arrays(self) -> dict[str, NDArray[Any]]:
+        """Return the tensors by name.
+
+        Raises:
+            InvalidInput: The bytes are no safetensors file.
+        """
+        try:
+            return load_tensors(self.tensors)
+        except SafetensorError as error:
+            raise InvalidInput("tensors", str(error), "must be a safetensors file") from error
+
+
+def check_file(
+    manifest: object, tensors: bytes, kind: str, required: Mapping[str, type], max_bytes: int
+) -> dict[str, Any]:
+    """Return the manifest of untrusted data; see :func:`load` for errors.
+
+    Args:
+        manifest: JSON value.
+        tensors: Content of the safetensors file.
+        kind: Required value of the field ``format``.
+        required: Fields every manifest has, with their JSON types.
+        max_bytes: Maximum size of the tensors [bytes].
+    """
+    if not isinstance(manifest, dict):
+        raise InvalidInput("manifest", type(manifest).__name__, "must be a JSON object")
+    for name, expected in required.items():
+        if not isinstance(value := manifest.get(name), expected):
+            raise InvalidInput(f"manifest.{name}", value, f"must be {expected.__name__}")
+        if name == "format" and value != kind:
+            raise CheckpointMismatch(name, kind, value)
+    if len(tensors) > max_bytes:
+        raise InvalidInput("tensors", len(tensors), f"must not exceed {max_bytes} bytes")
+    return manifest
+
+
+def tensor_bytes(arrays: Mapping[str, NDArray[Any]]) -> bytes:
+    """Return named arrays as the content of a safetensors file."""
+    return save_tensors({k: np.asarray(array, order="C") for k, array in arrays.items()})
+
+
+@dataclass(frozen=True)
+class Checkpoint(TensorFile):
+    """The networks of a policy."""
 
     def arrays(self) -> dict[str, NDArray[Any]]:
         """Return the tensors by name.
@@ -62,10 +107,7 @@ class Checkpoint:
         Raises:
             InvalidInput: The bytes are no safetensors file, or contain non-finite numbers.
         """
-        try:
-            arrays = load_tensors(self.tensors)
-        except SafetensorError as error:
-            raise InvalidInput("tensors", str(error), "must be a safetensors file") from error
+        arrays = super().arrays()
         for name, array in arrays.items():
             if not np.isfinite(array).all():
                 raise InvalidInput(f"tensors.{name}", "non-finite", "must be finite")
@@ -74,8 +116,7 @@ class Checkpoint:
 
 def pack(manifest: dict[str, Any], arrays: Mapping[str, NDArray[Any]]) -> Checkpoint:
     """Return a checked checkpoint of a manifest and named arrays."""
-    contiguous = {name: np.ascontiguousarray(array) for name, array in arrays.items()}
-    return load(manifest, save_tensors(contiguous))
+    return load(manifest, tensor_bytes(arrays))
 
 
 def load(manifest: object, tensors: bytes) -> Checkpoint:
@@ -85,23 +126,13 @@ def load(manifest: object, tensors: bytes) -> Checkpoint:
         InvalidInput: A field is missing, of a wrong type, or the tensors are too large.
         CheckpointMismatch: The format is another one.
     """
-    if not isinstance(manifest, dict):
-        raise InvalidInput("manifest", type(manifest).__name__, "must be a JSON object")
-    for name, kind in REQUIRED.items():
-        if not isinstance(manifest.get(name), kind):
-            raise InvalidInput(
-                f"manifest.{name}", manifest.get(name), f"must be {kind.__name__}"
-            )
-    if manifest["format"] != FORMAT:
-        raise CheckpointMismatch("format", FORMAT, manifest["format"])
-    if manifest["kind"] != "policy":
-        raise InvalidInput("manifest.kind", manifest["kind"], "must be policy")
-    if not 1 <= manifest["width"] <= 4096:
-        raise InvalidInput("manifest.width", manifest["width"], "must lie in [1, 4096] units")
-    _check_ranges(manifest["trained_range"])
-    if len(tensors) > MAX_BYTES:
-        raise InvalidInput("tensors", len(tensors), f"must not exceed {MAX_BYTES} bytes")
-    return Checkpoint(manifest, bytes(tensors))
+    fields = check_file(manifest, tensors, FORMAT, REQUIRED, MAX_BYTES)
+    if fields["kind"] != "policy":
+        raise InvalidInput("manifest.kind", fields["kind"], "must be policy")
+    if not 1 <= fields["width"] <= 4096:
+        raise InvalidInput("manifest.width", fields["width"], "must lie in [1, 4096] units")
+    _check_ranges(fields["trained_range"])
+    return Checkpoint(fields, bytes(tensors))
 
 
 def _check_ranges(ranges: dict[str, Any]) -> None:

@@ -2,7 +2,7 @@
 
 Networks, optimisers, environments, exploration, counters, random generators and the window of
 the learning curve are tensors (safetensors) and JSON values; transitions of the replay memory
-are in files that the manifest lists (``memory_files.py``). Nothing is pickled.
+are in files that the manifest lists (``memory_files.py``).
 """
 
 import json
@@ -13,13 +13,10 @@ from typing import Any
 
 import numpy as np
 import torch
-from safetensors import SafetensorError
-from safetensors.numpy import load as load_arrays
-from safetensors.numpy import save as save_arrays
 
-from app.digests import digest
-from app.errors import CheckpointMismatch, InvalidInput
+from app.errors import CheckpointMismatch
 from app.policies.algorithms.prioritized_replay import PrioritisedReplay
+from app.policies.checkpoints.checkpoint import TensorFile, check_file, tensor_bytes
 from app.policies.checkpoints.model_state import moments_of, restore, weights_of
 from app.policies.checkpoints.trained_cell import DEFINITION, manifest_fields
 from app.policies.configs.presets import Preset
@@ -45,23 +42,13 @@ REQUIRED = {
 
 
 @dataclass(frozen=True)
-class TrainingState:
-    """A manifest and its tensors."""
-
-    manifest: dict[str, Any]
-    """Configuration, values that are no arrays, and the files of the replay memory; JSON."""
-    tensors: bytes
-    """safetensors file."""
+class TrainingState(TensorFile):
+    """Configuration, values that are no arrays, and the files of the replay memory; tensors."""
 
     @property
     def step(self) -> int:
         """Environment steps so far."""
         return int(self.manifest["step"])
-
-    @property
-    def sha256(self) -> str:
-        """Digest of both, 64 hexadecimal digits."""
-        return digest(self.manifest, self.tensors)
 
     def entries(self) -> State:
         """Return arrays and values by name.
@@ -69,21 +56,14 @@ class TrainingState:
         Raises:
             InvalidInput: The bytes are no safetensors file.
         """
-        try:
-            return {**load_arrays(self.tensors), **self.manifest["values"]}
-        except SafetensorError as error:
-            raise InvalidInput("tensors", str(error), "must be a safetensors file") from error
+        return {**self.arrays(), **self.manifest["values"]}
 
 
 def pack(manifest: Mapping[str, Any], entries: State) -> TrainingState:
     """Return a checked state; ``entries`` are arrays and JSON values by name."""
-    arrays = {
-        name: np.asarray(value, order="C")
-        for name, value in entries.items()
-        if isinstance(value, np.ndarray)
-    }
+    arrays = {name: value for name, value in entries.items() if isinstance(value, np.ndarray)}
     values = {name: value for name, value in entries.items() if name not in arrays}
-    return load({**manifest, "format": FORMAT, "values": values}, save_arrays(arrays))
+    return load({**manifest, "format": FORMAT, "values": values}, tensor_bytes(arrays))
 
 
 def load(manifest: object, tensors: bytes) -> TrainingState:
@@ -93,15 +73,9 @@ def load(manifest: object, tensors: bytes) -> TrainingState:
         InvalidInput: A field is missing or of a wrong type, or the tensors are too large.
         CheckpointMismatch: The format is another one.
     """
-    fields = manifest if isinstance(manifest, dict) else {}
-    if fields.get("format") != FORMAT:
-        raise CheckpointMismatch("format", FORMAT, fields.get("format"))
-    for name, kind in REQUIRED.items():
-        if not isinstance(fields.get(name), kind):
-            raise InvalidInput(f"manifest.{name}", fields.get(name), f"must be {kind.__name__}")
-    if len(tensors) > MAX_BYTES:
-        raise InvalidInput("tensors", len(tensors), f"must not exceed {MAX_BYTES} bytes")
-    return TrainingState(fields, bytes(tensors))
+    return TrainingState(
+        check_file(manifest, tensors, FORMAT, REQUIRED, MAX_BYTES), bytes(tensors)
+    )
 
 
 def origin(preset: Preset, seed: int, cell: Cell) -> dict[str, Any]:
