@@ -25,21 +25,17 @@ from app.api.routes import (
     job_actions,
     jobs,
     metrics,
-    motion,
-    plan,
     presets,
     protocols,
     recordings,
     reference,
     results,
-    risk_map,
     session,
-    sorting,
-    task_selection,
     trackers,
     viewer,
     worlds,
 )
+from app.api.routes.decisions import motion, plan, risk_map, sorting, task_selection
 from app.api.security import SESSION_PATH, Guard
 
 ICON_PATH = "/favicon.ico"
