@@ -4,8 +4,7 @@ from typing import Annotated, Any
 
 from fastapi import APIRouter, Query, Response
 
-from app.api.schemas.comparison import ComparisonPublic
-from app.api.schemas.evaluations import EvaluationList, EvaluationPublic
+from app.api.schemas.results import ComparisonPublic, EvaluationList, EvaluationPublic
 from app.api.schemas.sweeps import TrialList
 from app.api.services import ServicesDep
 from app.errors import InvalidInput, NotFound

@@ -3,8 +3,7 @@
 from collections.abc import Sequence
 from urllib.parse import quote
 
-from app.api.schemas.comparison import ComparisonPublic
-from app.api.schemas.evaluations import EvaluationList, EvaluationPublic
+from app.api.schemas.results import ComparisonPublic, EvaluationList, EvaluationPublic
 from app.api.schemas.sweeps import TrialList
 from app.client.transport import Transport
 
