@@ -6,6 +6,7 @@ application       The HTTP application: routers, error handlers, access control 
 bodies            ASGI layer that checks address and body of a request before its route
 description       The OpenAPI document: answers of every operation, access, and names of
                   operations
+following         Live worlds that follow a training
 job_requests      Jobs of requests: the one a path names, checks before one is queued,
                   its answer
 direct_routes     ASGI layer that answers decision routes before the routing

@@ -15,6 +15,7 @@ from starlette.requests import HTTPConnection
 from app.api.metrics import Metrics
 from app.api.motion.load import MotionLoad
 from app.api.registry import CheckpointNames, PolicyRegistry
+from app.api.schemas.worlds import FollowPublic
 from app.api.tracker_sessions import TrackerSessions
 from app.errors import InvalidInput, NotFound, NotReady
 from app.live.lateness import Lateness
@@ -88,6 +89,23 @@ class Readiness:
             raise NotReady(self.reason)
 
 
+@dataclass(slots=True)
+class Follows:
+    """Trainings that live worlds follow (``app.api.following``)."""
+
+    by_world: dict[str, tuple[FollowPublic, LiveWorld]] = field(default_factory=dict)
+    """What each world follows or has followed, with the world."""
+    lock: threading.RLock = field(default_factory=threading.RLock)
+    """Held while one of them changes."""
+    thread: threading.Thread | None = None
+    """Looks for newer checkpoints; None while nothing is followed."""
+
+    def of(self, world_id: str) -> FollowPublic | None:
+        """Return what a world follows or has followed; None for nothing."""
+        found = self.by_world.get(world_id)
+        return None if found is None else found[0]
+
+
 @dataclass(slots=True, kw_only=True)
 class Services:
     """Parts of the service that routes use."""
@@ -122,6 +140,8 @@ class Services:
     """Counts decisions."""
     worlds: dict[str, LiveWorld] = field(default_factory=dict)
     """Live worlds by id; empty until the kernels are compiled."""
+    follows: Follows = field(default_factory=Follows)
+    """Trainings that live worlds follow."""
     trackers: TrackerSessions = field(default_factory=TrackerSessions)
     """Open trackers."""
     readiness: Readiness = field(default_factory=Readiness)

@@ -6,6 +6,7 @@ from typing import Any
 import pytest
 from playwright.sync_api import Page, expect
 
+from tests.browser.test_drag import tell
 from tests.browser.test_training import GROWTH_MS, open_form
 from tests.support import patient_http
 
@@ -139,3 +140,26 @@ def test_sweep_shows_its_trials_and_marks_the_best(
     page.locator(f'[data-trial="{best}"] button').click()
     expect(page.locator(".job.is-open .job-name")).to_contain_text(f"trial {best}")
     assert len(page.problems) == 1  # type: ignore[attr-defined]  # one refusal
+
+
+def test_cell_follows_a_training_and_says_with_which_step(
+    open_page: Callable[..., Page], server: str
+) -> None:
+    page = open_page((1280, 900), scene=False)
+    open_form(page)
+    page.click("form.train summary")
+    for name, value in (TINY | {"total_steps": 128_000}).items():
+        page.fill(f"#train-learning-{name}", str(value))
+    page.click("form.train [type=submit]")
+    page.click('.is-open [data-action="follow"]')
+    expect(page.locator('[data-role="follow"]')).to_contain_text("acts with", timeout=GROWTH_MS)
+    page.click('[data-action="unfollow"]')
+    expect(page.locator('.is-open [data-action="follow"]')).to_have_count(1)
+    page.click('.is-open [data-action="follow"]')
+    job_id = page.get_attribute(".job.is-open", "data-job")
+    patient_http.post(f"{server}/v1/jobs/{job_id}/cancel")
+    expect(page.locator('[data-role="follow"]')).to_contain_text(
+        "is cancelled: its last checkpoint acts", timeout=GROWTH_MS
+    )
+    tell(server, {"tag": "set-policy", "checkpoint": "pick"})
+    assert page.problems == []  # type: ignore[attr-defined]

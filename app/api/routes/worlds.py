@@ -8,10 +8,13 @@ from fastapi import APIRouter, Body, Depends
 from fastapi.sse import EventSourceResponse, ServerSentEvent
 from starlette.concurrency import run_in_threadpool
 
+from app.api import following
 from app.api.description import MISMATCH
 from app.api.schemas.examples import COMMANDS, named
 from app.api.schemas.worlds import (
     CommandAccepted,
+    FollowPublic,
+    FollowRequest,
     WorldCell,
     WorldList,
     WorldState,
@@ -38,6 +41,7 @@ from app.live.reach.interfaces import LiveReachPolicy
 from app.sim.cells.cell import Cell
 from app.sim.pick.task_policy import TaskPolicy
 from app.sim.sorting.sorting_values import SortingValues
+from app.store.jobs import get_job
 
 STREAM_PERIOD_S = 0.1
 
@@ -55,8 +59,12 @@ WorldDep = Annotated[LiveWorld, Depends(live_world)]
 @router.get("", summary="List the live worlds")
 async def list_worlds(services: ServicesDep) -> WorldList:
     """Return every live world; none while the service warms up."""
-    snapshots = [world.handle.snapshot() for world in services.worlds.values()]
-    return WorldList(items=[WorldSummary.from_domain(one) for one in snapshots])
+    return WorldList(
+        items=[
+            WorldSummary.from_domain(world.handle.snapshot(), services.follows.of(world_id))
+            for world_id, world in services.worlds.items()
+        ]
+    )
 
 
 @router.get("/{world_id}", summary="One live world, with the state a decision needs")
@@ -80,6 +88,7 @@ async def command_world(
     tick, cell = world.handle.snapshot().tick, world.cell
     if isinstance(body, LoadingCommand):
         body = body.with_loaded(await run_in_threadpool(load_for, body, cell, services))
+        await run_in_threadpool(following.end_by, body, world.handle.id, services)
     return CommandAccepted(tag=body.tag, number=world.handle.submit(body), tick=tick)
 
 
@@ -145,6 +154,26 @@ def set_world_cell(world_id: str, body: WorldCell, services: ServicesDep) -> Wor
         sorting_policy = services.sorting_policies.load(body.sorting_policy)
         require_sorting_policy(sorting_policy, cell)
     return _replace_world(world_id, cell, policy, sorting_policy, None, services)
+
+
+@router.put(
+    "/{world_id}/follow", summary="Let a live world follow a training", responses=MISMATCH
+)
+def follow_training(world_id: str, body: FollowRequest, services: ServicesDep) -> FollowPublic:
+    """Let the newest checkpoint of a training act, now and whenever one is stored.
+
+    It ends with the job, whose last checkpoint then acts, with another cell, and with a delete.
+    """
+    job = get_job(services.store, body.job)
+    return following.start(world_id, job, services)
+
+
+@router.delete("/{world_id}/follow", status_code=204, summary="Follow a training no longer")
+def stop_following(world_id: str, services: ServicesDep) -> None:
+    """Keep the policy that acts; without a followed training this changes nothing."""
+    services.world(world_id)
+    with services.follows.lock:
+        services.follows.by_world.pop(world_id, None)
 
 
 def _replace_world(

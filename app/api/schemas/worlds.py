@@ -63,6 +63,17 @@ def state_of(snapshot: WorldSnapshot) -> WorldState:
     )
 
 
+class FollowPublic(Answer):
+    """What a live world follows, or why it does so no longer."""
+
+    job: str = Field(description="id of the training")
+    number: int = Field(description="its running number")
+    active: bool = Field(description="whether newer checkpoints will act")
+    step: int | None = Field(description="step of the checkpoint that acts; null: none yet")
+    checkpoint: str | None = Field(description="its SHA-256")
+    reason: str | None = Field(description="why it has ended; null while it follows")
+
+
 class WorldSummary(Answer):
     """One line of the list of worlds."""
 
@@ -70,15 +81,19 @@ class WorldSummary(Answer):
     cell: str
     viewer: str
     checkpoint: str | None
+    follow: FollowPublic | None = Field(
+        description="the training that it follows or followed last; null for none"
+    )
 
     @classmethod
-    def from_domain(cls, snapshot: WorldSnapshot) -> Self:
+    def from_domain(cls, snapshot: WorldSnapshot, follow: FollowPublic | None = None) -> Self:
         """Make it from a snapshot."""
         return cls(
             id=snapshot.id,
             cell=snapshot.cell,
             viewer=f"/viewer/{snapshot.id}/",
             checkpoint=snapshot.checkpoint,
+            follow=follow,
         )
 
 
@@ -139,3 +154,9 @@ class CommandAccepted(Answer):
     tag: str
     number: int = Field(description="a snapshot whose `commands` is as high shows its effect")
     tick: int = Field(description="the world's last tick when the command was queued")
+
+
+class FollowRequest(Body):
+    """The training whose newest checkpoint acts in a live world."""
+
+    job: str = Field(max_length=64, description="id of a training that has not ended")

@@ -4,7 +4,14 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 from urllib.parse import quote
 
-from app.api.schemas.worlds import CommandAccepted, WorldCell, WorldList, WorldSummary
+from app.api.schemas.worlds import (
+    CommandAccepted,
+    FollowPublic,
+    FollowRequest,
+    WorldCell,
+    WorldList,
+    WorldSummary,
+)
 from app.client.transport import StreamEvent, Transport
 from app.live.commands import LiveCommand
 
@@ -41,3 +48,16 @@ class WorldsOperations(Transport):
             WorldSummary,
             self._send("PUT", f"/v1/worlds/{quote(world_id, safe='')}/cell", body=body),
         )
+
+    def follow_training(
+        self, world_id: str, body: FollowRequest | Mapping[str, Any]
+    ) -> FollowPublic:
+        """Let a live world follow a training."""
+        return self._parsed(
+            FollowPublic,
+            self._send("PUT", f"/v1/worlds/{quote(world_id, safe='')}/follow", body=body),
+        )
+
+    def stop_following(self, world_id: str) -> None:
+        """Follow a training no longer."""
+        self._send("DELETE", f"/v1/worlds/{quote(world_id, safe='')}/follow")

@@ -7,6 +7,7 @@ import { CurvePlot } from "../plots.js";
 import { EndedByBudget } from "./budgets.js";
 import { MAX_JOBS } from "./compare.js";
 import { JobActions, Labels, isActive } from "./jobactions.js";
+import { Follow } from "./follow.js";
 import { SweepDetail } from "./sweep.js";
 
 const POLL_MS = 2000;
@@ -177,6 +178,7 @@ function JobDetail({ job, onChanged, onOpen, onClone, onAct, acting }) {
     <div class="job-actions">
       ${checkpoint && html`<${Act} job=${job} newest=${checkpoint} acting=${acting}
         onAct=${onAct} />`}
+      ${job.kind === "train" && html`<${Follow} job=${job} />`}
       <${JobActions} ...${{ job, onChanged, onOpen, onClone }} />
     </div>
     <${Labels} job=${job} onChanged=${onChanged} />

@@ -1,0 +1,148 @@
+"""Live worlds that follow a training: its newest checkpoint acts as soon as it is stored."""
+
+import logging
+import threading
+from typing import Any
+
+from app.api.schemas.worlds import FollowPublic
+from app.api.services import LiveWorld, Services
+from app.api.world_policies import (
+    load_for,
+    reach_policy_for,
+    sorting_policy_for,
+    task_policy_for,
+)
+from app.errors import ServiceError, WrongState
+from app.live.commands import LoadingCommand, SetPolicy
+from app.live.reach.commands import is_reaching
+from app.live.sorting.commands import SetSortingPolicy
+from app.policies.checkpoints.checkpoint import SORTING, purpose_of
+from app.store.checkpoints import list_checkpoints
+from app.store.jobs import find_job
+from app.store.records import JobRecord
+
+logger = logging.getLogger(__name__)
+
+PERIOD_S = 1.0
+"""Period of the look for a newer checkpoint [s]."""
+
+
+def start(world_id: str, job: JobRecord, services: Services) -> FollowPublic:
+    """Let a world follow a training; its newest checkpoint acts at once.
+
+    Raises:
+        NotFound: There is no such world.
+        WrongState: The job is no training, or has ended.
+        InvalidInput: The policy does not fit the cell.
+        CheckpointMismatch: Likewise.
+    """
+    if job.kind != "train":
+        rule = f"of job {job.number}: only trainings are followed"
+        raise WrongState("kind", job.kind, rule, ("train",))
+    if job.is_final:
+        rule = f"of job {job.number}, which has ended: deploy its last checkpoint instead"
+        raise WrongState("state", job.state, rule, ("queued", "running"))
+    world, follows = services.world(world_id), services.follows
+    follow = FollowPublic(
+        job=job.id, number=job.number, active=True, step=None, checkpoint=None, reason=None
+    )
+    with follows.lock:
+        follow = _updated(follow, world, services)
+        follows.by_world[world_id] = follow, world
+        if follows.thread is None or not follows.thread.is_alive():
+            follows.thread = threading.Thread(
+                target=_run, args=(services,), name="following", daemon=True
+            )
+            follows.thread.start()
+    return follow
+
+
+def end_by(command: LoadingCommand, world_id: str, services: Services) -> None:
+    """End following where a command chooses another policy."""
+    if not isinstance(command, SetPolicy | SetSortingPolicy):
+        return
+    with services.follows.lock:
+        found = services.follows.by_world.get(world_id)
+        if found is not None and found[0].active:
+            now = _ended(found[0], "another policy was chosen")
+            services.follows.by_world[world_id] = now, found[1]
+
+
+def look(services: Services) -> bool:
+    """Let newer checkpoints act; return whether a world still follows a training."""
+    follows = services.follows
+    with follows.lock:
+        for world_id, (follow, world) in list(follows.by_world.items()):
+            if not follow.active:
+                continue
+            if services.worlds.get(world_id) is world:
+                now = _looked(follow, world, services)
+            else:
+                now = _ended(follow, "the cell was started again")
+            follows.by_world[world_id] = now, world
+        active = any(follow.active for follow, _ in follows.by_world.values())
+        follows.thread = follows.thread if active else None
+        return active
+
+
+def _run(services: Services) -> None:
+    while not services.stopping.wait(PERIOD_S):
+        try:
+            if not look(services):
+                return
+        except Exception:
+            logger.exception("a followed training could not be looked at")
+
+
+def _looked(follow: FollowPublic, world: LiveWorld, services: Services) -> FollowPublic:
+    """Return a follow after a look; it has ended where its job has."""
+    job = find_job(services.store, follow.job)
+    if job is None:
+        return _ended(follow, f"job {follow.number} was deleted")
+    try:
+        now = _updated(follow, world, services)
+    except ServiceError as error:
+        return _ended(follow, error.message)
+    if now.active and job.is_final:
+        acts = "its last checkpoint acts" if now.checkpoint else "it has no checkpoint"
+        return _ended(now, f"job {job.number} is {job.state}: {acts}")
+    return now
+
+
+def _updated(follow: FollowPublic, world: LiveWorld, services: Services) -> FollowPublic:
+    """Let the newest checkpoint of the job act, if it does not yet."""
+    items = list_checkpoints(services.store, job_id=follow.job, limit=1).items
+    if not items and follow.checkpoint is not None:
+        _fall_back(world, services)
+        reason = f"the checkpoints of job {follow.number} were removed: the cell's policy acts"
+        return _ended(follow, reason, step=None, checkpoint=None)
+    if not items or items[0].sha256 == follow.checkpoint:
+        return follow
+    newest = items[0]
+    sorts = purpose_of(newest.manifest) == SORTING
+    command: SetPolicy | SetSortingPolicy = SetPolicy(checkpoint=newest.sha256)
+    if sorts:
+        command = SetSortingPolicy(checkpoint=newest.sha256)
+    world.handle.submit(command.with_loaded(load_for(command, world.cell, services)))
+    return follow.model_copy(update={"step": newest.step, "checkpoint": newest.sha256})
+
+
+def _ended(follow: FollowPublic, reason: str, **changes: Any) -> FollowPublic:
+    logger.info("job %d is followed no longer: %s", follow.number, reason)
+    return follow.model_copy(update={"active": False, "reason": reason, **changes})
+
+
+def _fall_back(world: LiveWorld, services: Services) -> None:
+    """Let the policies act that the cell starts with."""
+    cell, sorting = world.cell, sorting_policy_for(world.cell, services)
+    if is_reaching(cell):
+        reach = reach_policy_for(cell, services)
+        name = None if reach is None else reach.checkpoint
+        world.handle.submit(SetPolicy(checkpoint=name).with_loaded(reach))
+        return
+    policy = task_policy_for(cell, services)
+    name = None if policy is None else policy.checkpoint
+    world.handle.submit(SetPolicy(checkpoint=name).with_loaded(policy))
+    if sorting is not None:
+        command = SetSortingPolicy(checkpoint=sorting.checkpoint)
+        world.handle.submit(command.with_loaded(sorting))

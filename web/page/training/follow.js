@@ -1,0 +1,38 @@
+// The live cell follows a training: its newest checkpoint acts as soon as it is stored.
+import { html, useEffect, useState } from "../vendor/htm-preact-standalone.module.js";
+import { get, put, remove } from "../api.js";
+import * as format from "../format.js";
+import { WORLD } from "../live/world-stream.js";
+import { Fault, isActive, useAction } from "./jobactions.js";
+
+export function Follow({ job }) {
+  const [follow, setFollow] = useState(null);
+  const action = useAction((answer) => setFollow(answer));
+  useEffect(() => {
+    let over = false;
+    get("v1/worlds").then(({ items }) => {
+      if (!over) setFollow(items.find(({ id }) => id === WORLD)?.follow ?? null);
+    }, () => {});
+    return () => {
+      over = true;
+    };
+  }, [isActive(job) ? job : job.state]);
+  const mine = follow?.job === job.id;
+  const path = `v1/worlds/${WORLD}/follow`;
+  if (!isActive(job) && !mine) return null;
+  return html`
+    ${mine && follow.active
+      ? html`<button type="button" class="tool" data-action="unfollow" disabled=${action.busy}
+          onClick=${() => action.run(() => remove(path))}>Stop following</button>`
+      : isActive(job) && html`<button type="button" class="tool" data-action="follow"
+          disabled=${action.busy} title="The newest checkpoint of this job acts in the live cell"
+          onClick=${() => action.run(() => put(path, { job: job.id }))}>Follow in cell</button>`}
+    ${mine && html`<span class="faint" role="status" data-role="follow">${text(follow)}</span>`}
+    <${Fault} error=${action.error} />`;
+}
+
+function text({ active, step, reason }) {
+  if (!active) return `Followed no longer: ${reason}.`;
+  return step === null ? "The cell waits for its first checkpoint."
+    : `The cell acts with ${format.steps(step)} steps.`;
+}
