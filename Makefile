@@ -54,10 +54,10 @@ run: $(VENV)/setup.stamp ## set up what is missing, start the server, print its 
 setup: $(VENV)/setup.stamp ## set up without starting
 
 test: $(VENV)/dev.stamp $(VENV)/setup.stamp ## the default tests: no network, no browser, no long training
-	@$(PY) -m pytest $(SIDE_BY_SIDE)
+	@$(PY) -m pytest $(SIDE_BY_SIDE) --durations 15
 
 test-browser: $(VENV)/dev.stamp ## the page in a real Chromium
-	@$(PY) -m pytest -m browser
+	@$(PY) -m pytest -m browser --numprocesses 2 --dist loadfile --durations 15
 
 test-postgres: $(VENV)/dev.stamp ## store and supervisor on a PostgreSQL server of the tests
 	@$(PY) -m pytest -m 'postgres and not slow' $(SIDE_BY_SIDE) tests/store tests/jobs
