@@ -92,6 +92,7 @@ COMMANDS: dict[str, Any] = {
     "set the candidates": {"tag": "set-candidates", "ids": ["cube1", "cube2"]},
     "resume": {"tag": "resume"},
 }
+FOLLOW: dict[str, Any] = {"job": "69fed224-c62a-436c-921d-1da364e6d886"}
 WORLD_CELL: dict[str, Any] = {"cell": "pick-and-place"}
 
 

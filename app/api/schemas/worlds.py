@@ -5,7 +5,7 @@ from typing import Any, ClassVar, Self
 
 from pydantic import ConfigDict, Field, TypeAdapter
 
-from app.api.schemas.examples import WORLD_CELL, shows
+from app.api.schemas.examples import FOLLOW, WORLD_CELL, shows
 from app.api.schemas.numbers import Answer, Body
 from app.api.schemas.robot_state import RobotState
 from app.api.schemas.task_selection import CandidateState, PersonState, TaskSelectionRequest
@@ -158,5 +158,7 @@ class CommandAccepted(Answer):
 
 class FollowRequest(Body):
     """The training whose newest checkpoint acts in a live world."""
+
+    model_config = shows(FOLLOW)
 
     job: str = Field(max_length=64, description="id of a training that has not ended")
