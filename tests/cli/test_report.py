@@ -12,7 +12,7 @@ from app.cli.report.parts import Config, Curve, Measure, StoredValue
 PRINTED = (
     "Table 3.1", "Figure 3.1", "Figure 3.2", "figure 3.3", "Figure 4.1", "Table 4.1",
     "Table 4.2", "Figure 4.4", "Figures 4.5, 4.6", "Table 4.3", "Figure 4.7", "Figure 4.9",
-    "table 4.4", "Outlook (4.5)", "Tables 5.1, 5.2", "figure 5.3", "Table 5.3",
+    "table 4.4", "Outlook (4.5)", "Table 5.1", "Table 5.2", "Figure 5.3", "Table 5.3",
     "figures 5.4 to 5.7",
 )  # fmt: skip
 """Tables and figures of the results of the thesis."""

@@ -69,7 +69,7 @@ def curve(result: Json) -> Figure:
         steps = [point["step"] / 1e6 for point in one["played"]]
         left.plot(steps, [point["reward"] for point in one["played"]], color=BLUE)
         left.axhline(one["standing_still"], color=GREY, lw=0.9, ls="--")
-        for end, colour in (("success", GREEN), ("collision", RED), ("timeout", ORANGE)):
+        for end, colour in (("timeout", ORANGE), ("collision", RED), ("success", GREEN)):
             rates = [100.0 * point[end] for point in one["played"]]
             right.plot(steps, rates, color=colour, label=end)
     right.axhline(75.0, color=GREY, lw=0.9, ls="--")
@@ -78,6 +78,7 @@ def curve(result: Json) -> Figure:
     right.legend(loc="center right")
     for view in (left, right):
         view.set_xlabel("environment steps [1e6]")
+        view.set_xlim(left=0.0)
     return figure
 
 

@@ -88,6 +88,8 @@ def _origin(name: str, found: Json) -> str:
     usual = f"python -m app {verb} {found.get('protocol') or found.get('bench')} --json"
     if found.get("settings", {}).get("cell") == "sorting-e1":
         usual += " --checkpoint sorting-e1"
+    if name.startswith("thesis-"):
+        usual += " --checkpoint FILE"
     parts = [f"`docs/results/{name}.json`: `{found.get('command', usual)}`"]
     parts += [f"{key} {found[key]}" for key in ("episodes", "seed") if key in found]
     if "checkpoint" in found:

@@ -71,3 +71,13 @@ def test_reach_recipe_does_not_gain_over_standing_still_at_first(name: str) -> N
     points = trained(preset).progress
     assert np.mean([one.reward for one in points]) < standing_still(preset)
     assert max(one.success for one in points) < 0.2
+
+
+@pytest.mark.slow
+def test_pick_recipe_gains_over_standing_still_at_first_by_contacts() -> None:
+    """A contact costs less than waiting for the time limit (docs/notebook/pick.md)."""
+    preset = short("pick-td3-thesis", 4_000)
+    point = trained(preset).progress[-1]
+    assert point.updates == 3_900
+    assert point.reward > standing_still(preset) + 1.0
+    assert point.collision > 0.8
