@@ -259,7 +259,7 @@ def test_only_so_many_files_are_taken_in_at_once(client: TestClient) -> None:
         uploads.release(MAX_UPLOADS)
     assert answer.status_code == 503
     assert answer.headers["Retry-After"] == "2"
-    assert "4 files are being imported" in answer.json()["detail"]
+    assert "4 files are being read" in answer.json()["detail"]
 
 
 def test_refused_files_leave_room_for_the_next(client: TestClient) -> None:

@@ -16,9 +16,9 @@ from tools.docs.reach.tables import COLUMNS, is_reach, lines_of, siblings
 from tools.docs.tables import BLOCK, render, table
 from tools.docs.world.plots import BLUE, ORANGE
 
-PAGE = (Path(__file__).resolve().parents[4] / "docs/results/reach.md").read_text(
-    encoding="utf-8"
-)
+DOCS = Path(__file__).resolve().parents[4] / "docs"
+PAGE = (DOCS / "results/reach.md").read_text(encoding="utf-8")
+REPORT = (DOCS / "report/index.md").read_text(encoding="utf-8")
 
 
 @pytest.fixture
@@ -112,26 +112,26 @@ def test_results_of_other_tasks_are_left_to_others() -> None:
     assert is_reach({"protocol": "reach-targets"})
 
 
-def test_every_picture_of_the_page_is_drawn(
+def test_every_picture_of_page_and_report_is_drawn(
     results: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     images = results / "img"
     monkeypatch.setattr(reach_plots, "RESULTS", results)
     monkeypatch.setattr(reach_plots, "IMAGES", images)
     reach_plots.main()
-    shown = set(re.findall(r"\]\(\.\./img/reach/([a-z-]+\.png)\)", PAGE))
+    shown = set(re.findall(r"\]\(\.\./img/reach/([a-z-]+\.png)\)", PAGE + REPORT))
     of_ssm = {"override.png", "arrivals.png"}  # drawn by reach_ssm_plots.py
     assert {path.name for path in images.glob("*.png")} == shown - of_ssm
     assert all(path.stat().st_size > 10_000 for path in images.glob("*.png"))
 
 
-def test_without_results_nothing_is_drawn(
+def test_without_results_only_walks_are_drawn(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(reach_plots, "RESULTS", tmp_path)
     monkeypatch.setattr(reach_plots, "IMAGES", tmp_path / "img")
     reach_plots.main()
-    assert list(tmp_path.iterdir()) == []
+    assert [path.name for path in tmp_path.rglob("*.png")] == ["walks.png"]
 
 
 def test_each_square_of_the_heat_maps_is_its_target() -> None:
