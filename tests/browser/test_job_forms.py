@@ -23,6 +23,15 @@ TINY = {
 """A training of seconds with a point and a checkpoint at every step."""
 
 
+def submit(page: Page) -> str:
+    """Post the job of the form and return its id once it is open."""
+    with page.expect_response(lambda one: one.request.method == "POST") as answer:
+        page.click("form.train [type=submit]")
+    job_id: str = answer.value.json()["id"]
+    page.wait_for_selector(f'.job.is-open[data-job="{job_id}"]')
+    return job_id
+
+
 def state_of(page: Page) -> str | None:
     """Return the state of the open job once it has ended."""
     page.wait_for_selector(".job.is-open:is([data-state=succeeded], [data-state=failed])")
@@ -42,10 +51,8 @@ def test_training_ends_at_its_budget_and_goes_on_with_a_larger_one(
     page.click("form.train [type=submit]")
     expect(page.locator("#train-step_budget-error")).to_contain_text("integer")
     page.fill("#train-step_budget", "1000")
-    page.click("form.train [type=submit]")
-    page.wait_for_selector(".job.is-open")
+    job_id = submit(page)
     assert state_of(page) == "succeeded"
-    job_id = page.get_attribute(".job.is-open", "data-job")
     ended = page.locator('.is-open [data-role="ended-by"]')
     expect(ended).to_contain_text("Ended by its step budget at 1024 of 5120 steps")
     expect(page.locator(".is-open .chip")).to_have_text("succeeded: step budget")
@@ -83,10 +90,9 @@ def test_evaluation_is_started_with_choices_of_the_server(
     expect(page.locator(".field-list .field-error")).to_contain_text("at least one motion")
     page.select_option("#evaluate-protocol", "pick-single")
     page.fill("#evaluate-name", "a look")
-    page.click("form.train [type=submit]")
-    page.wait_for_selector(".job.is-open")
+    job_id = submit(page)
     assert state_of(page) == "succeeded"
-    made = job(server, page.get_attribute(".job.is-open", "data-job"))
+    made = job(server, job_id)
     assert (made["name"], made["spec"]["protocol"], made["seed"]) == (
         "a look",
         "pick-single",
@@ -120,9 +126,8 @@ def test_sweep_shows_its_trials_and_marks_the_best(
     page.locator(".range select").last.select_option("networks.width")
     page.locator(".range").last.locator('[data-range="low"]').fill("16")
     page.locator(".range").last.locator('[data-range="high"]').fill("32")
-    page.click("form.train [type=submit]")
+    job_id = submit(page)
     page.wait_for_selector(".job.is-open [data-trial]", timeout=GROWTH_MS)
-    job_id = page.get_attribute(".job.is-open", "data-job")
     made = job(server, job_id)
     assert made["spec"]["ranges"]["learning.lr_start"] == {
         "low": 1e-4,
@@ -150,13 +155,12 @@ def test_cell_follows_a_training_and_says_with_which_step(
     page.click("form.train summary")
     for name, value in (TINY | {"total_steps": 128_000}).items():
         page.fill(f"#train-learning-{name}", str(value))
-    page.click("form.train [type=submit]")
+    job_id = submit(page)
     page.click('.is-open [data-action="follow"]')
     expect(page.locator('[data-role="follow"]')).to_contain_text("acts with", timeout=GROWTH_MS)
     page.click('[data-action="unfollow"]')
     expect(page.locator('.is-open [data-action="follow"]')).to_have_count(1)
     page.click('.is-open [data-action="follow"]')
-    job_id = page.get_attribute(".job.is-open", "data-job")
     patient_http.post(f"{server}/v1/jobs/{job_id}/cancel")
     expect(page.locator('[data-role="follow"]')).to_contain_text(
         "is cancelled: its last checkpoint acts", timeout=GROWTH_MS

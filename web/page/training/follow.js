@@ -5,16 +5,26 @@ import * as format from "../format.js";
 import { WORLD } from "../live/world-stream.js";
 import { Fault, isActive, useAction } from "./jobactions.js";
 
+/** The server looks at a followed job once a second, and so does the page once it has ended. */
+const LOOK_MS = 1000;
+
 export function Follow({ job }) {
   const [follow, setFollow] = useState(null);
   const action = useAction((answer) => setFollow(answer));
   useEffect(() => {
     let over = false;
-    get("v1/worlds").then(({ items }) => {
-      if (!over) setFollow(items.find(({ id }) => id === WORLD)?.follow ?? null);
+    let timer = null;
+    const look = () => get("v1/worlds").then(({ items }) => {
+      if (over) return;
+      const now = items.find(({ id }) => id === WORLD)?.follow ?? null;
+      setFollow(now);
+      const isBehind = now?.job === job.id && now.active && !isActive(job);
+      if (isBehind) timer = setTimeout(look, LOOK_MS);
     }, () => {});
+    look();
     return () => {
       over = true;
+      clearTimeout(timer);
     };
   }, [isActive(job) ? job : job.state]);
   const mine = follow?.job === job.id;
