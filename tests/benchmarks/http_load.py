@@ -54,18 +54,20 @@ class Load:
 
 
 class Client(asyncio.Protocol):
-    """A client on one connection.
+    """A client on one connection; its first request, which waits to be accepted, is not timed.
 
     Args:
         request: Bytes of the request.
-        until: Time after which no request is sent, on the clock ``time.perf_counter`` [s].
         times_ms: Gets the time of each answer [ms].
     """
 
-    def __init__(self, request: bytes, until: float, times_ms: list[float]) -> None:
-        self._request, self._until, self._times_ms = request, until, times_ms
+    def __init__(self, request: bytes, times_ms: list[float]) -> None:
+        self._request, self._times_ms = request, times_ms
+        self._until: float | None = None
         self._parser = httptools.HttpResponseParser(self)
         self._body = b""
+        self.ready = asyncio.get_running_loop().create_future()
+        """Set once the first answer has come, or the connection has ended."""
         self.done = asyncio.get_running_loop().create_future()
         """Set once the last answer has come; an exception where one is no 200."""
         self.closed = asyncio.get_running_loop().create_future()
@@ -88,11 +90,15 @@ class Client(asyncio.Protocol):
     def on_message_complete(self) -> None:
         """Note the time of an answer and send the next request."""
         now = time.perf_counter()
-        self._times_ms.append(1e3 * (now - self._sent))
         status = self._parser.get_status_code()
         if status != 200:
             self._end(RuntimeError(f"status {status}: {self._body.decode()}"))
-        elif now < self._until:
+            return
+        if self._until is None:
+            self.ready.set_result(None)
+            return
+        self._times_ms.append(1e3 * (now - self._sent))
+        if now < self._until:
             self._send()
         else:
             self._end(None)
@@ -102,6 +108,12 @@ class Client(asyncio.Protocol):
         self._end(exc or ConnectionError("the server closed the connection"))
         self.closed.set_result(None)
 
+    def start(self, until: float) -> None:
+        """Send timed requests until a time on the clock ``time.perf_counter`` [s]."""
+        self._until = until
+        if not self.done.done():
+            self._send()
+
     def _send(self) -> None:
         self._sent = time.perf_counter()
         self._transport.write(self._request)
@@ -109,6 +121,8 @@ class Client(asyncio.Protocol):
     def _end(self, error: Exception | None) -> None:
         if self.done.done():
             return
+        if not self.ready.done():
+            self.ready.set_result(None)
         if error is None:
             self.done.set_result(None)
         else:
@@ -135,14 +149,17 @@ def load(address: str, request: Request, *, clients: int, seconds: float) -> Loa
 async def _load(address: str, request: Request, clients: int, seconds: float) -> Load:
     parts, times_ms = urlsplit(address), list[float]()
     content = request.encoded(parts.netloc)
-    begin = time.perf_counter()
     opened = [
         asyncio.get_running_loop().create_connection(
-            lambda: Client(content, begin + seconds, times_ms), parts.hostname, parts.port
+            lambda: Client(content, times_ms), parts.hostname, parts.port
         )
         for _ in range(clients)
     ]
     connected = await asyncio.gather(*opened)
+    await asyncio.gather(*(one.ready for _, one in connected))
+    begin = time.perf_counter()
+    for _, one in connected:
+        one.start(begin + seconds)
     ends = await asyncio.gather(*(one.done for _, one in connected), return_exceptions=True)
     spent = time.perf_counter() - begin
     await asyncio.gather(*(one.closed for _, one in connected))
