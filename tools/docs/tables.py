@@ -16,7 +16,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from tools.docs import headline, pick_tables
+from tools.docs import headline, pick_seeds, pick_tables
 from tools.docs.reach import tables as reach_tables
 from tools.docs.sorting.tables import is_sorting, lines_of
 
@@ -24,8 +24,8 @@ ROOT = Path(__file__).resolve().parents[2]
 
 BLOCK = re.compile(r"(<!-- begin ([a-z0-9_-]+) -->\n).*?(<!-- end \2 -->)", re.DOTALL)
 Json = dict[str, Any]
-HEADLINE = "headline"
-"""Name of the table of `headline.py`."""
+COMPOSED = {"headline": headline.lines, "pick-seeds": pick_seeds.lines}
+"""Tables of several results by their names."""
 UNITS = {
     "rad_s": "rad/s",
     "m_s": "m/s",
@@ -49,8 +49,8 @@ def render(text: str, results: Path) -> str:
     """
 
     def block(match: re.Match[str]) -> str:
-        if match[2] == HEADLINE:
-            lines = headline.lines(results)
+        if match[2] in COMPOSED:
+            lines = COMPOSED[match[2]](results)
             return match[0] if lines is None else f"{match[1]}{_table(lines)}\n{match[3]}"
         path = results / f"{match[2].removesuffix(reach_tables.DIRECTED)}.json"
         if not path.exists():
