@@ -2,6 +2,7 @@ from typing import Any
 
 from fastapi.testclient import TestClient
 
+from app.store.checkpoints import drop_job_checkpoints
 from tests.api.routes.worlds.test_worlds import COMMANDS, WORLD, until
 
 LEARNING = {
@@ -47,6 +48,32 @@ def test_following_ends_when_another_policy_is_chosen_or_asked_to(client: TestCl
     assert client.delete(f"{WORLD}/follow").status_code == 204
     assert follow_of(client) is None
     client.post(f"/v1/jobs/{job['id']}/cancel")
+
+
+def test_own_policy_acts_again_where_a_restarted_training_lost_its_checkpoints(
+    client: TestClient,
+) -> None:
+    client.post(COMMANDS, json={"tag": "set-policy", "checkpoint": "pick"})
+    long = {"learning": {**LEARNING, "total_steps": 128_000}}
+    job = client.post("/v1/jobs", json={**TRAIN, "overrides": long}).json()
+    client.put(f"{WORLD}/follow", json={"job": job["id"]})
+    until(
+        client,
+        lambda world: follow_of(client)["checkpoint"] == world["checkpoint"],
+        within_s=240.0,  # a worker starts first
+    )
+    services = client.app.state.services  # type: ignore[attr-defined]
+    with services.follows.lock:  # nobody looks meanwhile
+        client.post(f"/v1/jobs/{job['id']}/cancel")
+        client.get(f"/v1/jobs/{job['id']}/events")  # ends with the job
+        with services.store.writing() as connection:
+            drop_job_checkpoints(connection, job["id"], beyond=-1)
+    until(client, lambda _: not follow_of(client)["active"])
+    ended, removed = follow_of(client), f"the checkpoints of job {job['number']} were removed"
+    assert (ended["step"], ended["checkpoint"]) == (None, None)
+    assert ended["reason"] == f"{removed}: the cell's policy acts"
+    own = client.get("/v1/checkpoints/pick").json()["sha256"]
+    until(client, lambda world: world["checkpoint"] == own)
 
 
 def test_evaluation_and_unknown_job_are_not_followed(client: TestClient) -> None:

@@ -12,9 +12,11 @@ WORLD = "/v1/worlds/main"
 COMMANDS = f"{WORLD}/commands"
 
 
-def until(client: TestClient, holds: Callable[[dict[str, Any]], bool]) -> dict[str, Any]:
+def until(
+    client: TestClient, holds: Callable[[dict[str, Any]], bool], within_s: float = 20.0
+) -> dict[str, Any]:
     """Return the world's snapshot once ``holds`` says so."""
-    give_up = time.monotonic() + 20.0
+    give_up = time.monotonic() + within_s
     while not holds(world := client.get(WORLD).json()):
         assert time.monotonic() < give_up, world
         time.sleep(0.02)
