@@ -60,17 +60,17 @@ def main(url: str, data_dir: Path, seed: int) -> None:
     supervisor.start()
     say(ready=True)
     while not over.wait(chance.uniform(0.01, 0.2)):
-        active = [job for job in jobs.list_jobs(store).items if not job.is_final]
-        if seed < 0:
-            if not active:
-                break
-        elif len(active) < MAX_ACTIVE:
-            post_one(store, chance)
-        elif chance.random() < 0.1:
-            try:
+        try:
+            active = [job for job in jobs.list_jobs(store).items if not job.is_final]
+            if seed < 0:
+                if not active:
+                    break
+            elif len(active) < MAX_ACTIVE:
+                post_one(store, chance)
+            elif chance.random() < 0.1:
                 cancel_one(store, chance)
-            except ServiceError:
-                continue  # it has ended meanwhile
+        except ServiceError:
+            continue  # the job has ended meanwhile, or the database is restarted
         supervisor.wake()
     supervisor.stop()
     store.close()

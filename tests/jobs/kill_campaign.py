@@ -1,7 +1,8 @@
 """Kill campaign: ``python -m tests.jobs.kill_campaign FOLDER --kills 1000 --minutes 120``.
 
 Kills, stops and terminates servers and workers at random moments, also during start, migration,
-post and cancel, and checks after every SERIES kills that nothing acknowledged is lost. The
+post and cancel, and checks after every SERIES kills that nothing acknowledged is lost. With
+``--postgresql`` the jobs are in a PostgreSQL server of the campaign, which is also crashed. The
 folder has the progress: the same command goes on after an interruption. Its file *report.json*
 counts kills, jobs and their ends, *summary.json* is the result for the docs.
 """
@@ -16,6 +17,7 @@ import sys
 import time
 from collections import Counter
 from collections.abc import Sequence
+from contextlib import ExitStack, nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -29,6 +31,7 @@ from app.store.records import FINAL_STATES, JobRecord
 from jobs.executor import PROJECT_ROOT
 from tests.jobs.counting_worker import CHECKPOINT_EVERY, FACTOR, GRID, MODULUS
 from tests.jobs.machinery import WAIT_S, worker_pids
+from tests.support.postgresql_server import PostgresqlServer, postgresql_server
 
 SERIES = 25
 """Kills of one database, below the number that ends a job."""
@@ -48,6 +51,10 @@ KILLS = {
     "SIGSTOP worker, SIGKILL server": 2,
 }
 """Ways of killing, each with its weight."""
+CRASH, CRASH_WEIGHT = "SIGQUIT database", 3
+"""The crash of a PostgreSQL server, which recovers at its next start, and its weight."""
+LONGEST_CRASH_S = 1.0
+"""Longest time from a crash of the database to its next start [s]."""
 
 
 @dataclass(slots=True)
@@ -61,6 +68,13 @@ class Series:
     continued: int = 0
     """Workers that were stopped before they asked to end with their server."""
     server: "subprocess.Popen[bytes] | None" = None
+    database: PostgresqlServer | None = None
+    """The server of the database, where it has one that the campaign may crash."""
+
+    @property
+    def kills(self) -> dict[str, int]:
+        """Ways of killing in this series, each with its weight."""
+        return KILLS if self.database is None else KILLS | {CRASH: CRASH_WEIGHT}
 
     def start(self, seed: int) -> "subprocess.Popen[bytes]":
         command = [sys.executable, "-m", "tests.jobs.campaign_server", self.url]
@@ -103,6 +117,12 @@ def kill(series: Series, how: str, chance: random.Random) -> bool:
     server = series.server
     assert server is not None
     workers = worker_pids(server.pid)
+    if how == CRASH:
+        assert series.database is not None
+        series.database.stop(signal.SIGQUIT)
+        time.sleep(chance.uniform(0.0, LONGEST_CRASH_S))
+        series.database.start()
+        return True
     if "worker" in how and not workers:
         return False
     first, _, then = how.partition(", ")
@@ -140,9 +160,16 @@ def _send(pid: int, name: str) -> None:
         pass  # it has just ended
 
 
-def run_series(url: str, folder: Path, n_kills: int, seed: int) -> dict[str, Any]:
+def run_series(
+    url: str,
+    folder: Path,
+    n_kills: int,
+    seed: int,
+    database: PostgresqlServer | None = None,
+) -> dict[str, Any]:
     """Kill ``n_kills`` times, let the jobs end, and check them; returns the counts."""
-    chance, series, kills = random.Random(seed), Series(url, folder), Counter[str]()
+    chance, kills = random.Random(seed), Counter[str]()
+    series = Series(url, folder, database=database)
     try:
         while kills.total() < n_kills:
             if series.server is None or series.server.poll() is not None:
@@ -152,7 +179,7 @@ def run_series(url: str, folder: Path, n_kills: int, seed: int) -> dict[str, Any
                 if chance.random() > SHARE_IN_START:
                     series.wait_until_ready()
             time.sleep(chance.uniform(0.0, LONGEST_S))
-            (how,) = chance.choices(list(KILLS), list(KILLS.values()))
+            (how,) = chance.choices(list(series.kills), list(series.kills.values()))
             kills[how] += kill(series, how, chance)
         if series.server is not None:
             _send(series.server.pid, "SIGTERM")
@@ -220,8 +247,17 @@ def check_whole(store: Store, job: JobRecord) -> None:
     assert job.result == {"value": value}
 
 
-def campaign(folder: Path, n_kills: int, minutes: float) -> dict[str, Any]:
-    """Run series until there were ``n_kills`` kills or the time is over; returns the report."""
+def campaign(
+    folder: Path, n_kills: int, minutes: float, database: PostgresqlServer | None = None
+) -> dict[str, Any]:
+    """Run series until there were ``n_kills`` kills or the time is over; returns the report.
+
+    Args:
+        folder: Folder of the progress.
+        n_kills: Number of kills.
+        minutes: Time after which no series begins [min].
+        database: Server of the databases; None: SQLite.
+    """
     progress = folder / "report.json"
     folder.mkdir(parents=True, exist_ok=True)
     done: dict[str, Any] = {"series": 0, "kills": {}, "seconds": 0.0}
@@ -232,8 +268,11 @@ def campaign(folder: Path, n_kills: int, minutes: float) -> dict[str, Any]:
         started, number = time.monotonic(), int(done["series"])
         here = folder / f"series-{number}-{os.getpid()}"
         here.mkdir()
-        url = f"sqlite:///{here}/tandem.db"
-        found = run_series(url, here, min(left, SERIES), number)
+        with ExitStack() as stack:
+            url = f"sqlite:///{here}/tandem.db"
+            if database is not None:
+                url = stack.enter_context(database.database("template0"))
+            found = run_series(url, here, min(left, SERIES), number, database)
         done["kills"] = dict(Counter(done["kills"]) + Counter(found.pop("kills")))
         for name, count in found.items():
             done[name] = done.get(name, 0) + count
@@ -246,13 +285,13 @@ def campaign(folder: Path, n_kills: int, minutes: float) -> dict[str, Any]:
     return done
 
 
-def summary(done: dict[str, Any]) -> dict[str, Any]:
+def summary(done: dict[str, Any], name: str, option: str) -> dict[str, Any]:
     """Return the counts as a result for ``tools.docs.tables``."""
     counts = ("posted", "jobs", "succeeded", "failed", "cancelled", "attempts", "continued")
     kills = done["kills"]
-    row = {"name": "sqlite", "kills": sum(kills.values()), "series": done["series"]}
+    row = {"name": name, "kills": sum(kills.values()), "series": done["series"]}
     return {
-        "command": "python -m tests.jobs.kill_campaign FOLDER",
+        "command": f"python -m tests.jobs.kill_campaign FOLDER{option}",
         "settings": {"kills": kills, "seconds": done["seconds"]},
         "results": [row | {name: done.get(name, 0) for name in counts}],
         "machine": describe(),
@@ -264,9 +303,13 @@ def main() -> None:
     parser.add_argument("folder", type=Path)
     parser.add_argument("--kills", type=int, default=1000)
     parser.add_argument("--minutes", type=float, default=120.0)
+    parser.add_argument("--postgresql", action="store_true")
     options = parser.parse_args()
-    done = campaign(options.folder, options.kills, options.minutes)
-    (options.folder / "summary.json").write_text(json.dumps(summary(done)))
+    name, option = ("postgresql", " --postgresql") if options.postgresql else ("sqlite", "")
+    with postgresql_server() if options.postgresql else nullcontext() as database:
+        done = campaign(options.folder, options.kills, options.minutes, database)
+    written = json.dumps(summary(done, name, option))
+    (options.folder / "summary.json").write_text(written)
 
 
 if __name__ == "__main__":

@@ -18,7 +18,7 @@ def test_nothing_acknowledged_is_lost_in_ten_kills(tmp_path: Path) -> None:
 def test_nothing_acknowledged_is_lost_in_ten_kills_on_postgresql(
     postgresql: PostgresqlServer, tmp_path: Path
 ) -> None:
-    with postgresql.database() as url:
-        report = run_series(url, tmp_path, 10, seed=0)
+    with postgresql.database("template0") as url:
+        report = run_series(url, tmp_path, 10, seed=0, database=postgresql)
     assert sum(report["kills"].values()) == 10
     assert report["jobs"] >= report["posted"] > 0
