@@ -241,7 +241,7 @@ def _queue(store: Store, job: JobRecord, number: int, body: Mapping[str, Any]) -
         parse_spec(body).new_job(),
         name=f"sweep {job.number}, trial {number}",
         priority=job.priority,
-        sweep=job.id,
+        part_of=job.id,
         trial=number,
     )
     jobs.create_job(store, new, idempotency_key=f"{job.id}-{number}-{new.kind}")

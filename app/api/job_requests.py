@@ -1,15 +1,47 @@
-"""Jobs of requests: the one a path names, checks before one is queued, its answer."""
+"""Jobs of requests: the one a path names, pages of them, checks before one is queued."""
 
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 from fastapi import Depends, Header, Response
 
-from app.api.schemas.jobs import JobPublic
+from app.api.schemas.jobs import JobList, JobPublic
 from app.api.services import Services, ServicesDep
 from app.policies.configs import presets
 from app.store import job_actions, jobs, metrics
-from app.store.records import JobRecord, MetricRow, NewJob
+from app.store.records import JobRecord, JobState, MetricRow, NewJob
 from jobs.spec import AnySpec, EvaluateSpec
+
+
+class PageQuery(NamedTuple):
+    """Which page of the list of jobs is asked for, as for ``app.store.jobs.list_jobs``."""
+
+    cursor: str | None
+    limit: int
+    state: JobState | None
+    part_of: str | None
+
+
+def page_of_jobs(services: Services, query: PageQuery, waiting: str | None) -> bytes:
+    """Return a page of the jobs as JSON, newest first.
+
+    Args:
+        services: Parts of the service.
+        query: The page.
+        waiting: Reason for which no job runs.
+
+    Raises:
+        InvalidInput: The cursor or limit is invalid.
+    """
+    page = jobs.list_jobs(services.store, **query._asdict())
+    steps = job_actions.resume_steps(services.store, [job.id for job in page.items])
+    items = [
+        JobPublic.from_domain(
+            job, None if job.is_final else newest_point(services, job), steps.get(job.id)
+        )
+        for job in page.items
+    ]
+    answer = JobList(items=items, next_cursor=page.next_cursor, waiting=waiting)
+    return answer.model_dump_json().encode()
 
 
 def job_of_path(job_id: str, services: ServicesDep) -> JobRecord:

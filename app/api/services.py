@@ -1,7 +1,7 @@
 """Parts of the service that routes use; ``app.main`` creates them."""
 
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Hashable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -36,6 +36,8 @@ MAX_UPLOADS = 4
 """Largest number of uploads at once; each file is held in memory."""
 MAX_VIEWERS = 16
 """Largest number of open 3D viewers."""
+MAX_ANSWERS = 64
+"""Largest number of answers that are kept until the next commit."""
 
 
 class LiveWorld(Protocol):
@@ -106,12 +108,44 @@ class Follows:
         return None if found is None else found[0]
 
 
+@dataclass(slots=True)
+class StoredAnswers:
+    """Answers from the database that are kept until its next commit; none on PostgreSQL."""
+
+    store: Store
+    """The database."""
+    kept: dict[Hashable, bytes] = field(default_factory=dict)
+    """Answers by what they depend on beside the database."""
+    commit: int | None = None
+    """Number of the commit for which they hold."""
+
+    async def find(self, key: Hashable, read: Callable[[], bytes]) -> bytes:
+        """Return an answer; called on the event loop.
+
+        Args:
+            key: Everything that the answer depends on beside the database.
+            read: Reads the answer, on a thread.
+        """
+        commit = self.store.commit_number()
+        if commit is None or commit != self.commit or len(self.kept) >= MAX_ANSWERS:
+            self.kept.clear()
+        self.commit = commit
+        found = self.kept.get(key)
+        if found is None:
+            found = await run_in_threadpool(read)
+            if commit is not None and commit == self.commit:
+                self.kept[key] = found
+        return found
+
+
 @dataclass(slots=True, kw_only=True)
 class Services:
     """Parts of the service that routes use."""
 
     store: Store
     """The database."""
+    answers: StoredAnswers
+    """Answers from the database."""
     supervisor: Supervisor
     """Runs the jobs; woken when one is posted."""
     retention: Retention

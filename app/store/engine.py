@@ -9,6 +9,7 @@ and writes later behaves alike on both.
 import copy
 import json
 import logging
+import sqlite3
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from datetime import UTC, datetime
@@ -92,6 +93,7 @@ class Store:
             )
             raise InvalidInput("database_url", self.shown_url, rule) from error
         self._fence: Callable[[sa.Connection], object] | None = None
+        self._observer: sqlite3.Connection | None = None
 
     def fenced(self, fence: Callable[[sa.Connection], object]) -> "Store":
         """Return this database with a condition on writing.
@@ -153,6 +155,25 @@ class Store:
         with self.writing() as connection:
             connection.execute(same)
 
+    def commit_number(self) -> int | None:
+        """Return a number that differs after a commit of any process, without waiting.
+
+        None: unknown, as on PostgreSQL.
+        """
+        if self.sqlite_path is None:
+            return None
+        try:
+            if self._observer is None:
+                address = f"{self.sqlite_path.as_uri()}?mode=rw"
+                self._observer = sqlite3.connect(
+                    address, timeout=0.0, uri=True, check_same_thread=False
+                )
+            # It counts commits of other connections, and this one makes none.
+            number: int = self._observer.execute("PRAGMA data_version").fetchone()[0]
+        except sqlite3.Error:
+            return None
+        return number
+
     def now(self, connection: sa.Connection) -> datetime:
         """Return the time of the database's machine, which all servers share."""
         if self.sqlite_path is not None:
@@ -193,7 +214,10 @@ class Store:
         return None
 
     def close(self) -> None:
-        """Close every pooled connection."""
+        """Close every connection."""
+        if self._observer is not None:
+            self._observer.close()
+            self._observer = None
         self.engine.dispose()
 
 

@@ -29,6 +29,8 @@ from app.store.records import FINAL_STATES, JobRecord, JobState, NewJob, Page
 
 MAX_KEY_LENGTH = 255
 """Longest idempotency key."""
+NO_PARTS = "none"
+"""Selects the jobs that are part of no other job."""
 
 
 def create_job(store: Store, new: NewJob, *, idempotency_key: str | None = None) -> JobRecord:
@@ -86,6 +88,7 @@ def list_jobs(
     cursor: str | None = None,
     limit: int = 50,
     state: JobState | None = None,
+    part_of: str | None = None,
 ) -> Page[JobRecord]:
     """Return one page of the jobs, newest first.
 
@@ -94,11 +97,15 @@ def list_jobs(
         cursor: ``next_cursor`` of the page before; None for the first.
         limit: Length of the page, 1 to 200.
         state: Only jobs in this state.
+        part_of: Only parts of the job with this id; ``NO_PARTS``: no parts of other jobs.
 
     Raises:
         InvalidInput: The cursor or limit is invalid.
     """
-    return _page(store, cursor, limit, [] if state is None else [_in_state(state)])
+    where = [] if state is None else [_in_state(state)]
+    if part_of is not None:
+        where.append(jobs.c.part_of == (None if part_of == NO_PARTS else part_of))
+    return _page(store, cursor, limit, where)
 
 
 def list_evaluations(

@@ -61,7 +61,7 @@ class NewJob:
     """Steps after which the job ends and keeps its state."""
     time_budget_s: float | None = None
     """Run time after which the job ends and keeps its state [s]."""
-    sweep: str | None = None
+    part_of: str | None = None
     """Id of the sweep that it is part of."""
     trial: int | None = None
     """Number of its trial in the sweep, from 1."""
@@ -133,8 +133,8 @@ class JobRecord:
     """Run time of all its attempts, at the last heartbeat [s]."""
     ended_by: Spent | None
     """The budget that ended it, or that the pruner of its sweep did; it can be resumed."""
-    sweep: str | None
-    """Id of the sweep that it is part of; it may be deleted."""
+    part_of: str | None
+    """Id of the sweep that it is part of; None after its deletion, too."""
     trial: int | None
     """Number of its trial in the sweep, from 1."""
 

@@ -45,6 +45,8 @@ def delete_job(store: Store, job_id: str, acting: Mapping[str, str]) -> tuple[st
         removed = sole_checkpoints(connection, job_id)
         _require_unused(connection, job, removed, acting)
         drop_job_checkpoints(connection, job_id, beyond=-1)
+        parts = sa.update(jobs).where(jobs.c.part_of == job_id)
+        connection.execute(parts.values(part_of=None))  # listed by themselves from now on
         connection.execute(sa.delete(jobs).where(jobs.c.id == job_id))
         return removed
 

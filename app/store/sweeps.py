@@ -22,7 +22,7 @@ def open_sweeps(store: Store) -> tuple[JobRecord, ...]:
 
 def jobs_of(store: Store, sweep_id: str) -> tuple[JobRecord, ...]:
     """Return the trainings and evaluations of a sweep, oldest first."""
-    return _found(store, sa.select(jobs).where(jobs.c.sweep == sweep_id))
+    return _found(store, sa.select(jobs).where(jobs.c.part_of == sweep_id))
 
 
 def start_sweep(store: Store, sweep_id: str) -> None:

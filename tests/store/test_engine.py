@@ -93,6 +93,25 @@ def test_many_threads_write_and_none_is_turned_away(store: Store) -> None:
     assert len(jobs.list_jobs(store, limit=200).items) == 80
 
 
+@SQLITE_ONLY
+def test_commit_number_differs_after_commits_and_not_after_reads(store: Store) -> None:
+    first = store.commit_number()
+    jobs.list_jobs(store)
+    assert store.commit_number() == first is not None
+    other = Store(store.url)  # as of another process
+    jobs.create_job(other, NewJob(kind="count", spec={}))
+    other.close()
+    second = store.commit_number()
+    assert second != first
+    jobs.create_job(store, NewJob(kind="count", spec={}))
+    assert store.commit_number() != second
+    with store.writing() as connection:
+        before = store.commit_number()
+        connection.execute(sa.text("UPDATE jobs SET seed = 5"))
+        assert store.commit_number() == before
+    assert store.commit_number() != before
+
+
 def test_one_key_posted_by_many_threads_makes_one_job(store: Store) -> None:
     found: list[str] = []
 

@@ -98,6 +98,16 @@ def test_a_page_is_read_by_an_index_without_sorting(
     assert plan(store, query, parameters) == expected
 
 
+@pytest.mark.parametrize("part_of", ["none", f"{7:036}"])
+def test_pages_of_parts_and_without_them_are_read_by_an_index(
+    store: Store, part_of: str
+) -> None:
+    add(store, 0, 300)
+    ((query, parameters),) = asked(store, lambda: jobs.list_jobs(store, part_of=part_of))
+    expected = "SEARCH jobs USING INDEX ix_jobs_part_of_number (part_of=?)"
+    assert plan(store, query, parameters) == expected
+
+
 @pytest.mark.parametrize("state", [None, *STATES])
 def test_a_page_costs_the_same_among_ten_times_as_many_jobs(
     store: Store, state: JobState | None

@@ -93,6 +93,14 @@ def test_list_filters_by_state(store: Store, claim: Claim) -> None:
     assert [j.id for j in jobs.list_jobs(store, state="cancelling").items] == [claim.job_id]
 
 
+def test_list_shows_the_parts_of_a_job_or_leaves_parts_out(store: Store) -> None:
+    whole, other = queue(store, 2)
+    part = jobs.create_job(store, NewJob(kind="count", spec={}, part_of=whole, trial=1)).id
+    assert [j.id for j in jobs.list_jobs(store, part_of=whole).items] == [part]
+    assert [j.id for j in jobs.list_jobs(store, part_of="none").items] == [other, whole]
+    assert jobs.list_jobs(store, part_of=other).items == ()
+
+
 def test_queued_job_is_cancelled_at_once(store: Store) -> None:
     (job_id,) = queue(store)
     job = jobs.request_cancel(store, job_id)

@@ -64,6 +64,14 @@ def test_job_whose_checkpoint_is_to_be_evaluated_is_not_deleted(
     assert len(retention.delete_job(store, claim.job_id, {})) == 1
 
 
+def test_parts_of_a_deleted_job_are_jobs_of_their_own(store: Store, claim: Claim) -> None:
+    new = NewJob(kind="count", spec={}, part_of=claim.job_id, trial=1)
+    part = jobs.create_job(store, new)
+    completion.finish(store, claim)
+    retention.delete_job(store, claim.job_id, {})
+    assert [job.id for job in jobs.list_jobs(store, part_of="none").items] == [part.id]
+
+
 def test_newest_ended_jobs_and_states_are_kept(store: Store, claim: Claim) -> None:
     ended = [claim.job_id]
     acts = save(store, claim, 1, b"0")

@@ -12,15 +12,16 @@ from app.api.description import CREATED
 from app.api.job_requests import (
     IdempotencyKey,
     JobDep,
+    PageQuery,
     checked,
-    newest_point,
+    page_of_jobs,
     queued,
     shown,
 )
 from app.api.schemas.examples import JOBS, named
 from app.api.schemas.jobs import JobList, JobPublic, MetricsPublic
 from app.api.services import ServicesDep
-from app.store import events, job_actions, jobs, metrics
+from app.store import events, jobs, metrics
 from app.store.cursors import MAX_INTEGER
 from app.store.records import JobEvent, JobState
 from jobs.spec import JobSpec
@@ -51,24 +52,25 @@ def create_job(
     return queued(checked(body, services), services, response, idempotency_key)
 
 
-@router.get("", summary="List the jobs")
-def list_jobs(
+@router.get("", summary="List the jobs", response_model=JobList)
+async def list_jobs(
     services: ServicesDep,
     cursor: Annotated[str | None, Query(description="next_cursor of the page before")] = None,
     limit: Annotated[int, Query(ge=1, le=200, description="length of the page")] = 50,
     state: Annotated[JobState | None, Query(description="only jobs in this state")] = None,
-) -> JobList:
+    part_of: Annotated[
+        str | None,
+        Query(
+            max_length=36,
+            description="only the jobs of the sweep with this id; `none`: only jobs that are "
+            "part of no sweep",
+        ),
+    ] = None,
+) -> Response:
     """Return one page, newest first."""
-    page = jobs.list_jobs(services.store, cursor=cursor, limit=limit, state=state)
-    steps = job_actions.resume_steps(services.store, [job.id for job in page.items])
-    items = [
-        JobPublic.from_domain(
-            job, None if job.is_final else newest_point(services, job), steps.get(job.id)
-        )
-        for job in page.items
-    ]
-    waiting = services.supervisor.waiting
-    return JobList(items=items, next_cursor=page.next_cursor, waiting=waiting)
+    asked = PageQuery(cursor, limit, state, part_of), services.supervisor.waiting
+    content = await services.answers.find(asked, lambda: page_of_jobs(services, *asked))
+    return Response(content, media_type="application/json")
 
 
 @router.get("/{job_id}", summary="One job")

@@ -45,7 +45,7 @@ class JobPublic(Answer):
     ended_by: str | None = Field(
         description="what ended it early: `step budget`, `time budget` or `pruned`; else null"
     )
-    sweep: str | None = Field(description="id of the sweep that it is part of")
+    part_of: str | None = Field(description="id of the sweep that it is part of")
     trial: int | None = Field(description="number of its trial in the sweep")
     progress: float | None = Field(
         description="done share of its steps, or of the budget that is nearer to its end"

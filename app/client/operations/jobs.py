@@ -35,12 +35,15 @@ class JobsOperations(Transport):
         limit: int | None = None,
         state: Literal["queued", "running", "cancelling", "succeeded", "failed", "cancelled"]
         | None = None,
+        part_of: str | None = None,
     ) -> JobList:
         """List the jobs."""
         return self._parsed(
             JobList,
             self._send(
-                "GET", "/v1/jobs", query={"cursor": cursor, "limit": limit, "state": state}
+                "GET",
+                "/v1/jobs",
+                query={"cursor": cursor, "limit": limit, "state": state, "part_of": part_of},
             ),
         )
 

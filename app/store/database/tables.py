@@ -107,10 +107,10 @@ jobs = Table(
     Column("time_budget_s", Float),
     Column("run_s", Float, nullable=False, server_default="0"),
     Column("ended_by", String(16)),
-    Column("sweep", String(36)),  # no foreign key: it may be deleted
+    Column("part_of", String(36)),  # no foreign key, as for the parent
     Column("trial", Integer),
     Index("ix_jobs_state_number", "state", "number"),  # pages of jobs in a state
-    Index("ix_jobs_sweep", "sweep"),
+    Index("ix_jobs_part_of_number", "part_of", "number"),  # pages without parts, or of them
     sqlite_autoincrement=True,
 )
 

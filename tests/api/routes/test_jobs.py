@@ -4,6 +4,8 @@ from typing import Any
 import pytest
 from fastapi.testclient import TestClient
 
+from app.store.jobs import create_job
+from app.store.records import NewJob
 from tests.sim.recorded_person import csv_text, working
 
 TINY = {
@@ -151,6 +153,32 @@ def test_jobs_are_listed_in_pages_newest_first(
     second = client.get("/v1/jobs", params={"limit": 1, "cursor": first["next_cursor"]}).json()
     assert [one["id"] for one in first["items"]] == [newer["id"]]
     assert [one["id"] for one in second["items"]] == [queued["id"]]
+
+
+def test_list_shows_each_change_at_once(client: TestClient) -> None:
+    def listed() -> list[tuple[str, str | None]]:
+        page = client.get("/v1/jobs", params={"limit": 1, "part_of": "none"}).json()
+        return [(one["id"], one["name"]) for one in page["items"]]
+
+    job = client.post("/v1/jobs", json=TRAIN).json()["id"]
+    client.post(f"/v1/jobs/{job}/cancel")
+    assert listed() == listed() == [(job, None)]
+    client.patch(f"/v1/jobs/{job}", json={"name": "renamed"})
+    assert listed() == [(job, "renamed")]
+    client.delete(f"/v1/jobs/{job}").raise_for_status()
+    assert (job, "renamed") not in listed()
+
+
+def test_list_shows_the_parts_of_one_job_only(client: TestClient) -> None:
+    whole = client.post("/v1/jobs", json=TRAIN).json()["id"]
+    client.post(f"/v1/jobs/{whole}/cancel")
+    store = client.app.state.services.store  # type: ignore[attr-defined]
+    part = create_job(store, NewJob(kind="count", spec={}, part_of=whole, trial=1)).id
+    client.post(f"/v1/jobs/{part}/cancel")
+    items = client.get("/v1/jobs", params={"part_of": whole}).json()["items"]
+    assert [(one["id"], one["part_of"], one["trial"]) for one in items] == [(part, whole, 1)]
+    items = client.get("/v1/jobs", params={"part_of": "none", "limit": 1}).json()["items"]
+    assert items[0]["id"] == whole
 
 
 @pytest.mark.parametrize(

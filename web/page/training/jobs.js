@@ -21,7 +21,7 @@ const OUTCOMES = [
 const UNITS = { evaluate: "rows", sweep: "trials" };
 const REWARD = [{ key: "reward", label: "mean reward of an episode", colour: "accent" }];
 
-/** All jobs, newest first, asked for again every two seconds while the server is there. */
+/** Newest jobs, asked for again every two seconds while the server is there; parts of others, too. */
 export function useJobs(link) {
   const [state, setState] = useState({ jobs: null, error: null, waiting: null });
   const refresh = useRef(() => {});
@@ -30,8 +30,9 @@ export function useJobs(link) {
     let over = false;
     refresh.current = async () => {
       try {
-        const page = await get("v1/jobs?limit=50");
-        if (!over) setState({ jobs: page.items, error: null, waiting: page.waiting });
+        const [own, all] = await Promise.all([get("v1/jobs?part_of=none"), get("v1/jobs")]);
+        const items = [...own.items, ...all.items.filter((one) => one.part_of)];
+        if (!over) setState({ jobs: items.sort(byNumber), error: null, waiting: own.waiting });
       } catch (error) {
         if (!over) setState((now) => ({ ...now, error }));
       }
@@ -44,6 +45,23 @@ export function useJobs(link) {
     };
   }, [link]);
   return { ...state, refresh: useCallback(() => refresh.current(), []) };
+}
+
+/** The jobs with the open one, which may be older than they are. */
+export function useOpened(jobs, id) {
+  const [found, setFound] = useState(null);
+  const missing = Boolean(id && jobs && !jobs.some((one) => one.id === id));
+  useEffect(() => {
+    if (!missing) return undefined;
+    const stop = new AbortController();
+    get(`v1/jobs/${id}`, { signal: stop.signal }).then(setFound, () => {});
+    return () => stop.abort();
+  }, [missing, id, jobs]);
+  return missing && found?.id === id ? [...jobs, found].sort(byNumber) : jobs;
+}
+
+function byNumber(a, b) {
+  return b.number - a.number;
 }
 
 const REMEDIES = {
@@ -73,8 +91,7 @@ export function JobList({ jobs, error, onNew, ...rest }) {
       ${onNew && html`<button type="button" class="primary" data-action="new-job" onClick=${onNew}>
         <${Icon} name="plus" />Start one</button>`}</div>`;
   }
-  const sweeps = new Set(jobs.filter(({ kind }) => kind === "sweep").map(({ id }) => id));
-  const listed = jobs.filter(({ id, sweep }) => !sweeps.has(sweep) || id === rest.open || rest.chosen);
+  const listed = jobs.filter((job) => !job.part_of || job.id === rest.open || rest.chosen);
   return html`<ul class="jobs">
     ${listed.map((job) => html`<${Job} key=${job.id} job=${job} jobs=${jobs} ...${rest}
       open=${rest.open === job.id} />`)}

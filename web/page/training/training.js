@@ -4,7 +4,7 @@ import { Icon } from "../icons.js";
 import { Comparison, MAX_JOBS } from "./compare.js";
 import { CheckpointCards } from "./checkpointcards.js";
 import { isActive } from "./jobactions.js";
-import { JobList, QueueWaits } from "./jobs.js";
+import { JobList, QueueWaits, useOpened } from "./jobs.js";
 import { EvaluateForm } from "./evaluateform.js";
 import { useItems } from "./formfields.js";
 import { SweepForm } from "./sweepform.js";
@@ -13,12 +13,14 @@ import { TrainForm } from "./trainform.js";
 const KINDS = { train: ["Training", TrainForm], evaluate: ["Evaluation", EvaluateForm],
   sweep: ["Sweep", SweepForm] };
 
-export function Training({ link, cell, jobs, error, waiting, refresh, acting, onAct }) {
+export function Training({ link, cell, jobs: newest, error, waiting, refresh, acting, onAct }) {
   const presets = useItems(link, "v1/presets");
   const [form, setForm] = useState(null);
   const [open, setOpen] = useState(undefined);
+  const jobs = useOpened(newest, open);
   useEffect(() => {
-    if (open === undefined && jobs?.length) setOpen((jobs.find(isActive) ?? jobs[0]).id);
+    const own = jobs?.filter((job) => !job.part_of);
+    if (open === undefined && own?.length) setOpen((own.find(isActive) ?? own[0]).id);
   }, [jobs]);
   const [chosen, setChosen] = useState(null);
   const [compared, setCompared] = useState(null);
