@@ -1,7 +1,9 @@
 """The command ``train``: train a policy in this process, without a server."""
 
+import fcntl
 import json
 import logging
+import os
 import signal
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -45,6 +47,12 @@ def train(
     The same command continues an interrupted training, with the same result as without the
     interruption.
     """
+    with in_use(output):
+        _train(preset, seed, sets or [], output, as_json)
+
+
+def _train(preset: str, seed: int, sets: Sequence[str], output: Path, as_json: bool) -> None:
+    """Train in a folder that no other process uses."""
     settings = prepared_settings()
     import torch
 
@@ -53,7 +61,7 @@ def train(
     from app.policies.training import train as training
     from app.policies.training.state_folder import StateFolder
 
-    configuration = presets.resolve(preset, presets.nested(parse_overrides(sets or [])))
+    configuration = presets.resolve(preset, presets.nested(parse_overrides(sets)))
     cell = named_cell(configuration.cell, settings)
     torch.set_num_threads(1)
     path, states = output / "policy.safetensors", StateFolder(output / "resume")
@@ -62,7 +70,6 @@ def train(
         require_same(resume, configuration, seed, cell, output)
         total = configuration.learning.total_steps
         logger.info("continues at step %d of %d from %s", resume.step, total, output)
-    output.mkdir(parents=True, exist_ok=True)
     curve = output / "curve.jsonl"
     cut_curve(curve, 0 if resume is None else resume.step)
 
@@ -95,6 +102,35 @@ def train(
         raise typer.Exit(INTERRUPTED)
     states.remove()
     print_result(f"wrote {path}", {"checkpoint": str(path)}, as_json=as_json)
+
+
+@contextmanager
+def in_use(folder: Path) -> Iterator[None]:
+    """Hold the folder of a training; the kernel's lock ends with its process.
+
+    Raises:
+        InvalidInput: Another training holds it, or it cannot be written to.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        file = (folder / "train.lock").open("a+", encoding="utf-8")
+    except OSError as error:
+        rule = f"must be a folder that this process may write to ({error.strerror})"
+        raise InvalidInput("--output", str(folder), rule) from error
+    with file:
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError as error:
+            file.seek(0)
+            rule = (
+                f"must not be used by another training (process {file.read(20) or 'unknown'}): "
+                "wait for its end, interrupt it by Ctrl-C, or choose another folder"
+            )
+            raise InvalidInput("--output", str(folder), rule) from error
+        file.truncate(0)
+        file.write(str(os.getpid()))
+        file.flush()
+        yield
 
 
 def require_same(

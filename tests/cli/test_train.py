@@ -1,6 +1,7 @@
 """The command ``train``: it continues an interrupted training, and refuses another one."""
 
 import json
+import os
 import signal
 import subprocess
 import sys
@@ -10,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from app.cli.entry import main
-from app.cli.train import INTERRUPTED, cut_curve
+from app.cli.train import INTERRUPTED, cut_curve, in_use
 from tests.cli.test_commands import ROOT, environment
 
 FIELDS = {
@@ -73,6 +74,36 @@ def test_interrupted_command_continues_with_the_same_result(
         assert (parts / name).read_bytes() == (whole / name).read_bytes()
     assert steps_of(parts) == steps_of(whole) == STEPS
     assert not (parts / "resume").exists()
+
+
+HOLDER = "import sys, time; from pathlib import Path; from app.cli.train import in_use\n\
+with in_use(Path(sys.argv[1])): print('held', flush=True); time.sleep(600)"
+
+
+def test_second_training_in_a_folder_is_refused_until_the_first_is_killed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("TANDEM_DATA", str(tmp_path))
+    folder = tmp_path / "run"
+    command = [sys.executable, "-c", HOLDER, str(folder)]
+    with subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, text=True) as first:
+        assert first.stdout is not None and first.stdout.readline() == "held\n"
+        assert main(call(folder)) == 2
+        refused = capsys.readouterr().err
+        assert f"--output = '{folder}' must not be used by another training" in refused
+        assert f"(process {first.pid})" in refused
+        assert not (folder / "curve.jsonl").exists()
+        first.kill()
+    with in_use(folder):
+        assert (folder / "train.lock").read_text() == str(os.getpid())
+
+
+def test_folder_that_cannot_be_made_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "file").write_text("")
+    assert main(call(tmp_path / "file")) == 2
+    assert "--output" in capsys.readouterr().err
 
 
 def test_points_beyond_a_state_and_a_torn_line_are_deleted(tmp_path: Path) -> None:
