@@ -13,7 +13,7 @@ from app.api.world_policies import (
     task_policy_for,
 )
 from app.errors import ServiceError, WrongState
-from app.live.commands import LoadingCommand, SetPolicy
+from app.live.commands import SetPolicy
 from app.live.reach.commands import is_reaching
 from app.live.sorting.commands import SetSortingPolicy
 from app.policies.checkpoints.checkpoint import SORTING, purpose_of
@@ -47,40 +47,36 @@ def start(world_id: str, job: JobRecord, services: Services) -> FollowPublic:
         job=job.id, number=job.number, active=True, step=None, checkpoint=None, reason=None
     )
     with follows.lock:
-        follow = _updated(follow, world, services)
-        follows.by_world[world_id] = follow, world
+        choices = world.handle.choices
+        now = _updated(follow, world, services)
+        follows.by_world[world_id] = now, world, choices + (now.checkpoint is not None)
         if follows.thread is None or not follows.thread.is_alive():
             follows.thread = threading.Thread(
                 target=_run, args=(services,), name="following", daemon=True
             )
             follows.thread.start()
-    return follow
-
-
-def end_by(command: LoadingCommand, world_id: str, services: Services) -> None:
-    """End following where a command chooses another policy."""
-    if not isinstance(command, SetPolicy | SetSortingPolicy):
-        return
-    with services.follows.lock:
-        found = services.follows.by_world.get(world_id)
-        if found is not None and found[0].active:
-            now = _ended(found[0], "another policy was chosen")
-            services.follows.by_world[world_id] = now, found[1]
+    return now
 
 
 def look(services: Services) -> bool:
-    """Let newer checkpoints act; return whether a world still follows a training."""
+    """Let newer checkpoints act; return whether a world still follows a training.
+
+    It follows no longer where another policy was chosen, by whatever submits commands.
+    """
     follows = services.follows
     with follows.lock:
-        for world_id, (follow, world) in list(follows.by_world.items()):
+        for world_id, (follow, world, choices) in list(follows.by_world.items()):
             if not follow.active:
                 continue
-            if services.worlds.get(world_id) is world:
-                now = _looked(follow, world, services)
-            else:
+            if services.worlds.get(world_id) is not world:
                 now = _ended(follow, "the cell was started again")
-            follows.by_world[world_id] = now, world
-        active = any(follow.active for follow, _ in follows.by_world.values())
+            elif world.handle.choices != choices:
+                now = _ended(follow, "another policy was chosen")
+            else:
+                now = _looked(follow, world, services)
+            choices += now.checkpoint != follow.checkpoint
+            follows.by_world[world_id] = now, world, choices
+        active = any(one[0].active for one in follows.by_world.values())
         follows.thread = follows.thread if active else None
         return active
 

@@ -95,8 +95,8 @@ class Readiness:
 class Follows:
     """Trainings that live worlds follow (``app.api.following``)."""
 
-    by_world: dict[str, tuple[FollowPublic, LiveWorld]] = field(default_factory=dict)
-    """What each world follows or has followed, with the world."""
+    by_world: dict[str, tuple[FollowPublic, LiveWorld, int]] = field(default_factory=dict)
+    """What each world follows or has followed, with the world and its expected ``choices``."""
     lock: threading.RLock = field(default_factory=threading.RLock)
     """Held while one of them changes."""
     thread: threading.Thread | None = None

@@ -4,9 +4,10 @@ import queue
 import threading
 
 from app.live.command_checks import Command, check, check_state, people_after
+from app.live.commands import SetPolicy
 from app.live.reach.commands import SetInferenceMode
 from app.live.snapshot import WorldSnapshot
-from app.live.sorting.commands import TableCommand
+from app.live.sorting.commands import SetSortingPolicy, TableCommand
 from app.sim.cells.cell import Cell
 
 
@@ -24,6 +25,7 @@ class WorldHandle:
         self._queue: queue.SimpleQueue[Command] = queue.SimpleQueue()
         self._lock = threading.Lock()
         self._submitted = 0
+        self._choices = 0
         # People after all queued commands.
         self._people = tuple(person.id for person in first.people)
         # Commands for the table that no snapshot contains yet: queued, and being applied.
@@ -51,9 +53,15 @@ class WorldHandle:
                     check_state(command, self._cell, self._last)
                 self._unseen[0] += 1
             self._people = people_after(command, self._people)
+            self._choices += isinstance(command, SetPolicy | SetSortingPolicy)
             self._queue.put(command)
             self._submitted += 1
             return self._submitted
+
+    @property
+    def choices(self) -> int:
+        """Number of submitted commands that choose a policy."""
+        return self._choices
 
     def snapshot(self) -> WorldSnapshot:
         """Return the last snapshot; never waits."""

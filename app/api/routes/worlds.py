@@ -88,8 +88,10 @@ async def command_world(
     tick, cell = world.handle.snapshot().tick, world.cell
     if isinstance(body, LoadingCommand):
         body = body.with_loaded(await run_in_threadpool(load_for, body, cell, services))
-        await run_in_threadpool(following.end_by, body, world.handle.id, services)
-    return CommandAccepted(tag=body.tag, number=world.handle.submit(body), tick=tick)
+    choices, number = world.handle.choices, world.handle.submit(body)
+    if world.handle.choices != choices:
+        await run_in_threadpool(following.look, services)
+    return CommandAccepted(tag=body.tag, number=number, tick=tick)
 
 
 @router.get(

@@ -2,6 +2,7 @@ from typing import Any
 
 from fastapi.testclient import TestClient
 
+from app.live.commands import SetPolicy
 from app.store.checkpoints import drop_job_checkpoints
 from tests.api.routes.worlds.test_worlds import COMMANDS, WORLD, until
 
@@ -47,6 +48,12 @@ def test_following_ends_when_another_policy_is_chosen_or_asked_to(client: TestCl
     assert client.put(f"{WORLD}/follow", json=body).json()["active"]
     assert client.delete(f"{WORLD}/follow").status_code == 204
     assert follow_of(client) is None
+    assert client.put(f"{WORLD}/follow", json=body).json()["active"]
+    world = client.app.state.services.worlds["main"]  # type: ignore[attr-defined]
+    world.handle.submit(SetPolicy(checkpoint=None))  # as the 3D viewer, not by the API
+    until(client, lambda _: not follow_of(client)["active"])
+    assert follow_of(client)["reason"] == "another policy was chosen"
+    client.post(COMMANDS, json={"tag": "set-policy", "checkpoint": "pick"})
     client.post(f"/v1/jobs/{job['id']}/cancel")
 
 
