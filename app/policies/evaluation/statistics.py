@@ -1,8 +1,8 @@
 """Rates and means with 95 % intervals, as results carry them."""
 
 import numpy as np
+import scipy  # loads scipy.stats where it is first used
 from numpy.typing import ArrayLike
-from scipy.stats import binomtest, norm
 
 
 def wilson(hits: int, n: int) -> dict[str, float]:
@@ -17,7 +17,7 @@ def wilson(hits: int, n: int) -> dict[str, float]:
     """
     if n < 1 or not 0 <= hits <= n:
         raise ValueError(f"a rate needs 0 <= hits <= n and n >= 1, got {hits} of {n}")
-    interval = binomtest(hits, n).proportion_ci(0.95, method="wilson")
+    interval = scipy.stats.binomtest(hits, n).proportion_ci(0.95, method="wilson")
     return {"mean": hits / n, "low": float(interval.low), "high": float(interval.high)}
 
 
@@ -31,7 +31,9 @@ def mean_of(values: ArrayLike) -> dict[str, float] | None:
     if len(x) == 0:
         return None
     mean, error = float(x.mean()), float(x.std(ddof=1)) / len(x) ** 0.5 if len(x) > 1 else 0.0
-    low, high = norm.interval(0.95, loc=mean, scale=error) if error else (mean, mean)
+    low, high = (
+        scipy.stats.norm.interval(0.95, loc=mean, scale=error) if error else (mean, mean)
+    )
     return {"mean": mean, "low": float(low), "high": float(high)}
 
 
@@ -48,5 +50,5 @@ def mcnemar(first: ArrayLike, second: ArrayLike) -> dict[str, float]:
     """
     a, b = np.asarray(first, dtype=bool), np.asarray(second, dtype=bool)
     gained, lost = int((a & ~b).sum()), int((~a & b).sum())
-    p = binomtest(gained, gained + lost).pvalue if gained + lost else 1.0
+    p = scipy.stats.binomtest(gained, gained + lost).pvalue if gained + lost else 1.0
     return {"only_first": gained, "only_second": lost, "p": float(p)}

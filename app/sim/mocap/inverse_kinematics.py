@@ -14,7 +14,7 @@ Source: docs/method.md 3.4.
 """
 
 import numpy as np
-from scipy.signal import butter, sosfiltfilt
+import scipy  # loads a subpackage where it is first used: scipy.signal takes a second
 
 from app.sim.core.arrays import Vec, as_kernel_array
 from app.sim.human.anthropometry import BodySize
@@ -132,8 +132,10 @@ def _elbow_normal(upper: Vec, fore: Vec, bend: Vec, rate_hz: float) -> Vec:
         held = np.interp(frames, frames[sure], directions[:, axis]) * np.sin(MIN_BEND)
         normal[~sure, axis] = held[~sure]
     if rate_hz > 2.5 * CUTOFF_HZ and len(normal) > 12:
-        low_pass = butter(2, CUTOFF_HZ, fs=rate_hz, output="sos")
-        normal = sosfiltfilt(low_pass, normal, axis=0, padlen=min(9, len(normal) - 1))
+        low_pass = scipy.signal.butter(2, CUTOFF_HZ, fs=rate_hz, output="sos")
+        normal = scipy.signal.sosfiltfilt(
+            low_pass, normal, axis=0, padlen=min(9, len(normal) - 1)
+        )
     return normal
 
 

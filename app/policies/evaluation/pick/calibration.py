@@ -20,10 +20,8 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+import scipy  # loads scipy.stats where it is first used
 from numpy.typing import NDArray
-from scipy.optimize import minimize
-from scipy.special import expit, logit
-from scipy.stats import rankdata
 
 from app.errors import InvalidInput
 from app.policies.checkpoints.checkpoint import Checkpoint
@@ -163,7 +161,7 @@ def calibration(
 
 def _recalibrated(probability: Float, happened: NDArray[np.bool_], seed: int) -> Float:
     """Return the probabilities after Platt scaling, each half fitted to the other one."""
-    x = logit(np.clip(probability, 1e-4, 1.0 - 1e-4))
+    x = scipy.special.logit(np.clip(probability, 1e-4, 1.0 - 1e-4))
     halves = np.array_split(np.random.default_rng(seed).permutation(len(x)), 2)
     corrected = np.empty(len(x))
     for rows, others in (halves, halves[::-1]):
@@ -172,8 +170,8 @@ def _recalibrated(probability: Float, happened: NDArray[np.bool_], seed: int) ->
         def loss(line: Float, x: Float = x[others], sign: Float = sign) -> float:
             return float(np.logaddexp(0.0, -sign * (line[0] * x + line[1])).mean())
 
-        slope, offset = minimize(loss, (1.0, 0.0), method="Nelder-Mead").x
-        corrected[rows] = expit(slope * x[rows] + offset)
+        slope, offset = scipy.optimize.minimize(loss, (1.0, 0.0), method="Nelder-Mead").x
+        corrected[rows] = scipy.special.expit(slope * x[rows] + offset)
     return corrected
 
 
@@ -190,5 +188,5 @@ def _auc(probability: Float, happened: NDArray[np.bool_]) -> float | None:
     negative = len(happened) - positive
     if not positive or not negative:
         return None
-    ranks = rankdata(probability)[happened].sum()
+    ranks = scipy.stats.rankdata(probability)[happened].sum()
     return float((ranks - positive * (positive + 1) / 2) / (positive * negative))
