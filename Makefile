@@ -27,8 +27,10 @@ RESOLVE = $(VENV)/bin/uv pip compile --quiet --no-config --universal --python-ve
 CUDA_PACKAGES := triton cuda-bindings cuda-pathfinder cuda-toolkit \
 	$(addprefix nvidia-,cublas cuda-cupti cuda-nvrtc cuda-runtime cudnn-cu13 cufft cufile curand cusolver cusparse cusparselt-cu13 nccl-cu13 nvjitlink nvshmem-cu13 nvtx)
 
-# Test files side by side, at most four: each process holds torch and the kernels.
-SIDE_BY_SIDE := --numprocesses auto --maxprocesses 4 --dist loadfile
+# Test files side by side, at most four: each process holds torch and the kernels. Files of a
+# folder follow each other and share its fixtures.
+SIDE_BY_SIDE := --numprocesses auto --maxprocesses 4 --dist loadfile --no-loadscope-reorder
+BROWSERS ?= 2
 
 # $(call INSTALL_LOCK,file): installs exactly what the file lists, and counts along. pip's
 # notes on a configured index that lacks a package are left out: another one has it.
@@ -43,7 +45,7 @@ SAY := @printf '==> %s\n'
 
 export PYTHONUNBUFFERED = 1
 
-.PHONY: help run setup test test-browser test-postgres test-ray test-slow check format bench tables world docs client lock clean
+.PHONY: help run setup test test-ci test-browser test-postgres test-ray test-slow check format bench tables world docs client lock clean
 
 help: ## list the targets
 	@grep -E '^[a-z-]+:.*## ' Makefile | sed -E 's/:.*## /\t/' | expand -t 16
@@ -56,8 +58,11 @@ setup: $(VENV)/setup.stamp ## set up without starting
 test: $(VENV)/dev.stamp $(VENV)/setup.stamp ## the default tests: no network, no browser, no long training
 	@$(PY) -m pytest $(SIDE_BY_SIDE) --durations 15
 
-test-browser: $(VENV)/dev.stamp ## the page in a real Chromium
-	@$(PY) -m pytest -m browser --numprocesses 2 --dist loadfile --durations 15
+test-ci: $(VENV)/dev.stamp $(VENV)/setup.stamp ## tests of test, test-postgres and test-ray in one run
+	@$(PY) -m pytest -m 'not slow and not bench and not browser' $(SIDE_BY_SIDE) --durations 15
+
+test-browser: $(VENV)/dev.stamp $(VENV)/setup.stamp ## the page in a real Chromium
+	@$(PY) -m pytest -m browser --numprocesses $(BROWSERS) --dist loadfile --durations 15
 
 test-postgres: $(VENV)/dev.stamp ## store and supervisor on a PostgreSQL server of the tests
 	@$(PY) -m pytest -m 'postgres and not slow' $(SIDE_BY_SIDE) tests/store tests/jobs

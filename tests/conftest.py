@@ -12,6 +12,7 @@ import pytest
 
 from app.sim.core.kernel_cache import kernel_cache
 
+os.environ.setdefault("OMP_NUM_THREADS", "1")  # as in the service; before torch is loaded
 IN_CI = os.environ.get("CI", "").lower() in ("1", "true")
 
 

@@ -6,7 +6,6 @@ Standing still is the action 0 in reaching; in sorting, the top of a tower goes 
 
 import numpy as np
 import pytest
-import torch
 
 from app.policies.configs.sorting import SortingPreset
 from app.policies.training import sorting
@@ -39,8 +38,7 @@ def moving_nothing(preset: SortingPreset) -> float:
 
 
 def trained(preset, stop_at: int | None = None) -> Recorder:
-    """Return the reports of a training in float32 on one thread."""
-    torch.set_num_threads(1)
+    """Return the reports of a training in float32."""
     recorder = Recorder(stop_at)
     recorder.result = recorder.run(preset, seed=1)
     return recorder

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-import torch
 
 from app.errors import CheckpointMismatch, InvalidInput
 from app.policies.configs import presets
@@ -133,7 +132,6 @@ def greedy_success(policy: SortingPolicy, n_objects: int, n_goal: int) -> float:
 @pytest.mark.slow
 def test_a_minute_of_training_sorts_ten_objects():
     """Reproduces the learning curve of sorting-e0-dqn: above 0.99 by 256,000 steps."""
-    torch.set_num_threads(1)
     short = {
         "learning.total_steps": 256_000,
         "learning.progress_steps": 51_200,
