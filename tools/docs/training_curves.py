@@ -41,8 +41,15 @@ def main() -> None:
     record(preset, options.seed, options.output)
 
 
-def record(preset: Preset, seed: int, folder: Path) -> None:
-    """Train a preset or resume; store curve and policies in a folder."""
+def record(preset: Preset, seed: int, folder: Path, *, predicts: bool = True) -> None:
+    """Train a preset or resume; store curve and policies in a folder.
+
+    Args:
+        preset: Training configuration.
+        seed: Seed of the training.
+        folder: Where curve, policies and, until the end, states are stored.
+        predicts: Whether pick policies get outcome probabilities at the end.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     states = StateFolder(folder / "resume")
     resume = states.newest()
@@ -54,7 +61,11 @@ def record(preset: Preset, seed: int, folder: Path) -> None:
                 json.dumps({"preset": preset.name, "seed": seed, **asdict(point)}) + "\n"
             )
 
+    stored = 0
+
     def on_checkpoint(step: int, policy: Checkpoint, state: TrainingState | None) -> None:
+        nonlocal stored
+        stored = step
         write(policy, folder / f"step-{step:09d}")
         if state is not None:
             states.write(state)
@@ -64,7 +75,7 @@ def record(preset: Preset, seed: int, folder: Path) -> None:
         seed=seed,
         on_progress=on_progress,
         on_checkpoint=on_checkpoint,
-        should_stop=lambda: False,
+        should_stop=lambda: not predicts and stored == preset.learning.total_steps,
         memory=states.memory,
         resume=resume,
     )

@@ -88,6 +88,11 @@ class PickEpisode(FieldGroup):
     anywhere_share: float = number(
         0.2, 0.0, 1.0, "", "Share of targets and of starts drawn away from the stations"
     )
+    target_choice: Literal["uniform", "critic"] = choice(
+        "uniform",
+        "Targets: drawn uniformly; or the station of the greatest value at the start, which "
+        "leaves others untrained (task maximisation bias)",
+    )
     curriculum_steps: Whole = number(
         0,
         0,
@@ -118,6 +123,12 @@ class PickEpisode(FieldGroup):
         """Whether a time-out is an end of the task, and no truncation."""
         return self.observation != "state" or self.timeout == "terminates"
 
+    @property
+    def _drawn_elsewhere(self) -> bool:
+        """Whether some targets are not at stations, or some starts depend on the target."""
+        shares = self.on_path_share, self.at_target_share, self.anywhere_share
+        return self.target_jitter_m > 0.0 or max(shares) > 0.0
+
     @model_validator(mode="after")
     def _check(self) -> Self:
         """Check the time limits against each other, and the observation against the task.
@@ -134,6 +145,14 @@ class PickEpisode(FieldGroup):
         ):
             rule = "needs safety = none, on_path_share = 0 and at_target_share = 0"
             raise InvalidInput("episode.curriculum_steps", self.curriculum_steps, rule)
+        if self.target_choice == "critic" and (
+            self.curriculum_steps or self.safety != "none" or self._drawn_elsewhere
+        ):
+            rule = (
+                "needs safety = none, curriculum_steps = 0, target_jitter_m = 0, "
+                "on_path_share = 0, at_target_share = 0 and anywhere_share = 0"
+            )
+            raise InvalidInput("episode.target_choice", self.target_choice, rule)
         if self.short_limit_s > self.time_limit_s:
             rule = f"must not exceed time_limit_s = {digits(self.time_limit_s)} s"
             raise InvalidInput("episode.short_limit_s", self.short_limit_s, rule)

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+import torch
 from numpy.typing import NDArray
 
 from app.policies.algorithms.exploration import (
@@ -12,10 +13,11 @@ from app.policies.algorithms.exploration import (
     PerEnvAR1Noise,
 )
 from app.policies.algorithms.parameter_noise import ParameterNoise
-from app.policies.algorithms.td3 import Networks
+from app.policies.algorithms.td3 import BatchTD3, Networks, critics_of
 from app.policies.checkpoints.checkpoint import Checkpoint
 from app.policies.checkpoints.model_state import under
 from app.policies.configs.pick import PickPeople, PickPreset
+from app.policies.networks.actor_critic import Critics
 from app.policies.networks.outcome import OutcomeHead
 from app.policies.networks.pick import LAYOUTS, actor_of, critics_for
 from app.policies.training.outcome import collect, fit
@@ -38,6 +40,7 @@ from app.sim.pick.batch import OUTCOMES, PickBatch, PickSettings
 from app.sim.pick.curriculum_batch import CurriculumPickBatch, StartRange
 from app.sim.pick.kernels.reward import RewardWeights
 from app.sim.pick.monitored_batch import MonitoredPickBatch
+from app.sim.pick.valued_targets import ValuedTargetBatch, Values
 from app.sim.robot.kernels.arm import CONTROLLED
 from app.sim.safety.layer import safety_settings
 from app.sim.scenario.monitoring import MonitoringSettings
@@ -114,7 +117,20 @@ def batch_of(preset: PickPreset, cell: Cell, n_envs: int, seed: int) -> PickBatc
             cell, n_envs, seed, settings, safety_settings(cell), monitoring
         )
     kind = CurriculumPickBatch if preset.episode.curriculum_steps else PickBatch
+    if preset.episode.target_choice == "critic":
+        kind = ValuedTargetBatch
     return kind(cell, n_envs, seed, settings)
+
+
+def values_of(actor: torch.nn.Module, critics: Critics) -> Values:
+    """Return the values that decisions choose by: the least critic's of the actor's action."""
+
+    def values(obs: NDArray[np.float32]) -> NDArray[np.floating]:
+        given = torch.as_tensor(obs)
+        with torch.inference_mode():
+            return critics.least(given, actor(given)).float().numpy()
+
+    return values
 
 
 def curve_batch(preset: PickPreset, cell: Cell) -> PickBatch:
@@ -150,6 +166,9 @@ def start(preset: PickPreset, seed: int, cell: Cell) -> tuple[TrainingRun, Train
         visited_states=lambda: visited_states(batch),
     )
     run, monitor = start_td3(preset, seed, cell, scenario)
+    if isinstance(batch, ValuedTargetBatch):
+        assert isinstance(run.model, BatchTD3)
+        batch.values = values_of(monitor.actor, critics_of(run.model.critic))
     if isinstance(exploration, ParameterNoise):
         exploration.follow(monitor.actor)
     return run, monitor

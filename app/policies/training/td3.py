@@ -131,21 +131,27 @@ def start_td3(
 
 
 def play(
-    actor: torch.nn.Module, batch: PlayedBatch
+    actor: torch.nn.Module, batch: PlayedBatch, gamma: float = 1.0
 ) -> tuple[NDArray[np.int64], NDArray[np.floating]]:
     """Play one greedy episode in every row of a batch.
 
+    Args:
+        actor: Returns actions of observations.
+        batch: The environments.
+        gamma: Discount factor of the returns per step.
+
     Returns:
-        Outcomes and undiscounted returns, each (n_envs,).
+        Outcomes and returns, each (n_envs,).
     """
     obs = batch.reset().copy()
     ended, returns = np.zeros(batch.n_envs, dtype=np.int64), np.zeros(batch.n_envs)
-    act = np.zeros((batch.n_envs, batch.n_act), dtype=np.float32)
+    act, discount = np.zeros((batch.n_envs, batch.n_act), dtype=np.float32), 1.0
     while (live := np.flatnonzero(ended == 0)).size:
         with torch.inference_mode():
             act[live] = actor(torch.as_tensor(obs[live])).numpy()
         result = batch.step(act, auto_reset=False)
-        obs, returns = result.obs.copy(), returns + result.rew
+        obs, returns = result.obs.copy(), returns + discount * result.rew
+        discount *= gamma
         ended = np.where(result.ended > 0, result.ended, ended)
     return ended, returns
 

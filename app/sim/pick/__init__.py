@@ -13,5 +13,7 @@ monitored_batch
               The pick scenario under speed and separation monitoring
 raw_state     The raw state of (5.8) from the features that contain it
 task_policy   Interface of a policy that selects a task, and its decision
+valued_targets
+              Pick environments whose targets are chosen by their values
 kernels/      Compiled pick episodes
 """
