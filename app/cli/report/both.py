@@ -44,7 +44,45 @@ def at_both_limits(
     )
 
 
+BIAS = "task-maximisation-bias"
+
+
+def of_both_choices(label: str, row: str, key: str, unit: str = "") -> tuple[Measure, ...]:
+    """Return a number of trainings with uniform targets, the critic's, and the difference.
+
+    Args:
+        label: Start of the names of the lines.
+        row: Name of the row behind that of the choice.
+        key: Key in the row.
+        unit: Unit of a quantity; empty for a rate.
+    """
+    return tuple(
+        Measure(f"{label}: {name}", "", "", StoredValue(BIAS, f"{choice} {row}", key, unit))
+        for name, choice in (
+            ("uniform targets", "uniform"),
+            ("targets chosen by the critic", "critic"),
+            ("difference, paired", "critic - uniform"),
+        )
+    )
+
+
 BOTH_ITEMS = (
+    Item(
+        chapter=BOTH,
+        title="Task maximisation bias (5.2)",
+        measures=(
+            *of_both_choices("success, each target in turn", "all", "success"),
+            *of_both_choices("least success of a target", "all", "least_success"),
+            *of_both_choices("value at the start less return", "all", "error", "of reward"),
+            *of_both_choices("its absolute value", "all", "error_abs", "of reward"),
+            *of_both_choices(
+                "success with the target that the critic chooses", "chosen", "success"
+            ),
+        ),
+        agreement="open. The thesis gives the reason for uniform targets in training and no "
+        "numbers ([notebook](../notebook/pick.md#task-maximisation-bias)).",
+        command="python -m tools.docs.task_maximisation FOLDER",
+    ),
     Item(
         chapter=BOTH,
         title="Table 5.1: environment",

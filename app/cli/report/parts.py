@@ -36,7 +36,8 @@ class StoredValue:
             mean, low, high = (100.0 * value[key] for key in ("mean", "low", "high"))
             return f"{mean:.2f} % ({low:.2f}-{high:.2f})"
         if isinstance(value, dict) and "sd" not in value:
-            mean, low, high = (f"{value[key]:.1f}" for key in ("mean", "low", "high"))
+            places = 1 if abs(value["mean"]) >= 10.0 else 2
+            mean, low, high = (f"{value[key]:.{places}f}" for key in ("mean", "low", "high"))
             return f"{mean} ({low} to {high}) {self.unit}"
         if isinstance(value, dict):
             return f"{value['mean']:.2f} ± {value['sd']:.2f} {self.unit}"

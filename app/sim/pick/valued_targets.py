@@ -3,7 +3,7 @@
 In training this choice is the cause of the *task maximisation bias*: a target whose value is
 underestimated is not tried, so its value and the policy toward it are not corrected.
 
-Source: thesis section 5.2, docs/method.md 3.5. Deviates: the choice is made once, at the start
+Source: thesis section 5.2, docs/method.md 3.1. Deviates: the choice is made once, at the start
 of an episode; the thesis chooses again at each step.
 """
 
@@ -63,5 +63,5 @@ class ValuedTargetBatch(PickBatch):
     def _at_stations(self, envs: Indices) -> Flags:
         """Return whether the robot stands at each station, shape (k, n_stations)."""
         away = self.state.q[envs, None, :CONTROLLED] - self.world.station_q[:, :CONTROLLED]
-        at: Flags = ~away.any(axis=2)
+        at: Flags = np.all(away == 0.0, axis=2)
         return at

@@ -190,6 +190,15 @@ VARIANTS: list[tuple[str, dict[str, Any]]] = [
     ("pick-td3", ARM),
     ("pick-td3-monitored", ARM),
     ("pick-td3-thesis", PARAMETERS),
+    (
+        "pick-reach-td3",
+        {
+            **ARM,
+            "episode.target_choice": "critic",
+            "episode.target_jitter_m": 0.0,
+            "episode.on_path_share": 0.0,
+        },
+    ),
 ]
 
 
