@@ -2,9 +2,11 @@
 
     python -m tools.docs.thesis_curves thesis-reach RUN ...
 
-A RUN is a folder with a ``curve.jsonl``, as written by ``training_curves.py``. Its points are
-greedy episodes during the training: in the reach recipes 20 for each of 54 targets by default,
-in the pick recipe 200. Their curves also have the return of standing still in these episodes.
+A RUN is a folder with a ``curve.jsonl``, as written by ``training_curves.py`` or
+``python -m app train``. Its points are greedy episodes during the training: in the reach
+recipes 20 for each of 54 targets by default, in the pick recipe 200, in ``pick-td3`` those of
+the environments without exploration. The curves of recipes also have the return of standing
+still in these episodes.
 A curve of the same preset and seed replaces the one in the file.
 """
 
@@ -53,13 +55,16 @@ class Still(torch.nn.Module):
 
 def curve_of(folder: Path) -> Json:
     """Return the recorded curve of a training."""
+    stored = folder / "policy.json"
+    last = stored if stored.exists() else sorted(folder.glob("step-*.json"))[-1]
+    manifest = read(last.with_suffix("")).manifest
     points = lines(folder / "curve.jsonl")
     curve: Json = {
-        "name": points[0]["preset"],
-        "seed": points[0]["seed"],
+        "name": manifest["preset"]["name"],
+        "seed": manifest["seed"],
+        "commits": manifest["commits"],
         "played": [{key: one[key] for key in KEYS} for one in points],
     }
-    manifest = read(sorted(folder.glob("step-*.json"))[-1].with_suffix("")).manifest
     kind = type(presets.get(curve["name"]))
     preset = read_config(kind, manifest["preset"], "manifest.preset")
     if not isinstance(preset, SortingPreset):

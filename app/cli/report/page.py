@@ -7,11 +7,12 @@ from typing import Any
 from app.cli.report.both import BOTH_ITEMS
 from app.cli.report.motion import MOTION_ITEMS
 from app.cli.report.parts import Config, Item, StoredValue
+from app.cli.report.recipes import RECIPE_ITEMS
 from app.cli.report.sorting import SORTING_ITEMS
 
 MISSING = "not measured"
-ITEMS = (*SORTING_ITEMS, *MOTION_ITEMS, *BOTH_ITEMS)
-"""Tables and figures, in the order of the thesis."""
+ITEMS = (*SORTING_ITEMS, *MOTION_ITEMS, *BOTH_ITEMS, *RECIPE_ITEMS)
+"""Tables and figures, in the order of the thesis; then all trainings."""
 HEAD = """# The thesis beside Tandem
 
 Every table and figure of the results of the [thesis](../method.md), in its order: its numbers,

@@ -1,0 +1,56 @@
+"""Report on the trainings of all recipes beside ours."""
+
+from app.cli.report.parts import Curve, Item, Measure, trained
+
+CURVES = (
+    ("sorting, e0", "thesis-sorting", "sorting-e0-thesis", "sorting-curves", "sorting-e0-dqn"),
+    ("reach", "thesis-reach", "reach-ddpg-authors", "reach-curves", "reach-td3"),
+    ("pick", "thesis-pick", "pick-td3-thesis", "pick-curves", "pick-td3"),
+)
+"""Scenario; file and name of the curves of its recipe, and of ours."""
+PRINTED = {"reach success": "91.76 %", "pick success": "75 %", "pick collision": "25 %"}
+"""Rates that the thesis prints."""
+
+
+def _lines() -> tuple[Measure, ...]:
+    return tuple(
+        Measure(
+            f"{scenario}: {text}",
+            PRINTED.get(f"{scenario} {key}", ""),
+            Curve(file, recipe, key, unit),
+            Curve(own_file, own, key, unit, "sorting-e0" if own == "sorting-e0-dqn" else ""),
+        )
+        for scenario, file, recipe, own_file, own in CURVES
+        for text, key, unit in (
+            ("success, last point", "success", ""),
+            ("collision, last point", "collision", ""),
+            ("processor time [s]", "cpu_s", "s"),
+        )
+        if not (scenario == "sorting, e0" and key == "collision")
+    )
+
+
+RECIPE_ITEMS = (
+    Item(
+        chapter="All chapters",
+        title="Trainings of the recipes beside ours",
+        measures=_lines(),
+        images=(
+            (
+                "recipes.png",
+                "Success (solid) and collisions (dashed) of all trainings over environment"
+                " steps, updates and processor time, a line per seed; grey: the thesis",
+            ),
+        ),
+        agreement="open: no recipe was trained to its end yet. Ours exceed the success that"
+        " the thesis prints for reaching and picking within minutes of processor time; picking"
+        " here includes the grasp and the lift. The thesis prints no rate for sorting.",
+        command=" ; ".join(
+            (
+                trained("sorting-e0-thesis", "thesis-sorting"),
+                trained("pick-td3", "pick-curves"),
+                "python -m tools.docs.recipe_plots",
+            )
+        ),
+    ),
+)

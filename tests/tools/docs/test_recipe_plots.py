@@ -1,0 +1,47 @@
+"""Curves of all recipes beside ours, and the points that are joined."""
+
+import json
+from pathlib import Path
+
+from tests.policies.conftest import TINY, preset_of
+from tools.docs.recipe_plots import curves_of, pooled, recipes, updates_at
+from tools.docs.thesis_curves import curve_of
+from tools.docs.training_curves import record
+
+
+def test_updates_follow_from_the_preset() -> None:
+    assert updates_at("pick-td3", 25_600) == 0
+    assert updates_at("pick-td3", 12_288_000) == 95_800  # as the shipped checkpoint states
+    assert updates_at("pick-td3-thesis", 150_000) == 149_900
+
+
+def test_points_are_joined_to_enough_episodes() -> None:
+    point = {"step": 100, "cpu_s": 60.0, "updates": 1, "success": 0.5, "collision": 0.0}
+    few = {**point, "episodes": 50}
+    played = [{**few, "success": None}, few, few, few, {**few, "step": 200, "success": 1.0}]
+    joined = pooled({"name": "pick-td3", "played": [*played, few]})
+    expected = {"step": 200, "updates": 1, "cpu_min": 1.0, "success": 0.625, "collision": 0.0}
+    assert joined == [expected]
+    one = {"step": 12_288_000, "cpu_s": 30.0, "success": 0.5}
+    assert pooled({"name": "pick-td3", "played": [one]}) == [
+        {"step": 12_288_000, "updates": 95_800, "cpu_min": 0.5, "success": 0.5}
+    ]
+
+
+def test_picture_has_a_row_per_scenario_also_without_curves(tmp_path: Path) -> None:
+    assert curves_of(tmp_path, "pick-curves", "pick-td3") == []
+    assert len(recipes(tmp_path).axes) == 9
+
+
+def test_folder_of_a_training_is_a_curve(tmp_path: Path) -> None:
+    run = tmp_path / "run"
+    preset = preset_of("pick-td3", {**TINY, "learning.total_steps": 512})
+    record(preset, 3, run, predicts=False)
+    curve = curve_of(run)
+    assert (curve["name"], curve["seed"]) == ("pick-td3", 3)
+    assert [one["step"] for one in curve["played"]] == [256, 512]
+    for kind in ("json", "safetensors"):  # as the command line names the last policy
+        (run / f"step-000000512.{kind}").rename(run / f"policy.{kind}")
+    assert curve_of(run) == curve
+    (tmp_path / "pick-curves.json").write_text(json.dumps({"curves": [curve]}))
+    assert curves_of(tmp_path, "pick-curves", "pick-td3") == [curve]
