@@ -69,7 +69,9 @@ def test_numbers_are_written_with_interval_deviation_or_unit():
     assert StoredValue("x", "a", "rate").value(found) == "50.00 % (25.00-75.00)"
     assert StoredValue("x", "a", "time_s", "s").value(found) == "0.50 ± 0.10 s"
     assert StoredValue("x", "a", "ms", "ms").value(found) == "2 ms"
-    assert StoredValue("x", "a", "rate", "1/h").value(found) == "0.5 (0.2 to 0.8) 1/h"
+    assert StoredValue("x", "a", "rate", "1/h").value(found) == "0.50 (0.25 to 0.75) 1/h"
+    parts = {"results": [{"name": "a", "n": {"mean": 12.0, "low": 9.04, "high": 15.0}}]}
+    assert StoredValue("x", "a", "n", "1/h").value(parts) == "12.0 (9.0 to 15.0) 1/h"
     pair = {"results": [], "paired": [{"name": "a - b", "rate": rate}]}
     assert StoredValue("x", "a - b", "rate").value(pair) == "50.00 % (25.00-75.00)"
     assert StoredValue("x", "b", "ms", "ms").value(found) is None

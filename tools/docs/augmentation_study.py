@@ -152,7 +152,7 @@ def main() -> None:
     options = parser.parse_args()
     torch.set_num_threads(1)
     policies = {kind: trained(options.folder, kind) for kind in KINDS}
-    motions = clean_runs(options.motions)
+    motions = clean_runs(options.recordings)
     rates = {
         kind: {seed: successes(one, motions, options.episodes) for seed, one in found.items()}
         for kind, found in policies.items()

@@ -137,7 +137,8 @@ def recipes(results: Path) -> Figure:
             view.xaxis.set_minor_formatter(NullFormatter())
             view.yaxis.set_major_formatter(PercentFormatter(1.0, decimals=0, symbol=" %"))
         views[0].set_title(f"{row.title}: success; dashed: collisions")
-        views[0].legend(loc="center right", fontsize=7)
+        if views[0].get_legend_handles_labels()[0]:
+            views[0].legend(loc="center right", fontsize=7)
     return figure
 
 

@@ -30,18 +30,23 @@ def test_points_are_joined_to_enough_episodes() -> None:
 
 def test_picture_has_a_row_per_scenario_also_without_curves(tmp_path: Path) -> None:
     assert curves_of(tmp_path, "pick-curves", "pick-td3") == []
-    assert len(recipes(tmp_path).axes) == 9
+    without = recipes(tmp_path).axes
+    assert [len(view.lines) for view in without] == [0] * 3 + [1] * 3 + [2] * 3
+    played = [{"step": 1000, "cpu_s": 9.0, "updates": 5, "success": 0.5, "collision": 0.5}]
+    one = {"name": "pick-td3", "seed": 1, "played": played}
+    (tmp_path / "pick-curves.json").write_text(json.dumps({"curves": [one, one]}))
+    assert [len(view.lines) for view in recipes(tmp_path).axes[6:]] == [6] * 3
 
 
 def test_folder_of_a_training_is_a_curve(tmp_path: Path) -> None:
     run = tmp_path / "run"
-    preset = preset_of("pick-td3", {**TINY, "learning.total_steps": 512})
+    preset = preset_of("pick-td3", {**TINY, "learning.total_steps": 1024})
     record(preset, 3, run, predicts=False)
     curve = curve_of(run)
     assert (curve["name"], curve["seed"]) == ("pick-td3", 3)
-    assert [one["step"] for one in curve["played"]] == [256, 512]
+    assert [one["step"] for one in curve["played"]] == [256, 512, 768, 1024]
     for kind in ("json", "safetensors"):  # as the command line names the last policy
-        (run / f"step-000000512.{kind}").rename(run / f"policy.{kind}")
+        (run / f"step-000001024.{kind}").rename(run / f"policy.{kind}")
     assert curve_of(run) == curve
     (tmp_path / "pick-curves.json").write_text(json.dumps({"curves": [curve]}))
     assert curves_of(tmp_path, "pick-curves", "pick-td3") == [curve]
