@@ -1,6 +1,7 @@
 """Short trainings of the recipes of the thesis: their return beside standing still.
 
-The presets are those of ``python -m app report``; only length and test episodes change.
+The presets are those of ``python -m app report``; length, test episodes and, for ``pick-td3``,
+the sizes of networks and batches change.
 Standing still is the action 0 in reaching; in sorting, the top of a tower goes back on it.
 """
 
@@ -50,6 +51,34 @@ def test_sorting_recipe_gains_over_moving_nothing(name: str) -> None:
     assert trained(preset).progress[-1].reward > moving_nothing(preset)
 
 
+@pytest.mark.parametrize("name", ["sorting-e0-dqn", "sorting-e1-dqn", "sorting-e1-dqn-pure"])
+def test_own_sorting_preset_gains_over_moving_nothing(name: str) -> None:
+    """Within 50 updates the return of an attempt is less than half as low."""
+    preset = short(name, 12_800, {"learning.progress_episodes": 60})
+    assert trained(preset).progress[-1].reward > 0.5 * moving_nothing(preset)
+
+
+PICK = {
+    "learning.progress_episodes": 40,
+    "learning.batch_size": 128,
+    "learning.learning_starts": 3_200,
+    "learning.actor_frozen_updates": 20,
+    "networks.width": 64,
+}
+
+
+def test_own_pick_preset_gains_over_standing_still() -> None:
+    """Mostly by the base motion of the residual actor: learning pays after 1 M steps.
+
+    Within 55 updates of the actor, its corrections must not undo that motion.
+    """
+    preset = short("pick-td3", 12_800, PICK)
+    point = trained(preset).progress[-1]
+    assert point.updates == 75
+    assert point.success > 0.3
+    assert point.reward > standing_still(preset) + 3.0
+
+
 @pytest.mark.slow
 def test_own_reach_preset_gains_over_standing_still() -> None:
     """At the first point of its curve: 1,800 updates, 800 of them of the actor, too."""
@@ -71,11 +100,10 @@ def test_reach_recipe_does_not_gain_over_standing_still_at_first(name: str) -> N
     assert max(one.success for one in points) < 0.2
 
 
-@pytest.mark.slow
 def test_pick_recipe_gains_over_standing_still_at_first_by_contacts() -> None:
     """A contact costs less than waiting for the time limit (docs/notebook/pick.md)."""
-    preset = short("pick-td3-thesis", 4_000)
+    preset = short("pick-td3-thesis", 1_000, {"learning.progress_episodes": 40})
     point = trained(preset).progress[-1]
-    assert point.updates == 3_900
+    assert point.updates == 900
     assert point.reward > standing_still(preset) + 1.0
     assert point.collision > 0.8
