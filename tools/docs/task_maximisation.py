@@ -196,7 +196,7 @@ def _intervals(values: dict[str, list[float]], low: float) -> Json:
 
 def draw(result: Json) -> Figure:
     """Draw success, error of the critic and share in training by target, a dot per seed."""
-    figure, axes = panels(1, 3, 2.9, sharex=True)
+    figure, axes = panels(1, 3, 3.3, sharex=True)
     rows = {row["name"]: row for row in result["results"]}
     stations = [name.split()[1] for name in rows if "trained" in rows[name]]
     stations = list(dict.fromkeys(stations))
@@ -207,7 +207,7 @@ def draw(result: Json) -> Figure:
         ):
             each = [rows[f"{choice} {one}"] for one in stations]
             mean = [factor * one[name]["mean"] for one in each]
-            view.bar(place, mean, 0.3, color=colour, alpha=0.5, label=f"{choice}")
+            view.bar(place, mean, 0.3, color=colour, alpha=0.5, label=choice)
             dots = factor * np.array([one[f"{name}_by_seed"] for one in each])
             view.plot(np.repeat(place, dots.shape[1]), dots.ravel(), ".", color=colour, ms=4)
     titles = ("success [%]", "value less return", "share of targets in training [%]")
@@ -215,7 +215,8 @@ def draw(result: Json) -> Figure:
         view.axhline(0.0, color=GREY, lw=0.9)
         view.set_title(title)
         view.set_xticks(range(len(stations)), stations, rotation=60)
-    axes[0, 0].legend(loc="lower right")
+    shown = axes[0, 0].get_legend_handles_labels()
+    figure.legend(*shown, loc="outside lower center", ncols=2, title="targets in training")
     return figure
 
 
