@@ -18,12 +18,7 @@ _STANDARD = {*vars(logging.makeLogRecord({})), "message", "asctime", "taskName"}
 
 
 class LineFormatter(logging.Formatter):
-    """Writes a record with its time in UTC and its fields.
-
-    Args:
-        style: Form of the line.
-        fields: Fields of every line.
-    """
+    """Writes a record with its time in UTC and its fields."""
 
     converter = staticmethod(time.gmtime)
     default_msec_format = "%s.%03dZ"

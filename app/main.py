@@ -113,11 +113,6 @@ def create_app(settings: Settings, traces: TracerProvider | None = None) -> Fast
 class Service:
     """The running parts of one application.
 
-    Args:
-        settings: Where and how the service runs.
-        counts: Metrics of the application.
-        tracer: Makes the spans of decisions and job attempts.
-
     Raises:
         Conflict: Another server uses the same database.
     """

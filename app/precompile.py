@@ -94,9 +94,6 @@ def compile_part(name: str) -> float:
 def compile_all(n_processes: int) -> Iterator[tuple[str, float]]:
     """Compile each part in its own process.
 
-    Args:
-        n_processes: Number of processes at once.
-
     Yields:
         Name and CPU time [s] of each compiled part.
     """

@@ -66,12 +66,7 @@ class StorageUnavailable(ServiceError):
 
 
 class ServerUnreachable(StorageUnavailable):
-    """The server does not answer a worker on another machine for now.
-
-    Args:
-        address: Its address.
-        reason: The error.
-    """
+    """The server does not answer a worker on another machine for now."""
 
     def __init__(self, address: str, reason: str) -> None:
         super().__init__(address, reason)

@@ -62,11 +62,7 @@ def models() -> dict[str, type[BaseModel]]:
 
 
 class Writer:
-    """Writes methods, and collects the models that they name.
-
-    Args:
-        document: The OpenAPI document.
-    """
+    """Writes methods, and collects the models that they name."""
 
     def __init__(self, document: Node) -> None:
         self._document = document

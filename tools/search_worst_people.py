@@ -50,12 +50,6 @@ def success_beside(
 ) -> NDArray[np.float64]:
     """Return the rate of success beside each motion.
 
-    Args:
-        checkpoint: Policy and critic.
-        motions: The motions.
-        per_motion: Episodes of each, on average.
-        seed: Seed of the episodes.
-
     Returns:
         Rates with one success and one failure added, shape (len(motions),).
     """
@@ -74,14 +68,7 @@ def success_beside(
 def search(
     checkpoint: Checkpoint, n_motions: int, n_generations: int, n_kept: int
 ) -> list[tuple[HandMotion, float]]:
-    """Return the worst motions found, and the rate of success beside each on another seed.
-
-    Args:
-        checkpoint: Policy and critic.
-        n_motions: Motions of a generation.
-        n_generations: Generations.
-        n_kept: Motions that are returned.
-    """
+    """Return the worst motions found, and the rate of success beside each on another seed."""
 
     def rates(numbers: NDArray[np.float64]) -> NDArray[np.float64]:
         motions = [hand_motion(one) for one in np.atleast_2d(numbers.T)]

@@ -128,12 +128,7 @@ def _watch(
 
 
 def watched(n: int, seed: int) -> Moments:
-    """Return noiseless inputs and targets of ``n`` pedestrians at random moments.
-
-    Args:
-        n: Number of pedestrians.
-        seed: Seed.
-    """
+    """Return noiseless inputs and targets of ``n`` pedestrians at random moments."""
     rng = np.random.default_rng(seed)
     person = pedestrian_settings(load_cell(CELL).cylinders[0])
     usual, constant = person, type(person)(kind="constant")
@@ -217,13 +212,7 @@ def network_of(net: nn.Sequential) -> Network:
 
 
 def make(n_pedestrians: int, n_updates: int, seed: int) -> tuple[Network, Network]:
-    """Return trained networks for radius and path length.
-
-    Args:
-        n_pedestrians: Moments to train on.
-        n_updates: Minibatches for each network.
-        seed: Seed.
-    """
+    """Return trained networks for radius and path length."""
     torch.manual_seed(seed)
     moments, rate = watched(n_pedestrians, seed), MOST_NOISE / 0.05
     radius = MOST_NOISE / RADIUS_SCALE, rate

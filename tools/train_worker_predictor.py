@@ -61,14 +61,7 @@ class PostureMoments(NamedTuple):
 
 
 def watched(settings: PickSettings, n_people: int, n_steps: int, seed: int) -> PostureMoments:
-    """Return the motion of people, observed at every control cycle.
-
-    Args:
-        settings: The people.
-        n_people: Number of people.
-        n_steps: Number of control cycles.
-        seed: Seed.
-    """
+    """Return the motion of people, observed at every control cycle."""
     batch = PickBatch(load_cell(PickPreset().cell), n_people, seed, settings)
     batch.reset()
     people, rest = batch.state.people, np.zeros((n_people, batch.n_act), dtype=np.float32)
@@ -87,13 +80,7 @@ def watched(settings: PickSettings, n_people: int, n_steps: int, seed: int) -> P
 
 
 def fitted(moments: PostureMoments, n_updates: int, seed: int) -> WorkerPredictor:
-    """Return a predictor trained on moments.
-
-    Args:
-        moments: Inputs and targets.
-        n_updates: Number of minibatches.
-        seed: Seed of weights and order.
-    """
+    """Return a predictor trained on moments."""
     torch.manual_seed(seed)
     mean = moments.now.mean(axis=0)
     scale = moments.now.std(axis=0) + LEAST_SCALE
@@ -137,10 +124,6 @@ def hand_errors(predictor: WorkerPredictor, moments: PostureMoments) -> Vec:
     """Return mean errors of moving hands [m] at each time: of the predictor, at constant speed.
 
     A hand moves if it would be 5 cm away after 0.25 s.
-
-    Args:
-        predictor: Predictor.
-        moments: Motion of people.
 
     Returns:
         Errors, shape (2, 3).

@@ -57,12 +57,7 @@ def id_of(scope: Scope) -> str:
 
 
 class Answers:
-    """ASGI layer around all others.
-
-    Args:
-        app: The inner layers.
-        metrics: Counts the answers.
-    """
+    """ASGI layer around all others."""
 
     def __init__(self, app: ASGIApp, *, metrics: Metrics) -> None:
         self.app = app

@@ -81,11 +81,6 @@ def known_people(
 ) -> tuple[KnownPerson, ...]:
     """Return the people of a request.
 
-    Args:
-        entries: Their descriptions.
-        cell: The work cell.
-        trackers: The open trackers.
-
     Raises:
         InvalidInput: An impossible state, with its place in the request.
     """

@@ -34,11 +34,7 @@ class StateMetric:
 
 
 class ServiceState(Collector):
-    """Reads the state of a service.
-
-    Args:
-        services: The parts of the service.
-    """
+    """Reads the state of a service."""
 
     def __init__(self, services: Services) -> None:
         self._services = services

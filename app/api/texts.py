@@ -32,9 +32,6 @@ def fault_in_json(body: bytes) -> Member | None:
     """Return field, value, rule and choices of a fault in a JSON body, or None.
 
     Invalid JSON is left to the parser.
-
-    Args:
-        body: The whole body.
     """
     if not body.isascii() or b"\0" in body:
         try:

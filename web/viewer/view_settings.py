@@ -58,12 +58,7 @@ def settings_of(cell: Cell) -> tuple[Setting, ...]:
 
 
 class ViewSettings:
-    """Gives every visitor check boxes, and hides what each of them unchecks.
-
-    Args:
-        server: The viewer.
-        cell: Says what there is.
-    """
+    """Gives every visitor check boxes, and hides what each of them unchecks."""
 
     def __init__(self, server: viser.ViserServer, cell: Cell) -> None:
         self._settings = settings_of(cell)

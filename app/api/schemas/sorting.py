@@ -337,14 +337,7 @@ def _size_of(shape: SortingShape) -> str:
 
 
 def move_of(move: Move, state: SortingState, names: SortingNames, ids: Ids) -> SortingMove:
-    """Return a move in the words of the task; a move back ends where it began.
-
-    Args:
-        move: The move.
-        state: The state before it.
-        names: Names of the task.
-        ids: Names of the objects.
-    """
+    """Return a move in the words of the task; a move back ends where it began."""
     pick = _place(move.pick, state, names, top=True)
     tower = move.pick - names.shape.n_cells
     code = int(state.clutter[move.pick] if tower < 0 else state.towers[tower, pick.level or 0])

@@ -27,11 +27,7 @@ Json = dict[str, Any]
 
 
 def page(results: Path) -> tuple[str, list[str]]:
-    """Return the report as Markdown, and the measures without a result file.
-
-    Args:
-        results: Folder of the result files.
-    """
+    """Return the report as Markdown, and the measures without a result file."""
     parts, missing = [HEAD], []
     chapter = ""
     for item in ITEMS:

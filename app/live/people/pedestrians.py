@@ -100,12 +100,7 @@ UPRIGHT = AnthropometrySnapshot(
 
 
 class LivePedestrians:
-    """Pedestrians of one live reach cell; arrays are indexed by person id.
-
-    Args:
-        cell: Work cell without workers.
-        seed: Seed of the walks.
-    """
+    """Pedestrians of one live reach cell; arrays are indexed by person id."""
 
     def __init__(self, cell: Cell, seed: int) -> None:
         self._cell, self._seed = cell, seed

@@ -16,15 +16,7 @@ def doing(
     has_policy: bool,
     n_people: int,
 ) -> str:
-    """Return the status message.
-
-    Args:
-        status: Status of the robot.
-        view: Goal.
-        safety: Safety layer.
-        has_policy: Whether a policy moves the robot.
-        n_people: Number of people.
-    """
+    """Return the status message."""
     if status == "blocked":
         return "Waiting at home: a person stands at the start position."
     if status == "reached":

@@ -15,12 +15,7 @@ ON_TARGET_M = 1e-3
 
 
 class LiveGoal:
-    """Target of the tcp.
-
-    Args:
-        cell: Cell with a goal region.
-        seed: Seed of the goals.
-    """
+    """Target of the tcp."""
 
     def __init__(self, cell: Cell, seed: int) -> None:
         self.targets = goal_region_of(cell).targets()

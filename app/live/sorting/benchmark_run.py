@@ -130,12 +130,7 @@ class SortingTestRun:
         self._spoilt = "a visitor changed blocks or goal"
 
     def verdict(self, *, solved: bool, moves: int) -> Verdict:
-        """Return expectation, observation and whether they agree.
-
-        Args:
-            solved: Whether every tower matches the goal.
-            moves: Number of moves in this test.
-        """
+        """Return expectation, observation and whether they agree."""
         if self._ended is not None:
             return self._ended
         over = solved and not self._waiting

@@ -12,12 +12,7 @@ DONE = "Done: every tower matches the goal."
 
 
 class StatusMessages:
-    """Builds the messages of one sorting cell.
-
-    Args:
-        cell: Sorting cell.
-        table: Its table.
-    """
+    """Builds the messages of one sorting cell."""
 
     def __init__(self, cell: Cell, table: SortingTable) -> None:
         self._table = table

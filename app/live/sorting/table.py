@@ -32,11 +32,7 @@ class Block:
 
 
 class SortingTable:
-    """Blocks by place, and the goal.
-
-    Args:
-        cell: Sorting cell.
-    """
+    """Blocks by place, and the goal."""
 
     def __init__(self, cell: Cell) -> None:
         self.cell = cell

@@ -111,15 +111,7 @@ class OwnPolicy(TD3Policy):
 
 
 class BatchTD3(TD3, Stateful):
-    """TD3 with exploration per environment, a frozen start and an averaged actor.
-
-    Args:
-        learning: Hyper-parameters.
-        env: The environments.
-        seed: Seed of networks and replay.
-        exploration: Perturbs the actions.
-        networks: Factories of actor and critics.
-    """
+    """TD3 with exploration per environment, a frozen start and an averaged actor."""
 
     STATE = (*COUNTERS, "exploration")
 

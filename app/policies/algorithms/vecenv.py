@@ -20,11 +20,7 @@ COUNTERS = ("num_timesteps", "_n_updates", "_episode_num", "_current_progress_re
 
 
 class BatchVecEnv(VecEnv, Stateful):
-    """The environments of one batch.
-
-    Args:
-        task: The batch with its spaces.
-    """
+    """The environments of one batch."""
 
     STATE = ("batch", "ended")
 

@@ -57,7 +57,9 @@ PROTOCOLS: Mapping[str, Protocol] = MappingProxyType(
         "reach-oracle": run_oracle,
     }
 )
-"""Protocol by name; each takes a checkpoint, ``episodes``, ``seed`` and ``on_row``."""
+"""Protocol by name. Each takes a checkpoint and, by keyword, ``episodes`` (None: the usual
+number), ``seed`` (of the episodes; use one that was not used for tuning), ``on_row`` (callback
+for each finished row) and, where it uses recorded motion, ``motions``."""
 WITH_MOTIONS = frozenset({"pick-mocap"})
 """Protocols that take recorded motion."""
 WITH_OR_WITHOUT_MOTIONS = frozenset({"reach-ssm", "risk-calibration"})

@@ -92,11 +92,7 @@ class PolicyQuery(Protocol):
 
 
 class Direct:
-    """The policy for its own goal.
-
-    Args:
-        actor: A policy.
-    """
+    """The policy for its own goal."""
 
     def __init__(self, actor: ReachActor) -> None:
         self._actor = actor
@@ -144,9 +140,6 @@ class DistanceWeighted:
     """The distance-weighted mean over people of the actions beside each of them alone.
 
     With one person it is the query itself, exactly.
-
-    Args:
-        query: Actions beside one person.
     """
 
     def __init__(self, query: PolicyQuery) -> None:
@@ -169,11 +162,6 @@ class DistanceWeighted:
 
 class RolloutController:
     """Rollout policy improvement of another controller.
-
-    Args:
-        base: The other controller.
-        actor: Policy of the rollouts.
-        layer: Safety layer of the robot.
 
     Raises:
         InvalidInput: The policy cannot be simulated by the kernels.

@@ -18,11 +18,7 @@ from app.sim.safety.layer import SafetySettings
 
 
 class TrainedReachPolicy:
-    """One policy and its controllers by inference mode; for one thread at a time.
-
-    Args:
-        actor: Policy.
-    """
+    """One policy and its controllers by inference mode; for one thread at a time."""
 
     def __init__(self, actor: ReachActor) -> None:
         self._actor = actor

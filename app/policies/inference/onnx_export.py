@@ -45,11 +45,7 @@ _TENSOR = re.compile(r"(\d+)\.weight")
 
 
 class Graph:
-    """Nodes and constants of a graph.
-
-    Args:
-        arrays: Tensors of the checkpoint.
-    """
+    """Nodes and constants of a graph."""
 
     def __init__(self, arrays: Mapping[str, NDArray[Any]]) -> None:
         self._arrays = arrays

@@ -55,9 +55,6 @@ class CrowdEncoder(nn.Module):
     Each block passes through the same layers; the maximum over present people is invariant to
     their order and number.
 
-    Args:
-        shape: Position of the blocks.
-
     Source: Zaheer et al., *Deep sets* (2017); the maximum as in Qi et al., *PointNet* (2017).
     """
 

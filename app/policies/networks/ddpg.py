@@ -24,11 +24,7 @@ CLIP = 5.0
 
 
 class RunningNormalisation(nn.Module):
-    """Normalise observations by the mean and standard deviation of all that were counted.
-
-    Args:
-        n_obs: Length of an observation.
-    """
+    """Normalise observations by the mean and standard deviation of all that were counted."""
 
     def __init__(self, n_obs: int) -> None:
         super().__init__()

@@ -45,11 +45,7 @@ class OutcomePrediction(NamedTuple):
 
 
 class OutcomeHead(nn.Module):
-    """Ensemble that predicts the outcome of a pick.
-
-    Args:
-        n_obs: Length of observations.
-    """
+    """Ensemble that predicts the outcome of a pick."""
 
     mean: torch.Tensor
     """Mean of each input, shape (n_obs + 1,)."""

@@ -43,11 +43,7 @@ def layout_of(shape: SortingShape) -> list[list[Any]]:
 
 
 class SortingView(nn.Module):
-    """Takes observations apart: cells, towers, goal and failure probabilities.
-
-    Args:
-        shape: Size of the task.
-    """
+    """Takes observations apart: cells, towers, goal and failure probabilities."""
 
     def __init__(self, shape: SortingShape) -> None:
         super().__init__()
@@ -83,12 +79,7 @@ def dueling(value: Tensor, advantage: Tensor, valid: Tensor) -> Tensor:
 
 
 class SharedNetwork(nn.Module):
-    """Values of all moves, with one set of weights for all towers.
-
-    Args:
-        shape: Size of the task.
-        width: Width of the hidden layers.
-    """
+    """Values of all moves, with one set of weights for all towers."""
 
     relative: Tensor
     """Codes as each tower counts colours, (C, n_types + 1)."""
@@ -192,10 +183,6 @@ class PrintedNetwork(nn.Module):
 
     As in Stable-Baselines 2, the library of the thesis, value and advantages have hidden layers
     of their own. Failure probabilities are not observed: the policy has to learn them.
-
-    Args:
-        shape: Size of the task.
-        width: Width of the hidden layers.
     """
 
     informed = False

@@ -73,9 +73,6 @@ class _Object(dict[str, Any]):
 def read_cell(content: bytes) -> Cell:
     """Return the cell in a JSON file.
 
-    Args:
-        content: Content of the file.
-
     Raises:
         BadCell: It is no cell; the error lists every fault.
     """

@@ -140,13 +140,7 @@ def _capsules(ends: Vec, radii: Vec, colours: Sequence[Rgb]) -> list[Solid]:
 
 
 def people_solids(cell: Cell, state: PeopleState, row: int) -> list[Solid]:
-    """Return the people of one environment.
-
-    Args:
-        cell: Work cell.
-        state: People of the batch.
-        row: Number of the environment.
-    """
+    """Return the people of one environment."""
     workers = worker_solids(cell, state.q[row], state.size[row])
     floor = cell.floor_z
     walkers = [
@@ -200,13 +194,7 @@ def target_solids(goal: Vec) -> list[Solid]:
 
 
 def block_solids(cell: Cell, shape: SortingShape, state: SortingState) -> list[Solid]:
-    """Return clutter slots, towers and blocks; blocks of the goal are translucent.
-
-    Args:
-        cell: Sorting cell.
-        shape: Size of its task.
-        state: Blocks, goal and failure rates.
-    """
+    """Return clutter slots, towers and blocks; blocks of the goal are translucent."""
     level = block_height(cell) or 0.03
     named = [one.colour for one in cell.stations_of("cluster")]
     colours = [BLOCKS.get(one or "", UNNAMED[k]) for k, one in enumerate(named)]

@@ -54,9 +54,6 @@ class SingleEnv(gymnasium.Env[NDArray[Any], Any]):
     def step(self, action: Any) -> tuple[NDArray[Any], float, bool, bool, dict[str, Any]]:
         """Execute one control cycle, or one attempt of the sorting task.
 
-        Args:
-            action: See the action space.
-
         Raises:
             ResetNeeded: The episode has ended.
             SimulationError: The action is NaN or infinite.

@@ -23,12 +23,7 @@ RENDER_FPS = 4
 
 
 class SortingTask:
-    """Sorting tasks of a cell.
-
-    Args:
-        cell: Work cell.
-        batch: The tasks.
-    """
+    """Sorting tasks of a cell."""
 
     def __init__(self, cell: Cell, batch: SortingBatch) -> None:
         self._cell, self.batch = cell, batch

@@ -126,9 +126,6 @@ class BatchVectorEnv(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
     def step(self, actions: NDArray[Any]) -> Steps:
         """Execute one control cycle, or one attempt of the sorting task, in every environment.
 
-        Args:
-            actions: See the action space.
-
         Raises:
             ResetNeeded: ``reset`` was never called, or, with ``Disabled``, not after an end.
             SimulationError: An action is NaN or infinite.

@@ -106,10 +106,6 @@ def forward(bvh: Bvh, wanted: Sequence[int]) -> Vec:
     """Return the positions of some joints [the file's unit], shape (n, len(wanted), 3).
 
     Position channels replace the offset of a joint, as in most readers.
-
-    Args:
-        bvh: Content of the file.
-        wanted: Indices of the joints.
     """
     needed = _with_ancestors(bvh, wanted)
     parts = range(0, len(bvh.values), CHUNK_FRAMES)

@@ -59,10 +59,6 @@ Centres = Mapping[str, Vec]
 def body_track(bvh: Bvh, options: ReadOptions = NOTHING_STATED) -> tuple[BodyTrack, Reading]:
     """Return a file's joint centres [m], z up, and its interpretation.
 
-    Args:
-        bvh: Content of the file.
-        options: Stated properties of the file.
-
     Raises:
         BadRecording: The file does not show an upright person in a known unit and in degrees,
             or it has two interpretations; the fault names both.

@@ -92,9 +92,6 @@ class TextTable:
     def values(self, columns: Mapping[str, int]) -> dict[str, Vec]:
         """Return the values of at least two columns, each of shape (n,); missing ones are NaN.
 
-        Args:
-            columns: Indices by our name.
-
         Raises:
             BadRecording: A row has a wrong number of cells, or a cell is not a number.
         """
@@ -262,12 +259,7 @@ def no_such_name(theirs: str, there: Sequence[str], what: str) -> BadRecording:
 
 
 def number(cell: str, decimal: str = ".") -> float:
-    """Return the number in a cell; NaN if it is missing, infinity for text.
-
-    Args:
-        cell: Text of the cell.
-        decimal: Decimal sign of the table.
-    """
+    """Return the number in a cell; NaN if it is missing, infinity for text."""
     word = cell.strip().replace("\u2212", "-")
     if word.lower() in MISSING:
         return np.nan

@@ -47,14 +47,7 @@ ARM_HIGH = np.array([1.3, 0.8, 0.6, 1.8])
 
 
 def off_task_motions(cell: Cell, size: BodySize, seed: int, n: int) -> tuple[Motion, ...]:
-    """Return random off-task motions near the place of a cell's worker.
-
-    Args:
-        cell: Work cell with a worker.
-        size: Body size.
-        seed: Seed of all motions.
-        n: Number of motions.
-    """
+    """Return random off-task motions near the place of a cell's worker."""
     return tuple(
         _motion(cell, size, np.random.default_rng([seed, number]), number)
         for number in range(n)

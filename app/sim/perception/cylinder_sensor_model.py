@@ -70,14 +70,7 @@ class CylinderSensorSettings:
 
 
 class CylinderSensorModel:
-    """Cameras and filters of ``n`` environments with ``n_people`` pedestrians each.
-
-    Args:
-        settings: Rate, latency and noise.
-        n: Number of environments.
-        n_people: Pedestrians in each.
-        seed: Seed of phases and noise.
-    """
+    """Cameras and filters of ``n`` environments with ``n_people`` pedestrians each."""
 
     def __init__(
         self, settings: CylinderSensorSettings, n: int, n_people: int, seed: int

@@ -48,12 +48,7 @@ class FilterSettings:
 
 
 class PointFilter:
-    """Filters of ``n`` points.
-
-    Args:
-        n: Number of points.
-        settings: Noise and times.
-    """
+    """Filters of ``n`` points."""
 
     def __init__(self, n: int, settings: FilterSettings) -> None:
         self.settings = settings

@@ -207,10 +207,6 @@ def checked_people(people: Sequence[Person]) -> tuple[Person, ...]:
 def checked_person(person: Person, path: str) -> Person:
     """Return a validated person.
 
-    Args:
-        person: Person.
-        path: Name of the field in errors.
-
     Raises:
         InvalidInput: A value out of range.
     """

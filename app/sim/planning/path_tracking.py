@@ -28,12 +28,7 @@ ON_PLAN = 1e-7
 
 
 class PathFollower:
-    """The follower of one timed path.
-
-    Args:
-        timed: The path.
-        limits: TimingLimits of the robot.
-    """
+    """The follower of one timed path."""
 
     def __init__(self, timed: TimedPath, limits: TimingLimits) -> None:
         self.timed, self._limits = timed, limits

@@ -159,10 +159,6 @@ def primitive_for(cell: Cell, segment: TaskSegment) -> TaskPrimitive:
 
     Among the primitives of the same kind and hand, the one whose places are nearest relative to
     the worker's stance is chosen; its pelvis is moved to the stance in this cell.
-
-    Args:
-        cell: Work cell with a worker.
-        segment: One of the segments of its task.
     """
 
     def apart(one: TaskPrimitive) -> float:

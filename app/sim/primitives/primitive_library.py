@@ -214,11 +214,6 @@ def draw_samples(found: TaskPrimitive, n: int, rng: np.random.Generator) -> Vec:
 
     Draws beyond the limits are rejected; ``sampling.sample`` supplies those missing after
     ROUNDS.
-
-    Args:
-        found: Primitive.
-        n: Number of draws.
-        rng: Source of randomness.
     """
     phi = promp.basis(GRID, promp.N_BASIS, promp.usual_width(promp.N_BASIS))
     kept: list[Vec] = []

@@ -129,12 +129,7 @@ class ReachSettings:
 
 
 def stated_rules(cell: Cell, settings: ReachSettings) -> dict[str, Any]:
-    """Return the rules that affect results, to be reported with every number.
-
-    Args:
-        cell: Work cell.
-        settings: Settings of the scenario.
-    """
+    """Return the rules that affect results, to be reported with every number."""
     chosen = _cell_of(cell, settings)
     stated: dict[str, Any] = {
         "cell": cell.name,

@@ -86,13 +86,6 @@ class BlockedReachBatch(ReachBatch):
 
 
 def new_reach_batch(cell: Cell, n_envs: int, seed: int, settings: ReachSettings) -> ReachBatch:
-    """Return reach environments; contacts block the arm where the settings say so.
-
-    Args:
-        cell: Work cell with a goal region.
-        n_envs: Number of environments.
-        seed: Seed of the episodes.
-        settings: Settings of the scenario.
-    """
+    """Return reach environments; contacts block the arm where the settings say so."""
     kind = ReachBatch if settings.blocked is None else BlockedReachBatch
     return kind(cell, n_envs, seed, settings)

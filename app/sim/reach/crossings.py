@@ -132,11 +132,6 @@ def covered(track: Vec, start: Vec, goal: Vec) -> NDArray[np.bool_]:
 def crossings(cell: Cell, n: int = N_CROSSINGS, seed: int = SEED) -> CrossingSet:
     """Return the first ``n`` crossings of a seed.
 
-    Args:
-        cell: Work cell with a goal region.
-        n: Number of crossings.
-        seed: Seed.
-
     Raises:
         InvalidInput: ``n`` is 0, or the cell has no goal region or no space for a person.
     """

@@ -71,10 +71,6 @@ def same_workspace(one: Cell, other: Cell) -> bool:
 def require_workspace(cell: Cell, trained: Cell) -> None:
     """Raise unless a policy of another cell may act in a sorting cell.
 
-    Args:
-        cell: Work cell in which the policy acts.
-        trained: The cell it was trained in.
-
     Raises:
         CheckpointMismatch: The cells differ in more than their stations.
     """

@@ -12,13 +12,7 @@ from web.viewer.people.person_view import PersonView
 
 
 class PeopleView:
-    """Draws everyone, each with handles; used by the live cell's thread only.
-
-    Args:
-        server: Where to draw.
-        cell: Work cell.
-        submit: Takes the command of a drag.
-    """
+    """Draws everyone, each with handles; used by the live cell's thread only."""
 
     def __init__(
         self, server: viser.ViserServer, cell: Cell, submit: Callable[[MovePerson], object]

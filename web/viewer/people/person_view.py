@@ -24,13 +24,7 @@ SAME_M = 1e-4
 
 
 class PersonView:
-    """Draws one person; used by the live cell's thread only.
-
-    Args:
-        server: Where to draw.
-        cell: Where the floor is.
-        person: Id of the person.
-    """
+    """Draws one person; used by the live cell's thread only."""
 
     def __init__(self, server: viser.ViserServer, cell: Cell, person: PersonSnapshot) -> None:
         self._scene, self._cell, self._id = server.scene, cell, person.id

@@ -18,12 +18,7 @@ OPEN, CLOSED = 0.044, 0.036
 
 
 class RobotView:
-    """Draws one UR10; used by the live cell's thread only.
-
-    Args:
-        server: Where to draw.
-        cell: Says which tool it carries.
-    """
+    """Draws one UR10; used by the live cell's thread only."""
 
     def __init__(self, server: viser.ViserServer, cell: Cell) -> None:
         tool = cell.robot

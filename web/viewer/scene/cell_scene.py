@@ -27,13 +27,7 @@ PATH_LIFT = 0.12
 
 
 class CellScene:
-    """One cell in one viewer.
-
-    Args:
-        server: The viewer.
-        cell: Work cell.
-        submit: Takes commands of clicks and drags.
-    """
+    """One cell in one viewer."""
 
     def __init__(
         self, server: viser.ViserServer, cell: Cell, submit: Callable[[Command], object]

@@ -23,13 +23,7 @@ REACHED: Rgb = (38, 166, 104)
 
 
 class GoalGizmo:
-    """The goal and its handle; poses are written by the live cell's thread only.
-
-    Args:
-        server: Where to draw.
-        cell: Reach cell.
-        submit: Takes the command of a drag.
-    """
+    """The goal and its handle; poses are written by the live cell's thread only."""
 
     def __init__(
         self, server: viser.ViserServer, cell: Cell, submit: Callable[[MoveGoal], object]

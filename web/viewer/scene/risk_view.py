@@ -29,11 +29,7 @@ def colours_of(probability: NDArray[np.float64]) -> NDArray[np.uint8]:
 
 
 class RiskView:
-    """Draws the map over table and floor; used by the live cell's thread only.
-
-    Args:
-        server: Where to draw.
-    """
+    """Draws the map over table and floor; used by the live cell's thread only."""
 
     def __init__(self, server: viser.ViserServer) -> None:
         (x0, x1), (y0, y1) = GRID.x[[0, -1]].tolist(), GRID.y[[0, -1]].tolist()

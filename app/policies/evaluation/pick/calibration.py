@@ -76,13 +76,6 @@ def run_calibration(
 ) -> dict[str, Any]:
     """Compare predicted probabilities with rates, for each kind of people by itself.
 
-    Args:
-        checkpoint: Policy with outcome probabilities.
-        episodes: Number of episodes of each row, by default 2000.
-        seed: Seed of the episodes.
-        motions: Runs of recorded motion, for a row beside recorded people.
-        on_row: Callback for each finished row.
-
     Raises:
         InvalidInput: The checkpoint predicts no outcomes, or there is too much recorded motion.
     """

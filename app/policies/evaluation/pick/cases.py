@@ -69,14 +69,7 @@ class _Recorder:
 def run_cases(
     checkpoint: Checkpoint, *, episodes: int | None, seed: int, on_row: OnRow = ignore_row
 ) -> dict[str, Any]:
-    """Evaluate the four case studies from jittered starts.
-
-    Args:
-        checkpoint: Checkpoint of the policy and its critic.
-        episodes: Number of starts of each case, by default 200.
-        seed: Seed of the starts.
-        on_row: Callback for each finished row.
-    """
+    """Evaluate the four case studies from jittered starts."""
     cell, networks = cell_of(checkpoint.manifest), ValueNetworks(checkpoint)
     n, rows, curves = episodes or DEFAULT_EPISODES, [], {}
     cases = cases_of(cell)

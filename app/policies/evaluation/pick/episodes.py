@@ -170,16 +170,7 @@ def settings_for(n_candidates: tuple[int, int], preset: PickPreset) -> PickSetti
 
 
 class Evaluator:
-    """Episodes of one seed, run once per selection rule.
-
-    Args:
-        networks: Actor and critics.
-        cell: Work cell.
-        n_episodes: Number of episodes.
-        seed: Seed of the episodes.
-        settings: Start and end conditions.
-        new_batch: Makes the environments.
-    """
+    """Episodes of one seed, run once per selection rule."""
 
     def __init__(
         self,

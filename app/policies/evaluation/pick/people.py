@@ -104,14 +104,7 @@ def _sized(work: HumanMotionConfig, percentile: float, pelvis: float) -> HumanMo
 def run_people(
     checkpoint: Checkpoint, *, episodes: int | None, seed: int, on_row: OnRow = ignore_row
 ) -> dict[str, Any]:
-    """Evaluate beside 0 to 4 people and people of several sizes.
-
-    Args:
-        checkpoint: Policy and critic.
-        episodes: Number of episodes of each row, by default 1000.
-        seed: Seed of the episodes.
-        on_row: Callback for each finished row.
-    """
+    """Evaluate beside 0 to 4 people and people of several sizes."""
     bench = ChoiceBench(checkpoint, episodes, seed, on_row)
     usual, pelvis = bench.usual, bench.cell.human.pelvis_height
     small, large = (_sized(usual.work, share, pelvis) for share in (SMALL, LARGE))
@@ -137,12 +130,6 @@ def run_rest(
 
     A timeout is *blocked* where the configuration at the object is closer to the person than a
     grasp permits, and *alone* where nobody is within ALONE_M of the robot.
-
-    Args:
-        checkpoint: Policy and critic.
-        episodes: Number of episodes of each row, by default 1000.
-        seed: Seed of the episodes.
-        on_row: Callback for each finished row.
     """
     usual = settings_for((1, 1), pick_preset_of(checkpoint))
     networks, cell = ValueNetworks(checkpoint), cell_of(checkpoint.manifest)
@@ -188,14 +175,7 @@ def _timeouts(batch: PickBatch, run: Episodes) -> dict[str, dict[str, float]]:
 def run_yielding(
     checkpoint: Checkpoint, *, episodes: int | None, seed: int, on_row: OnRow = ignore_row
 ) -> dict[str, Any]:
-    """Evaluate beside people that yield to the arm with strength 0, 0.5 and 1.
-
-    Args:
-        checkpoint: Policy and critic.
-        episodes: Number of episodes of each row, by default 1000.
-        seed: Seed of the episodes.
-        on_row: Callback for each finished row.
-    """
+    """Evaluate beside people that yield to the arm with strength 0, 0.5 and 1."""
     bench = ChoiceBench(checkpoint, episodes, seed, on_row)
     usual = bench.usual
 
@@ -232,13 +212,6 @@ def run_mocap(
     on_row: OnRow = ignore_row,
 ) -> dict[str, Any]:
     """Evaluate beside recorded people, with the library's people as the first row.
-
-    Args:
-        checkpoint: Policy and critic.
-        episodes: Number of episodes of each row, by default 1000.
-        seed: Seed of the episodes.
-        motions: Recordings without artefacts; those of one name form one row.
-        on_row: Callback for each finished row.
 
     Raises:
         InvalidInput: There is no recorded motion, or more than ``MAX_RECORDED_S``.

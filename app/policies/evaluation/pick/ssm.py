@@ -79,13 +79,7 @@ CONDITIONS: Mapping[str, Condition] = {
 
 
 class MonitoredPicks:
-    """Episodes of a policy under the safety layer.
-
-    Args:
-        checkpoint: Policy and critics.
-        n_episodes: Number of episodes.
-        seed: Seed of the episodes.
-    """
+    """Episodes of a policy under the safety layer."""
 
     def __init__(self, checkpoint: Checkpoint, n_episodes: int, seed: int) -> None:
         self._networks, self._cell = ValueNetworks(checkpoint), cell_of(checkpoint.manifest)
@@ -158,14 +152,7 @@ def row_of(name: str, runs: MonitoredEpisodes, bare: MonitoredEpisodes | None) -
 def run_ssm(
     checkpoint: Checkpoint, *, episodes: int | None, seed: int, on_row: OnRow = ignore_row
 ) -> Json:
-    """Evaluate picks under the safety layer, and the same episodes without it.
-
-    Args:
-        checkpoint: Policy and critics.
-        episodes: Number of episodes of each row, by default 20,000.
-        seed: Seed of the episodes; use one that was not used for tuning.
-        on_row: Callback for each finished row.
-    """
+    """Evaluate picks under the safety layer, and the same episodes without it."""
     picks = MonitoredPicks(checkpoint, episodes or DEFAULT_EPISODES, seed)
     runs: dict[str, MonitoredEpisodes] = {}
     rows: list[Json] = []

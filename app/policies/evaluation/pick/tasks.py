@@ -86,14 +86,7 @@ def settings_of(evaluator: Evaluator) -> dict[str, object]:
 def run_single(
     checkpoint: Checkpoint, *, episodes: int | None, seed: int, on_row: OnRow = ignore_row
 ) -> dict[str, object]:
-    """Evaluate one random target per episode.
-
-    Args:
-        checkpoint: Policy.
-        episodes: Number of episodes, by default 1000.
-        seed: Seed of the episodes; use one that was not used for tuning.
-        on_row: Callback for the finished row.
-    """
+    """Evaluate one random target per episode."""
     evaluators, rows = evaluators_of(checkpoint, (1, 1), episodes, seed), []
     trajectories: tuple[Trajectory, ...] = ()
     for name, evaluator in evaluators.items():
@@ -160,14 +153,7 @@ class ChoiceRun:
 def run_choice(
     checkpoint: Checkpoint, *, episodes: int | None, seed: int, on_row: OnRow = ignore_row
 ) -> dict[str, object]:
-    """Evaluate the selection among 2-3 random targets, with other rules on the same episodes.
-
-    Args:
-        checkpoint: Checkpoint of the policy and its critic.
-        episodes: Number of episodes, by default 1000.
-        seed: Seed of the episodes; use one that was not used for tuning.
-        on_row: Called with each finished row.
-    """
+    """Evaluate the selection among 2-3 random targets, and other rules on the same episodes."""
     evaluators, rows = evaluators_of(checkpoint, (2, 3), episodes, seed), []
     runs = {name: ChoiceRun(one, seed, name) for name, one in evaluators.items()}
     for name, run in runs.items():
@@ -187,14 +173,7 @@ def run_choice(
 def run_choice_hard(
     checkpoint: Checkpoint, *, episodes: int | None, seed: int, on_row: OnRow = ignore_row
 ) -> dict[str, object]:
-    """Evaluate the selection beside two people, faster people, and two faster people.
-
-    Args:
-        checkpoint: Checkpoint of the policy and its critic.
-        episodes: Number of episodes of each setting, by default 1000.
-        seed: Seed of the episodes; use one that was not used for tuning.
-        on_row: Called with each finished row.
-    """
+    """Evaluate the selection beside two people, faster people, and two faster people."""
     usual = settings_for((2, 3), pick_preset_of(checkpoint))
     fast = replace(usual, work=replace(usual.work, pace=FASTER))
     settings = {

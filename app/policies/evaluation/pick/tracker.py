@@ -93,12 +93,7 @@ def between(
 
 
 class KeypointObserver:
-    """Observe the first worker of each environment by tracker and estimator, for one run.
-
-    Args:
-        row: Observation model.
-        seed: Seed of the disturbances.
-    """
+    """Observe the first worker of each environment by tracker and estimator, for one run."""
 
     def __init__(self, row: KeypointSensorRow, seed: int) -> None:
         self._row, self._seed = row, seed
@@ -166,14 +161,7 @@ class KeypointObserver:
 def run_tracker(
     checkpoint: Checkpoint, *, episodes: int | None, seed: int, on_row: OnRow = ignore_row
 ) -> dict[str, object]:
-    """Evaluate task selection among 2-3 random targets with people observed by a tracker.
-
-    Args:
-        checkpoint: Policy and critic.
-        episodes: Number of episodes per row, by default 300.
-        seed: Seed of the episodes and of the disturbances.
-        on_row: Callback for each finished row.
-    """
+    """Evaluate task selection among 2-3 random targets with people observed by a tracker."""
     evaluator = evaluators_of(checkpoint, (2, 3), episodes or DEFAULT_EPISODES, seed)[""]
     rule, results = choice_rules.critic(HYSTERESIS), []
     looks: dict[str, Seen] = {"exact": seen_exactly}

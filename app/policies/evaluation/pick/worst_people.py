@@ -109,14 +109,7 @@ def stored_motions() -> tuple[HandMotion, ...]:
 def run_worst(
     checkpoint: Checkpoint, *, episodes: int | None, seed: int, on_row: OnRow = ignore_row
 ) -> dict[str, Any]:
-    """Evaluate beside the people who were found, together and one by one.
-
-    Args:
-        checkpoint: Policy and critic.
-        episodes: Number of episodes of each row, by default 1000.
-        seed: Seed of the episodes.
-        on_row: Callback for each finished row.
-    """
+    """Evaluate beside the people who were found, together and one by one."""
     bench, found = ChoiceBench(checkpoint, episodes, seed, on_row), stored_motions()
     rows = {"library": bench.usual, "found": beside(bench.usual, bench.cell, found)}
     for number, one in enumerate(found, start=1):

@@ -152,12 +152,7 @@ class ReachBench:
         return self.run(self.variant("clearance", goals, mode))
 
     def measure(self, variants: Sequence[Variant], more: Measure = no_measures) -> None:
-        """Run variants and add the row of each.
-
-        Args:
-            variants: All rows of the result.
-            more: Further measures of each row.
-        """
+        """Run variants and add the row of each."""
         for variant in variants:
             episodes = self.run(variant)
             row = {**episodes.row(variant.name), **more(variant, episodes)}
@@ -171,13 +166,7 @@ class ReachBench:
         )
 
     def add(self, row: Json, variant: Variant, n_rows: int = 1) -> None:
-        """Add a row and its rules.
-
-        Args:
-            row: Measures, with the name.
-            variant: Rules.
-            n_rows: Number of rows of the result.
-        """
+        """Add a row and its rules."""
         self._stated[row["name"]] = {
             **stated_rules(variant.cell or self.cell, variant.settings),
             "goals": variant.goal_set,
@@ -188,11 +177,7 @@ class ReachBench:
         self._on_row(len(self._rows), n_rows, row)
 
     def result(self, **more: Any) -> Json:
-        """Return the result.
-
-        Args:
-            more: Further settings to state.
-        """
+        """Return the result."""
         found = {} if self._recheck is None else {"fcl_recheck": self._recheck}
         return {
             "policy": self.actor.title,

@@ -159,14 +159,7 @@ def verdict(search: OracleSearch, never: Any, targets: Vec, goals: Vec) -> Json:
 def run_oracle(
     checkpoint: Checkpoint, *, episodes: int | None, seed: int, on_row: OnRow = ignore_row
 ) -> Json:
-    """Search for solutions of the episodes of ``reach-targets``.
-
-    Args:
-        checkpoint: Policy of the first resimulations.
-        episodes: Number of episodes of each target, by default 100.
-        seed: Seed of the episodes.
-        on_row: Callback for each finished stage.
-    """
+    """Search for solutions of the episodes of ``reach-targets``."""
     bench = ReachBench(checkpoint, seed)
     goals = bench.target_goals((episodes or PER_TARGET) * len(bench.targets))
     cell, settings = bench.cell, bench.usual

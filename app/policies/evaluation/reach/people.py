@@ -44,14 +44,7 @@ SPEEDS = (0.25, 0.5, 1.0)
 def run_people(
     checkpoint: Checkpoint, *, episodes: int | None, seed: int, on_row: OnRow = ignore_row
 ) -> dict[str, Any]:
-    """Evaluate beside zero to four pedestrians.
-
-    Args:
-        checkpoint: Policy.
-        episodes: Number of episodes of each row, by default 1000.
-        seed: Seed of the episodes.
-        on_row: Callback for each finished row.
-    """
+    """Evaluate beside zero to four pedestrians."""
     bench = ReachBench(checkpoint, seed, on_row)
     goals = bench.target_goals(episodes or DEFAULT_EPISODES)
     allowed = inference_modes_of(bench.actor)
@@ -76,14 +69,7 @@ def run_people(
 def run_constant(
     checkpoint: Checkpoint, *, episodes: int | None, seed: int, on_row: OnRow = ignore_row
 ) -> dict[str, Any]:
-    """Evaluate beside people whose speed and radius are constant in each episode.
-
-    Args:
-        checkpoint: Policy.
-        episodes: Number of episodes of each row, by default 5400.
-        seed: Seed of the episodes.
-        on_row: Callback for each finished row.
-    """
+    """Evaluate beside people whose speed and radius are constant in each episode."""
     bench = ReachBench(checkpoint, seed, on_row)
     goals = bench.target_goals(episodes or TARGET_EPISODES)
     bench.measure(
@@ -98,14 +84,7 @@ def run_constant(
 def run_speeds(
     checkpoint: Checkpoint, *, episodes: int | None, seed: int, on_row: OnRow = ignore_row
 ) -> dict[str, Any]:
-    """Evaluate beside people of a given speed.
-
-    Args:
-        checkpoint: Policy.
-        episodes: Number of episodes of each row, by default 1000.
-        seed: Seed of the episodes.
-        on_row: Callback for each finished row.
-    """
+    """Evaluate beside people of a given speed."""
     bench = ReachBench(checkpoint, seed, on_row)
     goals = bench.target_goals(episodes or DEFAULT_EPISODES)
     bench.measure(

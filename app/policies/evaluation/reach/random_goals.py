@@ -53,14 +53,7 @@ def between(episodes: ReachEpisodes, targets: Vec) -> list[dict[str, Any]]:
 def run_random(
     checkpoint: Checkpoint, *, episodes: int | None, seed: int, on_row: OnRow = ignore_row
 ) -> dict[str, Any]:
-    """Evaluate on random goals in the box.
-
-    Args:
-        checkpoint: Policy.
-        episodes: Number of episodes of each row, by default 5000.
-        seed: Seed of goals and people; use one that was not used for tuning.
-        on_row: Callback for each finished row.
-    """
+    """Evaluate on random goals in the box."""
     bench, n = ReachBench(checkpoint, seed, on_row), episodes or DEFAULT_EPISODES
     usual, grid, goals = bench.usual, bench.target_goals(n), bench.random_goals(n)
     at_targets: dict[str, ReachEpisodes] = {}

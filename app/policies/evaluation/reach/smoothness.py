@@ -182,14 +182,7 @@ def shown_episode(paths: Paths, dt: float) -> dict[str, Any] | None:
 def run_smoothness(
     checkpoint: Checkpoint, *, episodes: int | None, seed: int, on_row: OnRow = ignore_row
 ) -> dict[str, Any]:
-    """Measure the smoothness of a policy's joint trajectories.
-
-    Args:
-        checkpoint: Policy with trajectory segments of degree 2 or 3.
-        episodes: Number of episodes, by default 1000.
-        seed: Seed of the episodes.
-        on_row: Callback for the finished row.
-    """
+    """Measure the smoothness of a policy's joint trajectories."""
     bench = ReachBench(checkpoint, seed, on_row)
     settings, n = bench.usual, episodes or DEFAULT_EPISODES
     batch, goals = ReachBatch(bench.cell, n, seed, settings), bench.target_goals(n)

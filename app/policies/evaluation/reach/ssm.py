@@ -143,15 +143,7 @@ def compare(
 def random_episodes(
     cell: Cell, batch: MonitoredReachBatch, acts: Acts, n: int, seed: int
 ) -> MonitoredEpisodes:
-    """Run ``n`` episodes of ``reach-random`` under the safety layer.
-
-    Args:
-        cell: Work cell.
-        batch: N_ENVS environments.
-        acts: Returns the actions of the batch.
-        n: Number of episodes.
-        seed: Seed of the goals.
-    """
+    """Run ``n`` episodes of ``reach-random`` under the safety layer."""
     goals, found = random_goals(*goal_box(cell), n, seed), []
     for number, first in enumerate(range(0, n, N_ENVS)):
         some = goals[first : first + N_ENVS]

@@ -126,12 +126,7 @@ class Comparison:
         self._configurations: list[Vec] | None = None
 
     def batch(self, *, no_person: bool = False, monitored: bool = True) -> MonitoredReachBatch:
-        """Return a batch at the start of all crossings.
-
-        Args:
-            no_person: Whether the person stands aside.
-            monitored: Whether the safety layer acts.
-        """
+        """Return a batch at the start of all crossings."""
         aside = np.tile(np.array(ASIDE), (len(self.crossed.goals), 2, 1))
         tracks = aside if no_person else self.crossed.tracks
         monitoring = MonitoringSettings(active=monitored, rest_ends=False)
@@ -184,11 +179,7 @@ class Comparison:
     def run(
         self, controllers: Mapping[str, Controller]
     ) -> dict[str, Callable[[], CrossingRuns]]:
-        """Return the runs of policies and planners by row, each started when called.
-
-        Args:
-            controllers: Policies by row.
-        """
+        """Return the runs of policies and planners by row, each started when called."""
         runs: dict[str, Callable[[], CrossingRuns]] = {
             name: partial(self.policy, controller) for name, controller in controllers.items()
         }

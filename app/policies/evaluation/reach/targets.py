@@ -91,14 +91,7 @@ def reached_after_contact(episodes: ReachEpisodes) -> dict[str, float]:
 def run_targets(
     checkpoint: Checkpoint, *, episodes: int | None, seed: int, on_row: OnRow = ignore_row
 ) -> Json:
-    """Evaluate on all targets of the grid under three start rules.
-
-    Args:
-        checkpoint: Policy.
-        episodes: Number of episodes of each target, by default 100.
-        seed: Seed of the episodes; use one that was not used for tuning.
-        on_row: Callback for each finished row.
-    """
+    """Evaluate on all targets of the grid under three start rules."""
     bench = ReachBench(checkpoint, seed, on_row)
     per_target = episodes or PER_TARGET
     goals = bench.target_goals(per_target * len(bench.targets))

@@ -68,13 +68,7 @@ ROLLOUT_ROWS = ("30hz", "100ms-noise")
 
 
 class CylinderObserver:
-    """Controller whose policy observes people through a tracker, for one run.
-
-    Args:
-        controller: Controller of the robots.
-        row: Observation model.
-        seed: Seed of the disturbances.
-    """
+    """Controller whose policy observes people through a tracker, for one run."""
 
     def __init__(self, controller: Controller, row: CylinderSensorRow, seed: int) -> None:
         self._controller, self._row, self._seed = controller, row, seed
@@ -149,12 +143,6 @@ def run_tracker(
     checkpoint: Checkpoint, *, episodes: int | None, seed: int, on_row: OnRow = ignore_row
 ) -> dict[str, Any]:
     """Evaluate on all targets with people observed through a tracker.
-
-    Args:
-        checkpoint: Policy.
-        episodes: Number of episodes of each row, by default 5400.
-        seed: Seed of the episodes and of the disturbances.
-        on_row: Callback for each finished row.
 
     Raises:
         InvalidInput: The checkpoint's cell has no pedestrian.

@@ -90,14 +90,7 @@ def _per_hour(values: Vec) -> dict[str, Any]:
 def run_cycle_time(
     checkpoint: Checkpoint, *, episodes: int | None, seed: int, on_row: OnRow = ignore_row
 ) -> dict[str, Any]:
-    """Evaluate the throughput of a sorting cell.
-
-    Args:
-        checkpoint: Pick policy and its critic.
-        episodes: Number of tasks, by default 300.
-        seed: Seed of tasks, grasps and people.
-        on_row: Callback for each finished row.
-    """
+    """Evaluate the throughput of a sorting cell."""
     networks, cell, settings = parts_of(checkpoint)
     n = episodes or DEFAULT_TASKS
     runs: dict[str, FullTasks] = {}

@@ -59,12 +59,7 @@ def least_success(shape: SortingShape) -> float:
 
 
 def run_kind(batches: Iterable[SortingBatch], choose: Chooser) -> tuple[SortingEpisodes, ...]:
-    """Return the episodes of batches for each of DECIDERS.
-
-    Args:
-        batches: Batches at their starts.
-        choose: Policy.
-    """
+    """Return the episodes of batches for each of DECIDERS."""
     found = []
     for batch in batches:
 

@@ -105,16 +105,7 @@ def _of(sight: Sight, rows: Index) -> People:
 
 
 class SortingBesidePeople:
-    """Full tasks of one seed, run once per order rule.
-
-    Args:
-        networks: Actor and critics.
-        cell: Sorting cell.
-        settings: Settings of the picks.
-        n_tasks: Number of tasks.
-        seed: Seed of tasks, grasps and people.
-        condition: Safety layer and motion.
-    """
+    """Full tasks of one seed, run once per order rule."""
 
     def __init__(
         self,
@@ -338,14 +329,7 @@ def stated(batch: PickBatch) -> dict[str, Any]:
 def run_sorting_people(
     checkpoint: Checkpoint, *, episodes: int | None, seed: int, on_row: OnRow = ignore_row
 ) -> dict[str, Any]:
-    """Evaluate full sorting tasks beside a working person under every order rule.
-
-    Args:
-        checkpoint: Pick policy and its critic.
-        episodes: Number of tasks, by default 300.
-        seed: Seed of tasks, grasps and people.
-        on_row: Callback for each finished row.
-    """
+    """Evaluate full sorting tasks beside a working person under every order rule."""
     networks, cell, settings = parts_of(checkpoint)
     n = episodes or DEFAULT_TASKS
     runs: dict[str, FullTasks] = {}

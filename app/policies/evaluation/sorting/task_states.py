@@ -95,12 +95,7 @@ class TaskStates:
         return found
 
     def advance(self, e: int, target: int) -> bool:
-        """Grasp or set down the object of a task; return whether the goal is reached.
-
-        Args:
-            e: Task.
-            target: Index into its targets.
-        """
+        """Grasp or set down the object of a task; return whether the goal is reached."""
         move = self._moves(e)[target]
         if self.held[e] != NOTHING:
             self._states[e] = apply(self._states[e], self.shape, move)
