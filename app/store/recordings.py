@@ -5,6 +5,7 @@ is removed, so that results keep the meaning of the names they cite.
 """
 
 import logging
+from dataclasses import asdict
 from datetime import UTC, datetime
 from typing import Any
 
@@ -48,19 +49,11 @@ def put_recording(store: Store, new: NewRecording) -> bool:
             return False
         summary, detail = dict(new.summary), dict(new.detail)
         values = {
-            "name": new.name,
-            "sha256": new.sha256,
-            "file_name": new.file_name,
-            "n_runs": new.n_runs,
-            "n_frames": new.n_frames,
-            "duration": new.duration,
-            "summary": summary,
-            "detail": detail,
+            **asdict(new),
             "size": len(new.tensors),
             "created_at": datetime.now(UTC),
             "summary_digest": digest({"summary": summary}),
             "digest": digest({"summary": summary, "detail": detail}, new.tensors),
-            "tensors": new.tensors,
         }
         connection.execute(sa.insert(recordings).values(values))
     return True

@@ -40,7 +40,7 @@ class NewJob:
     kind: str
     """``"train"`` or ``"evaluate"``."""
     spec: Mapping[str, Any]
-    """The posted body."""
+    """The posted body, without name, notes and priority."""
     preset: str | None = None
     """Name of the preset, for jobs that have one."""
     seed: int = 0
@@ -56,43 +56,27 @@ class NewJob:
     priority: int = 0
     """Queued jobs of a higher priority start first."""
     parent: str | None = None
-    """Id of the job that this one repeats or changes."""
+    """Id of the job that this one repeats or changes; it may be deleted."""
     step_budget: int | None = None
     """Steps after which the job ends and keeps its state."""
     time_budget_s: float | None = None
     """Run time after which the job ends and keeps its state [s]."""
     part_of: str | None = None
-    """Id of the sweep that it is part of."""
+    """Id of the sweep that it is part of; None after its deletion, too."""
     trial: int | None = None
     """Number of its trial in the sweep, from 1."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class JobRecord:
-    """A job."""
+class JobRecord(NewJob):
+    """A job: what was submitted, and its state."""
 
+    overrides: Mapping[str, Any]
+    """Changes to the preset's fields."""
     id: str
     """UUID as text."""
     number: int
     """Running number, in the order of submission."""
-    kind: str
-    """``"train"`` or ``"evaluate"``."""
-    preset: str | None
-    """Name of the preset."""
-    seed: int
-    """Seed of every random stream."""
-    overrides: Mapping[str, Any]
-    """Changes to the preset's fields."""
-    spec: Mapping[str, Any]
-    """The posted body, without name, notes and priority."""
-    name: str | None
-    """A name for people."""
-    notes: str | None
-    """Text for people."""
-    parent: str | None
-    """Id of the job that this one repeats or changes; it may be deleted."""
-    priority: int
-    """Queued jobs of a higher priority start first."""
     state: JobState
     """Its state."""
     attempt: int
@@ -111,8 +95,6 @@ class JobRecord:
     """Cause of the failure, as text."""
     step: int
     """Steps done."""
-    total_steps: int | None
-    """Steps to do, where known."""
     cancel_requested: bool
     """Whether a cancel was requested."""
     idempotency_key: str | None
@@ -125,18 +107,10 @@ class JobRecord:
     """Number of attempts that were killed with their server."""
     waiting: str | None
     """Reason for which its worker cannot write, such as ``"disk full"``."""
-    step_budget: int | None
-    """Steps after which it ends and keeps its state."""
-    time_budget_s: float | None
-    """Run time after which it ends and keeps its state [s]."""
     run_s: float
     """Run time of all its attempts, at the last heartbeat [s]."""
     ended_by: Spent | None
     """The budget that ended it, or that the pruner of its sweep did; it can be resumed."""
-    part_of: str | None
-    """Id of the sweep that it is part of; None after its deletion, too."""
-    trial: int | None
-    """Number of its trial in the sweep, from 1."""
 
     @property
     def is_final(self) -> bool:
@@ -232,8 +206,8 @@ class CellRecord:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class NewRecording:
-    """A recording to store."""
+class RecordingSummary:
+    """What lists show of a recording."""
 
     name: str
     """Its name, unique."""
@@ -248,7 +222,13 @@ class NewRecording:
     duration: float
     """Duration of the file [s]."""
     summary: Mapping[str, Any]
-    """Measures and errors, shown in lists."""
+    """Measures and errors."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class NewRecording(RecordingSummary):
+    """A recording to store."""
+
     detail: Mapping[str, Any]
     """Each run and each artifact."""
     tensors: bytes
@@ -256,25 +236,11 @@ class NewRecording:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class StoredRecording:
+class StoredRecording(RecordingSummary):
     """A stored recording, without its runs."""
 
     number: int
     """Running number, in the order of storing; never used twice."""
-    name: str
-    """Its name, unique."""
-    sha256: str
-    """Digest of its file."""
-    file_name: str
-    """Name of its file."""
-    n_runs: int
-    """Number of clean runs."""
-    n_frames: int
-    """Number of frames of the file."""
-    duration: float
-    """Duration of the file [s]."""
-    summary: Mapping[str, Any]
-    """Measures and errors, shown in lists."""
     detail: Mapping[str, Any] | None = None
     """Each run and each artifact; None in lists."""
     size: int
