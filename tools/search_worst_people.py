@@ -99,9 +99,11 @@ def main() -> None:
     torch.set_num_threads(1)
     checkpoint = pretrained.load("pick")
     found = search(checkpoint, N_MOTIONS, N_GENERATIONS, N_KEPT)
-    motions = [asdict(motion) | {"success": round(rate, 3)} for motion, rate in found]
-    content = {"checkpoint": checkpoint.sha256, "seed": SEED, "motions": motions}
-    FILE.write_text(json.dumps(content, indent=1) + "\n")
+    lines = ",\n  ".join(
+        json.dumps(asdict(motion) | {"success": round(rate, 3)}) for motion, rate in found
+    )
+    head = f'{{"checkpoint": "{checkpoint.sha256}", "seed": {SEED}, "motions": ['
+    FILE.write_text(f"{head}\n  {lines}\n]}}\n")
     logger.info("wrote %s: success %s", FILE, [round(rate, 3) for _, rate in found])
 
 
