@@ -85,8 +85,7 @@ def test_token_does_not_show_in_the_settings_text() -> None:
 
 
 @pytest.mark.parametrize(
-    ("host", "expected"),
-    [("127.0.0.1", "http://127.0.0.1:8130"), ("::1", "http://[::1]:8130")],
+    ("host", "expected"), [("127.0.0.1", "http://127.0.0.1:8130"), ("::1", "http://[::1]:8130")]
 )
 def test_workers_find_the_server_by_host_and_port(host: str, expected: str) -> None:
     assert load_settings(host=host, port=8130).worker_address == expected

@@ -25,12 +25,7 @@ from app.sim.human.kernels import kinematics as body
 from app.sim.people.human_motion_config import HumanMotionConfig
 from app.sim.pick.batch import PickBatch, PickSettings
 from app.sim.prediction.kernels.networks import Floats, Network
-from app.sim.prediction.kernels.worker import (
-    N_JOINTS,
-    TIMES,
-    WorkerPredictor,
-    predict_worker,
-)
+from app.sim.prediction.kernels.worker import N_JOINTS, TIMES, WorkerPredictor, predict_worker
 from app.sim.prediction.weights import worker_predictor, write_worker_predictor
 
 logger = logging.getLogger(__name__)

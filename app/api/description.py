@@ -40,7 +40,7 @@ _ACCESS = (
 CREATED: dict[str, Any] = {
     "headers": {
         "Location": {"description": "path of the resource", "schema": {"type": "string"}}
-    },
+    }
 }
 """An answer with the path of its resource."""
 MISMATCH: dict[int | str, dict[str, Any]] = {

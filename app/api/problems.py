@@ -231,11 +231,7 @@ async def on_http_error(request: Request, error: Exception) -> ProblemResponse:
         headers["Allow"] = ", ".join(choices)
         data = member("method", request.method, "must be one of the choices", choices)
     return problem(
-        error.status_code,
-        detail,
-        instance=request.url.path,
-        data=data,
-        headers=headers,
+        error.status_code, detail, instance=request.url.path, data=data, headers=headers
     )
 
 

@@ -29,9 +29,9 @@ app.command()(train.train)
 app.command()(evaluate.evaluate)
 app.command()(report)
 app.command()(export.export)
-app.command(
-    context_settings={"allow_extra_args": True, "ignore_unknown_options": True},
-)(evaluate.bench)
+app.command(context_settings={"allow_extra_args": True, "ignore_unknown_options": True})(
+    evaluate.bench
+)
 app.add_typer(cells.app, name="cells")
 app.add_typer(recordings.app, name="recordings")
 

@@ -24,8 +24,7 @@ CHECKPOINT_HELP = "Alias, SHA-256 or .safetensors file; the protocol's own by de
 def evaluate(
     protocol: Annotated[str, typer.Argument(show_default=False)],
     files: Annotated[
-        list[Path] | None,
-        typer.Argument(help="Recorded motion, for pick-mocap and others."),
+        list[Path] | None, typer.Argument(help="Recorded motion, for pick-mocap and others.")
     ] = None,
     checkpoint: Annotated[str | None, typer.Option(help=CHECKPOINT_HELP)] = None,
     episodes: Annotated[
@@ -95,8 +94,7 @@ def find_checkpoint(reference: str, settings: "Settings") -> "Checkpoint":
 
 
 def bench(
-    context: typer.Context,
-    name: Annotated[str, typer.Argument(show_default=False)],
+    context: typer.Context, name: Annotated[str, typer.Argument(show_default=False)]
 ) -> None:
     """Run a benchmark of the checkout; further options go to it."""
     folder = ROOT / "tests" / "benchmarks"

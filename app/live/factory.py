@@ -43,9 +43,5 @@ def new_world(
 
 def lacks_for_live(cell: Cell) -> str | None:
     """Return what a live world of a cell still needs, as a sentence part; None if nothing."""
-    lacks = {
-        "pick": lacks_for_pick,
-        "reach": lacks_for_reaching,
-        "sorting": lacks_for_sorting,
-    }
+    lacks = {"pick": lacks_for_pick, "reach": lacks_for_reaching, "sorting": lacks_for_sorting}
     return lacks[scenario_of(cell)](cell)

@@ -171,11 +171,7 @@ def insert_checkpoint(
     if len(new.tensors) > MAX_TENSORS:
         rule = f"bytes exceed the limit of {MAX_TENSORS} bytes per checkpoint"
         raise InvalidInput("checkpoint.tensors", len(new.tensors), rule)
-    content = {
-        "manifest": dict(new.manifest),
-        "size": len(new.tensors),
-        "tensors": new.tensors,
-    }
+    content = {"manifest": dict(new.manifest), "size": len(new.tensors), "tensors": new.tensors}
     same = checkpoints.c.sha256 == new.sha256
     query = sa.select(checkpoints).where(same)
     there = connection.execute(query).first()

@@ -244,9 +244,7 @@ def test_joints_of_a_person_somewhat_beyond_the_model_are_answered(
     assert answer["people"][0]["flags"] == flags
 
 
-def test_full_turns_of_a_person_have_no_effect(
-    client: TestClient,
-) -> None:
+def test_full_turns_of_a_person_have_no_effect(client: TestClient) -> None:
     q = [*STANDING["q"]]
     q[2] += 10 * 3.141592653589793
     turned = asked(client, "/v1/task-selection", people=[{**STANDING, "q": q}])

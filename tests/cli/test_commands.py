@@ -143,10 +143,7 @@ def test_wrong_call_ends_with_status_2(
     ("name", "value"), [("TANDEM_PORT", "no"), ("TANDEM_PROT", "8000"), ("TANDEM_TOKEN", "x")]
 )
 def test_bad_setting_stops_the_start_with_status_2(
-    name: str,
-    value: str,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
+    name: str, value: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setenv(name, value)
     assert main(["serve"]) == 2

@@ -343,8 +343,7 @@ def test_idle_connections_are_closed_for_new_ones() -> None:
     with serving() as small, ExitStack() as stack:
         idle = [stack.enter_context(small.connect()) for _ in range(n_clients)]
         assert patient_http.get(
-            f"http://127.0.0.1:{small.port}/name",
-            headers={"Authorization": f"Bearer {TOKEN}"},
+            f"http://127.0.0.1:{small.port}/name", headers={"Authorization": f"Bearer {TOKEN}"}
         ).is_success
         assert status_of(rest_of(idle[0])) == 503
         idle[-1].sendall(NAME + LAST)

@@ -66,9 +66,7 @@ def test_file_of_another_kind_is_refused_before_it_is_imported(
         RecordingCatalog(store, never).add(CLIP, file_name)
 
 
-def test_same_file_again_is_not_new_and_is_not_imported_again(
-    store: Store,
-) -> None:
+def test_same_file_again_is_not_new_and_is_not_imported_again(store: Store) -> None:
     calls: list[str] = []
 
     def counted(

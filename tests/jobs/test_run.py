@@ -184,9 +184,7 @@ def test_evaluation_of_an_unknown_checkpoint_fails_by_name(store: Store) -> None
 
 @pytest.mark.usefixtures("supervisor")
 @SQLITE_ONLY
-def test_evaluation_beside_stored_recordings_tells_row_by_row(
-    store: Store,
-) -> None:
+def test_evaluation_beside_stored_recordings_tells_row_by_row(store: Store) -> None:
     recordings = RecordingCatalog(store)
     for name, seed in (("nods", 0), ("waves", 1)):
         recordings.add(csv_text(working(100, seed=seed)).encode(), "clip.csv", name)

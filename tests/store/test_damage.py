@@ -139,11 +139,7 @@ def claim_again(store: Store) -> Claim:
 
 @pytest.mark.parametrize(("column", "change"), every({"tensors": TENSORS, "manifest": JSON}))
 def test_training_goes_on_from_the_state_before_a_damaged_one(
-    store: Store,
-    claim: Claim,
-    caplog: pytest.LogCaptureFixture,
-    column: str,
-    change: Change,
+    store: Store, claim: Claim, caplog: pytest.LogCaptureFixture, column: str, change: Change
 ) -> None:
     train_on(store, claim, 10, 20, 30)
     harm(store, "resume_states", column, change, "step = 30")

@@ -105,23 +105,14 @@ async def create_recording(
     return RecordingPublic.from_domain(record)
 
 
-@router.delete(
-    "/{name}",
-    status_code=204,
-    summary="Remove a recording",
-    responses={507: {}},
-)
+@router.delete("/{name}", status_code=204, summary="Remove a recording", responses={507: {}})
 def delete_recording(name: str, services: ServicesDep) -> None:
     """Remove a recording."""
     services.recordings.remove(name)
 
 
 async def _import(
-    request: Request,
-    services: Services,
-    file_name: str,
-    name: str | None,
-    options: ReadOptions,
+    request: Request, services: Services, file_name: str, name: str | None, options: ReadOptions
 ) -> tuple[StoredRecording, bool]:
     """Import the body on a thread, a few at a time; names are checked before it is read."""
     checked_names(file_name, name)

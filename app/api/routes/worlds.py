@@ -74,10 +74,7 @@ async def get_world(world: WorldDep) -> WorldState:
 
 
 @router.post(
-    "/{world_id}/commands",
-    status_code=202,
-    summary="Change a live world",
-    responses=MISMATCH,
+    "/{world_id}/commands", status_code=202, summary="Change a live world", responses=MISMATCH
 )
 async def command_world(
     world: WorldDep,
@@ -118,9 +115,7 @@ async def stream_world(
 
 
 @router.put(
-    "/{world_id}/cell",
-    summary="Start a live world again in another cell",
-    responses=MISMATCH,
+    "/{world_id}/cell", summary="Start a live world again in another cell", responses=MISMATCH
 )
 def set_world_cell(world_id: str, body: WorldCell, services: ServicesDep) -> WorldSummary:
     """Stop the world and start it in a cell to pick and place, sort or reach in; streams end.

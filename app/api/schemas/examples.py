@@ -20,7 +20,7 @@ TASK_SELECTION: dict[str, Any] = {
     ],
 }
 RISK_MAP: dict[str, Any] = TASK_SELECTION | {
-    "grid": {"x": [-0.5, 0.5], "y": [1.1, 1.5], "nx": 3, "ny": 2},
+    "grid": {"x": [-0.5, 0.5], "y": [1.1, 1.5], "nx": 3, "ny": 2}
 }
 MOTION: dict[str, Any] = {
     "cell": "shared-workspace",

@@ -11,13 +11,7 @@ from app.api.schemas.numbers import Answer, Vector3
 from app.api.schemas.people import PersonInput, PersonUse
 from app.api.schemas.robot_state import RobotState
 from app.api.schemas.sorting import SortingFields, SortingMove, Word, move_of
-from app.api.schemas.task_selection import (
-    FRAME_TEXT,
-    FrameName,
-    Outcome,
-    Outside,
-    Stamp,
-)
+from app.api.schemas.task_selection import FRAME_TEXT, FrameName, Outcome, Outside, Stamp
 from app.errors import InvalidInput
 from app.policies.inference.sorting_plan import (
     MotionEstimate,

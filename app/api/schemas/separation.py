@@ -31,15 +31,13 @@ class SafetyInput(Body):
         "`human_speed` in any direction; people in other forms are not",
     )
     speed_change: Annotated[float, Field(ge=0.0, le=10.0)] | None = Field(
-        default=None,
-        description="assumed excess over that velocity, in any direction [m/s]",
+        default=None, description="assumed excess over that velocity, in any direction [m/s]"
     )
     reaction_time: Seconds | None = Field(
         default=None, description="time from a decision to its effect, a part of T_r [s]"
     )
     tracker_delay: Seconds | None = Field(
-        default=None,
-        description="age of the tracker's data on arrival, a part of T_r [s]",
+        default=None, description="age of the tracker's data on arrival, a part of T_r [s]"
     )
     intrusion_distance: Metres | None = Field(default=None, description="C [m]")
     person_uncertainty: Metres | None = Field(default=None, description="Z_d [m]")

@@ -71,8 +71,7 @@ class TaskSelectionRequest(Body):
         0.0, description="time for which the tool has been held at the object [s]"
     )
     time_left_s: Annotated[float, Field(ge=-1e9, le=1e9)] = Field(
-        10.0,
-        description="time left to reach the target [s]; clamped to 0 to 60 for the policy",
+        10.0, description="time left to reach the target [s]; clamped to 0 to 60 for the policy"
     )
     objective: Objective = Field(
         "value",

@@ -120,11 +120,7 @@ BOTH_ITEMS = (
         title="Figure 5.3: learning curve",
         measures=(
             *(
-                Measure(
-                    f"{end}, last point",
-                    number,
-                    Curve("thesis-pick", RECIPE, end),
-                )
+                Measure(f"{end}, last point", number, Curve("thesis-pick", RECIPE, end))
                 for end, number in (
                     ("success", "75 % after 2e6 steps"),
                     ("collision", "25 %"),

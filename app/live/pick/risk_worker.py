@@ -12,13 +12,7 @@ from app.errors import ServiceError
 from app.sim.core.arrays import Vec
 from app.sim.human.person import Person
 from app.sim.pick.person_grid import PersonGrid
-from app.sim.pick.task_policy import (
-    Candidate,
-    ChoiceTerms,
-    MovedPerson,
-    RiskMap,
-    TaskPolicy,
-)
+from app.sim.pick.task_policy import Candidate, ChoiceTerms, MovedPerson, RiskMap, TaskPolicy
 
 logger = logging.getLogger(__name__)
 

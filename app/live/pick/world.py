@@ -23,13 +23,7 @@ from app.sim.core.arrays import Vec, as_kernel_array
 from app.sim.pick.case_verdict import CaseRun, Verdict, judge
 from app.sim.pick.cases import Case, find_case
 from app.sim.pick.kernels.grasp import APPROACH, DESCEND, next_phase
-from app.sim.pick.task_policy import (
-    Candidate,
-    ChoiceTerms,
-    Decision,
-    PickProgress,
-    TaskPolicy,
-)
+from app.sim.pick.task_policy import Candidate, ChoiceTerms, Decision, PickProgress, TaskPolicy
 from app.sim.robot.trajectory_segment import TrajectorySegment
 
 
@@ -232,9 +226,7 @@ class LivePickWorld(BaseWorld[LiveWorkers]):
             people=[replace(one, q=one.q.copy(), qd=one.qd.copy()) for one in people],
             offered=self.offered,
             terms=ChoiceTerms(
-                previous=self.previous,
-                progress=self.progress,
-                time_left_s=self.time_left,
+                previous=self.previous, progress=self.progress, time_left_s=self.time_left
             ),
         )
 

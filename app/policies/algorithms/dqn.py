@@ -138,10 +138,7 @@ class SortingDQN(DQN, Stateful):
         self.exploration_rate = self.exploration_schedule(self._current_progress_remaining)
 
     def _sample_action(
-        self,
-        learning_starts: int,
-        action_noise: Any = None,
-        n_envs: int = 1,
+        self, learning_starts: int, action_noise: Any = None, n_envs: int = 1
     ) -> tuple[NDArray[Any], NDArray[Any]]:
         """Act greedily or at random among the moves, row by row."""
         masked = self.preset.networks.kind == "shared"

@@ -181,10 +181,7 @@ class TaskChooser(TrainedPolicy):
         """
         started = time.perf_counter()
         terms = ChoiceTerms(
-            previous=previous,
-            progress=progress,
-            time_left_s=time_left_s,
-            objective=objective,
+            previous=previous, progress=progress, time_left_s=time_left_s, objective=objective
         )
         asked = self._ask(q, qd, candidates, terms)
         observed = self._observed(asked.state.measured.q, people)

@@ -4,13 +4,7 @@ import torch
 from torch import nn
 
 from app.policies.configs.pick import PickPreset
-from app.policies.networks.actor_critic import (
-    Critics,
-    Fade,
-    MeanCritics,
-    ResidualActor,
-    hidden,
-)
+from app.policies.networks.actor_critic import Critics, Fade, MeanCritics, ResidualActor, hidden
 from app.sim.pick.kernels.observation_layout import (
     BODY_SIZES,
     DISTANCE_SCALE,

@@ -39,13 +39,7 @@ class Worker(_Walking):
     kind: Literal["worker"] = Field(default="worker", description="an 18-DoF person at work")
     home: Annotated[
         Three,
-        Each(
-            (
-                Within(-10.0, 10.0, "m"),
-                Within(-10.0, 10.0, "m"),
-                Within(-TURN, TURN, "rad"),
-            )
-        ),
+        Each((Within(-10.0, 10.0, "m"), Within(-10.0, 10.0, "m"), Within(-TURN, TURN, "rad"))),
     ] = Field(description="pelvis x, y [m] and yaw [rad] when at rest")
     pelvis_height: Annotated[float, Within(0.4, 1.4, "m")] = Field(
         description="pelvis above the floor, of a person of median stature [m]"

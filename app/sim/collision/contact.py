@@ -59,12 +59,7 @@ class Clearance:
 
 
 def clearance(
-    arm: Arm,
-    people: People,
-    q: Vec,
-    human_q: Vec,
-    cylinders: Vec,
-    sizes: Vec | None = None,
+    arm: Arm, people: People, q: Vec, human_q: Vec, cylinders: Vec, sizes: Vec | None = None
 ) -> Clearance:
     """Return the distances of the robot at ``q``.
 

@@ -282,8 +282,5 @@ def _obstacles(cell: Cell) -> dict[str, Any]:
             np.array([table.x_min, table.y_min, -table.thickness]),
             np.array([table.x_max, table.y_max, 0.0]),
         ),
-        "floor": make_box(
-            np.array([-5.0, -5.0, floor - 1.0]),
-            np.array([5.0, 5.0, floor]),
-        ),
+        "floor": make_box(np.array([-5.0, -5.0, floor - 1.0]), np.array([5.0, 5.0, floor])),
     }

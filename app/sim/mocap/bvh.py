@@ -166,10 +166,7 @@ def axis_turns(axis: int, angle: Vec) -> Vec:
 
 
 def read_rows(
-    lines: Sequence[tuple[int, str]],
-    n_columns: int,
-    n_rows: int | None,
-    what: str,
+    lines: Sequence[tuple[int, str]], n_columns: int, n_rows: int | None, what: str
 ) -> Vec:
     """Return a table of finite numbers, shape (n, n_columns).
 

@@ -12,14 +12,7 @@ from dataclasses import dataclass
 
 from app.sim.mocap.bvh import lines_of
 from app.sim.mocap.faults import bad
-from app.sim.mocap.tables import (
-    MAX_COLUMNS,
-    MISSING,
-    PADDING,
-    TextTable,
-    named_columns,
-    plain,
-)
+from app.sim.mocap.tables import MAX_COLUMNS, MISSING, PADDING, TextTable, named_columns, plain
 
 SEPARATORS = (",", ";", "\t", "|")
 """Separators of columns; white space if a file has none of them."""

@@ -281,11 +281,7 @@ class _Segments:
         )
 
     def error(
-        self,
-        which: tuple[int, ...],
-        *,
-        body: BodySize | None = None,
-        carry_height: bool = True,
+        self, which: tuple[int, ...], *, body: BodySize | None = None, carry_height: bool = True
     ) -> Spread:
         """Return the distances between points of the model and of the file [m]."""
         height = self._height if carry_height else np.full(len(self._height), self._standing)

@@ -221,10 +221,7 @@ def back_and_forth(run: Motion, seconds: float) -> Motion:
         pelvis_z.append(run.pelvis_z[part])
         times.append(k * length + elapsed)
     return replace(
-        run,
-        q=np.concatenate(q),
-        pelvis_z=np.concatenate(pelvis_z),
-        times=np.concatenate(times),
+        run, q=np.concatenate(q), pelvis_z=np.concatenate(pelvis_z), times=np.concatenate(times)
     )
 
 

@@ -159,10 +159,7 @@ class PersonEstimator:
     """
 
     def __init__(
-        self,
-        size: Vec,
-        settings: EstimatorSettings | None = None,
-        floor_z: float | None = None,
+        self, size: Vec, settings: EstimatorSettings | None = None, floor_z: float | None = None
     ) -> None:
         if np.shape(size) != (N_SIZE,) or not np.isfinite(size).all():
             rule = f"must be {N_SIZE} finite numbers"

@@ -22,12 +22,7 @@ APART = 0.1
 
 
 def goal_configurations(
-    arm: Arm,
-    target: Vec,
-    rng: np.random.Generator,
-    *,
-    n_starts: int = 24,
-    spread: float = 0.0,
+    arm: Arm, target: Vec, rng: np.random.Generator, *, n_starts: int = 24, spread: float = 0.0
 ) -> Vec:
     """Return configurations whose tcp is at a target, of any tilt.
 

@@ -206,8 +206,4 @@ def _blends(segments: Vec, limits: TimingLimits, qd0: Vec) -> tuple[list[int], V
             least[0] = cruise[0] + ends[0] + 1.0
             short[0] = False
         blends[short] += 1.0
-    return (
-        [int(b) for b in blends],
-        speeds,
-        [*(int(m) for m in cruise), 0],
-    )
+    return ([int(b) for b in blends], speeds, [*(int(m) for m in cruise), 0])

@@ -51,14 +51,7 @@ OVER_TABLE = 0.015
 KEYFRAME_TRIES, TRIES = 20, 40
 """Largest number of draws of a keyframe and of a motion."""
 
-_LOW_POINTS = (
-    body.ELBOW_R,
-    body.WRIST_R,
-    body.HAND_R,
-    body.ELBOW_L,
-    body.WRIST_L,
-    body.HAND_L,
-)
+_LOW_POINTS = (body.ELBOW_R, body.WRIST_R, body.HAND_R, body.ELBOW_L, body.WRIST_L, body.HAND_L)
 Range = tuple[float, float]
 
 
@@ -205,11 +198,7 @@ def _held_palm(
     c, s = math.cos(pelvis[2]), math.sin(pelvis[2])
     height = size[body.PELVIS_Z] + size[body.TRUNK] - drop
     return np.array(
-        [
-            pelvis[0] + c * forward - s * sideways,
-            pelvis[1] + s * forward + c * sideways,
-            height,
-        ]
+        [pelvis[0] + c * forward - s * sideways, pelvis[1] + s * forward + c * sideways, height]
     )
 
 

@@ -22,14 +22,7 @@ LINK_NAMES = (
     "wrist_2_link",
     "wrist_3_link",
 )
-JOINT_NAMES = (
-    "shoulder_pan",
-    "shoulder_lift",
-    "elbow",
-    "wrist_1",
-    "wrist_2",
-    "wrist_3",
-)
+JOINT_NAMES = ("shoulder_pan", "shoulder_lift", "elbow", "wrist_1", "wrist_2", "wrist_3")
 
 
 def package_dir() -> Path:

@@ -346,11 +346,7 @@ def valid_moves(state: SortingState, shape: SortingShape) -> NDArray[np.bool_]:
     there, towers = state.clutter != NULL, state.heights > 0
     across = towers[:, None] & ~np.eye(shape.n_colours, dtype=np.bool_)
     return np.concatenate(
-        [
-            np.repeat(there, shape.n_colours),
-            (towers[:, None] & ~there).ravel(),
-            across.ravel(),
-        ]
+        [np.repeat(there, shape.n_colours), (towers[:, None] & ~there).ravel(), across.ravel()]
     )
 
 

@@ -34,9 +34,7 @@ def test_service_says_that_it_warms_up_and_then_decides(cold_app_settings: Setti
         assert cold.get("/v1/worlds/main").status_code == 200
 
 
-def test_second_app_on_the_same_database_is_refused(
-    cold_app_settings: Settings,
-) -> None:
+def test_second_app_on_the_same_database_is_refused(cold_app_settings: Settings) -> None:
     with TestClient(create_app(cold_app_settings), base_url=ADDRESS):
         second = TestClient(create_app(cold_app_settings), base_url=ADDRESS)
         with pytest.raises(Conflict, match="another Tandem server"), second:

@@ -170,11 +170,7 @@ def test_torn_upload_stores_nothing(
     store: Store, service: ServiceConnection, claim: Claim
 ) -> None:
     content, policy_bytes = pack_upload(NEW, state(10))
-    query = {
-        "step": 10,
-        "policy_bytes": policy_bytes,
-        "sha256": sha256(content).hexdigest(),
-    }
+    query = {"step": 10, "policy_bytes": policy_bytes, "sha256": sha256(content).hexdigest()}
     with pytest.raises(ServiceError, match="is not that of the body"):
         path = f"{service.attempt}/checkpoints"
         service.send("POST", path, query=query, content=content[:-1])

@@ -67,11 +67,7 @@ def running_on(
     ray_address: str, store: Store, folder: Path, address: str
 ) -> Iterator[Supervisor]:
     """Run a supervisor whose jobs run on a cluster."""
-    settings = {
-        "TANDEM_RAY": ray_address,
-        "TANDEM_WORKER_URL": address,
-        "TANDEM_TOKEN": TOKEN,
-    }
+    settings = {"TANDEM_RAY": ray_address, "TANDEM_WORKER_URL": address, "TANDEM_TOKEN": TOKEN}
     executor = LocalProcess(store.url, folder, "jobs.remote.ray_driver", settings)
     supervisor = Supervisor(store, folder, executor=executor, timeouts=PATIENCE_OF_RAY)
     supervisor.start()
@@ -145,10 +141,7 @@ def test_training_whose_worker_and_node_fail_ends_with_the_checkpoints_of_a_loca
     local_supervisor.start()
     local = wait_until_final(store, train(store, **FIELDS))
     local_supervisor.stop()
-    with (
-        ray_cluster(2) as cluster,
-        running_on(line_of(cluster), store, tmp_path, address),
-    ):
+    with ray_cluster(2) as cluster, running_on(line_of(cluster), store, tmp_path, address):
         job_id = train(store, **FIELDS)
         wait_for(store, job_id, lambda job: job.step >= 384)
         pid = process_of(job_id)

@@ -7,12 +7,7 @@ import pytest
 import torch
 from torch import nn
 
-from app.policies.algorithms.parameter_noise import (
-    FACTOR,
-    ParameterNoise,
-    distance,
-    forward,
-)
+from app.policies.algorithms.parameter_noise import FACTOR, ParameterNoise, distance, forward
 from app.policies.networks.forward import Layer, layers_of
 from app.policies.networks.pick import NormedActor
 from app.sim.cells.cell import load_cell

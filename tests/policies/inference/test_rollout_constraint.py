@@ -58,9 +58,7 @@ def constrained(batch: ReachBatch, constraint: SsmConstraint) -> list[tuple[floa
 
 
 @pytest.mark.parametrize("settings", [None, SafetySettings()])
-def test_no_constraint_without_measured_velocities(
-    settings: SafetySettings | None,
-) -> None:
+def test_no_constraint_without_measured_velocities(settings: SafetySettings | None) -> None:
     assert ssm_constraint_of(settings, DT) == NO_CONSTRAINT
 
 

@@ -241,9 +241,6 @@ def test_a_second_person_counts_for_the_candidate_it_stands_at(chooser):
     near = person(-0.2, 1.25)
     alone = chooser.decide(HOME, np.zeros(6), [near], cubes("cube0", "cube5"))
     beside = chooser.decide(
-        HOME,
-        np.zeros(6),
-        [near, Person(q=posture.q, qd=np.zeros(18))],
-        cubes("cube0", "cube5"),
+        HOME, np.zeros(6), [near, Person(q=posture.q, qd=np.zeros(18))], cubes("cube0", "cube5")
     )
     assert beside.values[1] < alone.values[1] - 0.25

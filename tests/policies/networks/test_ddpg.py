@@ -6,12 +6,7 @@ import pytest
 import torch
 from torch import nn
 
-from app.policies.networks.ddpg import (
-    DDPGActor,
-    DDPGCritics,
-    LateActionQ,
-    RunningNormalisation,
-)
+from app.policies.networks.ddpg import DDPGActor, DDPGCritics, LateActionQ, RunningNormalisation
 
 
 def linear_layers(module: nn.Module) -> list[nn.Linear]:

@@ -105,10 +105,7 @@ def test_turning_all_colours_turns_the_values(n_colours):
 
 def test_the_printed_network_has_two_streams_of_two_layers():
     net = PrintedNetwork(SHAPE, 128)
-    for first, stream in (
-        (net.advantage_first, net.advantage),
-        (net.value_first, net.value),
-    ):
+    for first, stream in ((net.advantage_first, net.advantage), (net.value_first, net.value)):
         assert first.weight.shape == (50 * 7, 128)
         assert (stream[1].in_features, stream[1].out_features) == (128, 128)
     assert (net.advantage[3].out_features, net.value[3].out_features) == (SHAPE.n_actions, 1)

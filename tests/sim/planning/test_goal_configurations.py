@@ -3,10 +3,7 @@
 import numpy as np
 
 from app.sim.cells.cell import load_cell
-from app.sim.planning.goal_configurations import (
-    APART,
-    goal_configurations,
-)
+from app.sim.planning.goal_configurations import APART, goal_configurations
 from app.sim.robot.ur10 import Robot
 from app.sim.scene.scene import arm_of
 from tests.sim.configurations import vertical_configuration

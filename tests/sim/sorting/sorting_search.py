@@ -96,10 +96,7 @@ def first_moves(state: SortingState, shape: SortingShape) -> tuple[int, tuple[in
 
 
 def fewest_attempts(
-    state: SortingState,
-    shape: SortingShape,
-    to_go: dict[Key, int],
-    fewest_moves: bool = True,
+    state: SortingState, shape: SortingShape, to_go: dict[Key, int], fewest_moves: bool = True
 ) -> float:
     """Fewest expected attempts to the goal, a shortest path by A*.
 

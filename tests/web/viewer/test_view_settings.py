@@ -55,9 +55,7 @@ def node_shown(server: ViewerServer, name: str) -> bool:
     return bool(handle.visible)
 
 
-def test_what_a_visitor_hides_stays_in_the_scene_of_another(
-    server: ViewerServer,
-) -> None:
+def test_what_a_visitor_hides_stays_in_the_scene_of_another(server: ViewerServer) -> None:
     cell = load_cell()
     ViewSettings(server, cell)
     labels = {f"{PREFIX}{one.label}" for one in settings_of(cell)}

@@ -114,11 +114,7 @@ class _Zone:
             visible=False,
         )
         self._edge = server.scene.add_line_segments(
-            "/zone/edge",
-            np.zeros((N_DIRECTIONS, 2, 3)),
-            OFF,
-            thickness=0.016,
-            visible=False,
+            "/zone/edge", np.zeros((N_DIRECTIONS, 2, 3)), OFF, thickness=0.016, visible=False
         )
         self._key: tuple[object, ...] = ()
 

@@ -103,10 +103,7 @@ def rod(base: Sequence[float], height: float, radius: float) -> trimesh.Trimesh:
         np.column_stack([np.full(count, 2 * count), 2 * count + i, 2 * count + j])[1:-1],
         np.column_stack([np.full(count, 3 * count), 3 * count + j, 3 * count + i])[1:-1],
     ]
-    walls = [
-        np.column_stack([i, j, count + j]),
-        np.column_stack([i, count + j, count + i]),
-    ]
+    walls = [np.column_stack([i, j, count + j]), np.column_stack([i, count + j, count + i])]
     return trimesh.Trimesh(
         vertices=np.vstack([low, high, high, low]),
         faces=np.vstack([*walls, *caps]),

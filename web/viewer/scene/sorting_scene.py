@@ -40,10 +40,7 @@ class SortingScene:
     """
 
     def __init__(
-        self,
-        server: viser.ViserServer,
-        cell: Cell,
-        submit: Callable[[ToggleGoal], object],
+        self, server: viser.ViserServer, cell: Cell, submit: Callable[[ToggleGoal], object]
     ) -> None:
         self._cell, self._floor = cell, tray_height(cell)
         self._clutter = ClutterView(server, cell)

@@ -49,10 +49,7 @@ class StationsView:
     """
 
     def __init__(
-        self,
-        server: viser.ViserServer,
-        cell: Cell,
-        submit: Callable[[ToggleCandidate], object],
+        self, server: viser.ViserServer, cell: Cell, submit: Callable[[ToggleCandidate], object]
     ) -> None:
         self._scene, self._cell, self._submit = server.scene, cell, submit
         self._stations = [one for one in cell.stations if one.kind in ("cube", "dock")]

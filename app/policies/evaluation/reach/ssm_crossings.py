@@ -22,12 +22,7 @@ from app.sim.reach.oracle_search import Acts, sample_detours, toward
 from app.sim.robot.actions import ActionSettings
 from app.sim.robot.kernels.arm import Arm
 from app.sim.safety.layer import SafetySettings
-from app.sim.scenario.monitoring import (
-    MonitoredEpisodes,
-    MonitoringSettings,
-    joined,
-    selected,
-)
+from app.sim.scenario.monitoring import MonitoredEpisodes, MonitoringSettings, joined, selected
 from app.sim.scene.scene import arm_of
 
 MARGIN = 0.05

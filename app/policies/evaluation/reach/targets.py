@@ -110,11 +110,7 @@ def run_targets(
 
     variants = [
         bench.variant(
-            start + suffix_of(mode),
-            goals,
-            mode,
-            start=start,
-            collision_ends=start != "authors",
+            start + suffix_of(mode), goals, mode, start=start, collision_ends=start != "authors"
         )
         for mode, start in product(bench.direct_modes, STARTS)
     ]

@@ -164,11 +164,7 @@ def grid(
             on_row(len(rows), len(DECIDERS) * len(STARTS), rows[-1])
     return {
         "episodes": per_pair,
-        "settings": {
-            **settings_of(shape, fail),
-            "pairs": len(pairs),
-            "least_success": least,
-        },
+        "settings": {**settings_of(shape, fail), "pairs": len(pairs), "least_success": least},
         "results": rows,
     }
 

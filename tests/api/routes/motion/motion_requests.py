@@ -55,10 +55,7 @@ BAD: list[tuple[dict[str, Any], int, str]] = [
     ({"robot": {"q": HOME, "qd": [0, 0, 1.2, 0, 0, 0]}}, 422, "robot.qd[2]"),
     ({"robot": {"q": HOME, "qd": [0, 0, float("nan"), 0, 0, 0]}}, 422, "robot.qd[2]"),
     (
-        {
-            "robot": {"q": HOME, "qd": [0.0] * 6, "qdd": [0, 50, 0, 0, 0, 0]},
-            "checkpoint": JERK,
-        },
+        {"robot": {"q": HOME, "qd": [0.0] * 6, "qdd": [0, 50, 0, 0, 0, 0]}, "checkpoint": JERK},
         422,
         "robot.qdd[1]",
     ),

@@ -9,14 +9,7 @@ from fastapi.testclient import TestClient
 from starlette.testclient import WebSocketTestSession
 from starlette.websockets import WebSocketDisconnect
 
-from tests.api.routes.motion.motion_requests import (
-    BAD,
-    SOCKET,
-    STREAM,
-    TASK,
-    asked,
-    refused,
-)
+from tests.api.routes.motion.motion_requests import BAD, SOCKET, STREAM, TASK, asked, refused
 
 pytestmark = pytest.mark.usefixtures("policies")
 

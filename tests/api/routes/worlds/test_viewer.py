@@ -105,9 +105,7 @@ def test_request_for_a_public_tunnel_never_reaches_the_viewer(
     assert not asked
 
 
-def test_only_the_service_itself_listens_and_asks_viewers_for_its_token(
-    tmp_path: Path,
-) -> None:
+def test_only_the_service_itself_listens_and_asks_viewers_for_its_token(tmp_path: Path) -> None:
     before = listening_ports()
     app = create_app(Settings(data=tmp_path, token=TOKEN))  # type: ignore[arg-type]
     with running(app) as (_, found):

@@ -6,12 +6,7 @@ import numpy as np
 import pytest
 
 from app.policies.evaluation.reach.episodes import target_goals
-from app.policies.evaluation.reach.smoothness import (
-    Paths,
-    measure,
-    record_paths,
-    shown_episode,
-)
+from app.policies.evaluation.reach.smoothness import Paths, measure, record_paths, shown_episode
 from app.sim.cells.cell import load_cell
 from app.sim.reach.batch import ReachBatch, ReachSettings
 from app.sim.robot.actions import ActionSettings

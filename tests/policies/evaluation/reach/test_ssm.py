@@ -93,10 +93,7 @@ def test_the_protocol_runs_policy_planners_recordings_and_random_episodes(monkey
         for name in ("rrtstar-once", "replan-every-cycle")
     }
     settings = ComparisonSettings(
-        planners=few,
-        without_people=few["rrtstar-once"],
-        n_resimulations=4,
-        time_limit_s=3.0,
+        planners=few, without_people=few["rrtstar-once"], n_resimulations=4, time_limit_s=3.0
     )
     monkeypatch.setattr(reach_ssm, "SETTINGS", settings)
     monkeypatch.setattr(reach_ssm, "RANDOM_S", 0.5)

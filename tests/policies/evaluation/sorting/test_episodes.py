@@ -15,12 +15,7 @@ from app.policies.evaluation.sorting.episodes import (
 from app.policies.evaluation.sorting.optimal_baseline import choose_by_planner
 from app.sim.sorting.batch import SortingBatch, SortingSettings
 from app.sim.sorting.state import SortingShape, empty_state
-from tests.policies.evaluation.sorting_players import (
-    exactly,
-    in_circles,
-    riskily,
-    values_of,
-)
+from tests.policies.evaluation.sorting_players import exactly, in_circles, riskily, values_of
 
 SHAPE = SortingShape(n_cells=6, n_colours=2)
 FAIL = np.linspace(0.0, 0.4, 6)
