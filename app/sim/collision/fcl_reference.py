@@ -11,12 +11,12 @@ Raw meshes are surfaces: only ``hull`` finds a body wholly inside a link.
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any, Literal
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, Literal
 
 import fcl
 import numpy as np
 import pinocchio as pin
-import trimesh
 
 from app.sim.cells.cell import Cell
 from app.sim.cells.parts import Obstacle
@@ -24,6 +24,9 @@ from app.sim.core.arrays import Vec
 from app.sim.human import model as human
 from app.sim.robot.capsules import TOOL, tool_capsule
 from app.sim.robot.ur10 import LINK_NAMES, Robot, package_dir, urdf_path
+
+if TYPE_CHECKING:
+    import trimesh
 
 Mesh = Literal["raw", "hull"]
 Kind = Literal["human", "cell", "self"]
@@ -67,7 +70,7 @@ class Distance:
     """Capsule of the person."""
 
 
-def collision_mesh(link: str) -> trimesh.Trimesh:
+def collision_mesh(link: str) -> "trimesh.Trimesh":
     """Load one link's collision mesh in the link's frame [m].
 
     The URDF's ``ee_link`` carries a box without a mesh file, so links are read by name.
@@ -77,14 +80,14 @@ def collision_mesh(link: str) -> trimesh.Trimesh:
         model, str(urdf_path()), pin.GeometryType.COLLISION, package_dirs=[str(package_dir())]
     )
     shape = geometry.geometryObjects[geometry.getGeometryId(f"{link}_0")]
-    mesh = trimesh.load_mesh(shape.meshPath)
-    assert isinstance(mesh, trimesh.Trimesh)
+    # Loaded here: it takes half a second, and every process that reads a cell imports this.
+    mesh: trimesh.Trimesh = import_module("trimesh").load_mesh(shape.meshPath)
     frame = model.frames[model.getFrameId(link)]
     mesh.apply_transform(frame.placement.inverse().act(shape.placement).homogeneous)
     return mesh
 
 
-def tree_of(mesh: trimesh.Trimesh) -> Any:
+def tree_of(mesh: "trimesh.Trimesh") -> Any:
     """Return the mesh as fcl's bounding volume tree of triangles."""
     tree = fcl.BVHModel()
     tree.beginModel(len(mesh.vertices), len(mesh.faces))
@@ -93,7 +96,7 @@ def tree_of(mesh: trimesh.Trimesh) -> Any:
     return tree
 
 
-def hull_of(mesh: trimesh.Trimesh) -> Any:
+def hull_of(mesh: "trimesh.Trimesh") -> Any:
     """Return the mesh's convex hull as fcl's convex body."""
     hull = mesh.convex_hull
     faces = np.column_stack([np.full(len(hull.faces), 3), hull.faces]).ravel()

@@ -17,7 +17,7 @@ from collections.abc import Mapping, Sequence
 from functools import reduce
 
 import numpy as np
-from scipy.spatial.transform import Rotation
+import scipy
 
 from app.sim.core.arrays import Vec
 from app.sim.mocap.bvh import axis_turns, lines_of
@@ -231,7 +231,8 @@ def _elevated(values: Mapping[str, Vec], hand: str, side: float, first: int) -> 
     """
     plane, elevation, axial = (-side * values[name] for name in ELEVATED[hand])
     turns = axis_turns(2, plane) @ axis_turns(0, -elevation)
-    turns = turns @ Rotation.from_rotvec(np.outer(axial, _AXIAL)).as_matrix()
+    axial_turns = scipy.spatial.transform.Rotation.from_rotvec(np.outer(axial, _AXIAL))
+    turns = turns @ axial_turns.as_matrix()
     return one_branch(euler_angles(turns) * np.array([-1.0, side, 1.0]), first)
 
 

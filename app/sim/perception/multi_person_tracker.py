@@ -19,8 +19,8 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike
-from scipy.optimize import linear_sum_assignment
 
 from app.errors import InvalidInput
 from app.sim.core.arrays import Vec
@@ -71,7 +71,7 @@ def match_people(
     # Costlier than all allowed matches together: the number of matches comes first.
     cost[~allowed] = 1.0 + cost[allowed].sum()
     matched: list[int | None] = [None] * len(expected)
-    for i, j in zip(*linear_sum_assignment(cost), strict=True):
+    for i, j in zip(*scipy.optimize.linear_sum_assignment(cost), strict=True):
         if allowed[i, j]:
             matched[int(i)] = int(j)
     return matched

@@ -18,8 +18,8 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.spatial import Delaunay
 
 from app.errors import GoalOutside, InvalidInput
 from app.sim.cells.parts import GoalRegion
@@ -217,7 +217,7 @@ class DelaunayInterpolation:
         if at_corner.sum() != N_CORNERS or not (low < high).all():
             rule = "must have the 8 corners of their box among them, once each"
             raise InvalidInput("targets", int(at_corner.sum()), rule)
-        simplices = Delaunay(self.targets).simplices
+        simplices = scipy.spatial.Delaunay(self.targets).simplices
         edges = self.targets[simplices[:, :3]] - self.targets[simplices[:, 3:]]
         kept = np.abs(np.linalg.det(edges)) > 6.0 * _FLAT
         self.corners = np.ascontiguousarray(simplices[kept], dtype=np.int64)
