@@ -16,7 +16,8 @@ one another.
 """
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields
+from dataclasses import dataclass, fields
+from functools import lru_cache
 from statistics import NormalDist
 
 import numpy as np
@@ -64,7 +65,7 @@ class BodySize:
 
     def lengths(self) -> dict[str, float]:
         """Return the lengths by name [m]."""
-        return asdict(self)
+        return {name: getattr(self, name) for name in NAMES}
 
     @property
     def stature(self) -> float:
@@ -94,6 +95,7 @@ NAMES = tuple(entry.name for entry in fields(BodySize))
 """Names of the lengths, in the kernels' order."""
 
 
+@lru_cache(maxsize=256)
 def percentile_body(
     stature: float = 50.0, arms: float = 50.0, shoulders: float = 50.0, pelvis: float = 0.95
 ) -> BodySize:

@@ -240,11 +240,15 @@ def _lean(q: Vec, size: Vec, targets: dict[str, Vec | None]) -> Vec:
 
 def _lean_factor(q: Vec, size: Vec, hand: str, target: Vec, direction: Vec) -> float:
     trial, easy = q.copy(), EASY_REACH * sum(arm_lengths(size, hand))
+    writable, trig = np.array(size, dtype=np.float64), np.empty((3, 16))
+    points, frames = np.empty((body.N_POINTS, 3)), np.empty((body.N_FRAMES, 3, 3))
+    shoulder, abdomen = points[POINT_NAMES.index(f"shoulder_{hand}")], trial[3:6]
 
     def gap(factor: float) -> float:
-        trial[3:6] = np.clip(factor * direction, Q_MIN[3:6], Q_MAX[3:6])
-        shoulder = joint_points(trial, size)[f"shoulder_{hand}"]
-        return float(np.linalg.norm(target - shoulder)) - easy
+        np.minimum(np.maximum(factor * direction, Q_MIN[3:6]), Q_MAX[3:6], out=abdomen)
+        body.points_and_frames(trial, writable, trig, points, frames)
+        offset = target - shoulder
+        return math.sqrt(offset @ offset) - easy
 
     if gap(0.0) <= 0.0:
         return 0.0
