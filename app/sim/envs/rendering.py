@@ -63,9 +63,15 @@ _PARTS = {
 """Colours of a worker's capsules besides arms and trunk."""
 
 
-@lru_cache(maxsize=8)
+@lru_cache(maxsize=64)
 def raycaster_of(cell: Cell) -> Raycaster:
-    """Return the raycaster of a cell; the camera distance depends on the scenario."""
+    """Return the raycaster of a cell, which does not depend on its people."""
+    return _raycaster(cell.model_copy(update={"people": ()}))
+
+
+@lru_cache(maxsize=8)
+def _raycaster(cell: Cell) -> Raycaster:
+    """Return a new raycaster; the camera distance depends on the scenario."""
     if is_sorting(cell):
         position, look_at = (2.05, -1.15, 1.7), (0.0, 0.62, 0.1)
     elif cell.goal_region is not None:
