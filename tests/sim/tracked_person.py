@@ -21,7 +21,7 @@ def cell_of(percentile: float) -> Cell:
     return CELL.model_copy(update={"people": (worker,)})
 
 
-@lru_cache(maxsize=8)
+@lru_cache(maxsize=16)
 def work(
     seed: int, seconds: float, percentile: float = 50.0
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -59,7 +59,23 @@ def errors(
         estimates = follow(motion(seed, SECONDS, percentile), times, tracker, estimator)
         for k, estimate in enumerate(estimates):
             if k / RATE_HZ >= settings.latency_s + 0.1:
-                compare(cell, taken_for, estimate, q[k], qd[k], found)
+                axis = true_axes(seed, percentile)[k]
+                compare(cell, taken_for, estimate, (q[k], qd[k], *axis), found)
+    return found
+
+
+@lru_cache(maxsize=16)
+def true_axes(seed: int, percentile: float) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Centre [m] and velocity [m/s] of the axis of exact key-points at each time."""
+    cell, (_, q, qd) = cell_of(percentile), work(seed, SECONDS, percentile)
+    found = []
+    for k in range(len(q)):
+        true, before, after = (
+            safety_cylinder(keypoints_of(q[k] + s * qd[k], cell.body, cell.floor_z))
+            for s in (0.0, -0.01, 0.01)
+        )
+        assert true is not None and before is not None and after is not None
+        found.append((true.center, (after.center - before.center) / 0.02))
     return found
 
 
@@ -67,21 +83,15 @@ def compare(
     cell: Cell,
     taken_for: Cell,
     estimate: PersonEstimate,
-    q: np.ndarray,
-    qd: np.ndarray,
+    true: tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray],
     found: Errors,
 ) -> None:
-    """Add the errors of one estimate."""
+    """Add the errors of one estimate; the truth is joints, their speeds, axis and velocity."""
     assert estimate.person is not None and estimate.cylinder is not None
-    true, before, after = (
-        safety_cylinder(keypoints_of(q + s * qd, cell.body, cell.floor_z))
-        for s in (0.0, -0.01, 0.01)
-    )
-    assert true is not None and before is not None and after is not None
+    q, qd, center, velocity = true
     body = human.joint_points(q, cell.body)
     fitted = human.joint_points(estimate.person.q, taken_for.body)
-    velocity = (after.center - before.center) / 0.02
-    found.center.append(float(np.linalg.norm(estimate.cylinder.center - true.center)))
+    found.center.append(float(np.linalg.norm(estimate.cylinder.center - center)))
     found.contains.append(estimate.cylinder.contains(np.array(list(body.values()))))
     found.surface.append(holds_surface(estimate.cylinder, cell, q))
     found.wrist.extend(
