@@ -66,6 +66,10 @@ Monitored = tuple[SafetyDecision | None, int | None, SeparationTerms | None]
 class MotionDecider:
     """Decide motions by one policy; safe to call from several threads.
 
+    Args:
+        actor: Policy.
+        cell: Training cell of the policy.
+
     Raises:
         CheckpointMismatch: The policy was trained in another cell.
         InvalidInput: The cell has no goals.

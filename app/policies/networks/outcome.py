@@ -45,7 +45,11 @@ class OutcomePrediction(NamedTuple):
 
 
 class OutcomeHead(nn.Module):
-    """Ensemble that predicts the outcome of a pick."""
+    """Ensemble that predicts the outcome of a pick.
+
+    Args:
+        n_obs: Length of observations.
+    """
 
     mean: torch.Tensor
     """Mean of each input, shape (n_obs + 1,)."""
