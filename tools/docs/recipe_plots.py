@@ -46,13 +46,16 @@ class Row(NamedTuple):
 
 
 ROWS = (
-    Row(
-        "sorting, e0",
-        (
-            ("thesis-sorting", "sorting-e0-thesis", ORANGE),
-            ("sorting-curves", "sorting-e0-dqn", BLUE),
-        ),
-        (),
+    *(
+        Row(
+            f"sorting, {task}",
+            (
+                ("thesis-sorting", f"sorting-{task}-thesis", ORANGE),
+                ("sorting-curves", f"sorting-{task}-dqn", BLUE),
+            ),
+            (),
+        )
+        for task in ("e0", "e1")
     ),
     Row(
         "reach",
@@ -119,7 +122,7 @@ def _columns(points: Sequence[Json], over: str, end: str) -> tuple[Grid, Grid]:
 
 def recipes(results: Path) -> Figure:
     """Draw success (solid) and collisions (dashed) of all trainings, a line per seed."""
-    figure, axes = panels(len(ROWS), len(AXES), 8.0, sharey=True)
+    figure, axes = panels(len(ROWS), len(AXES), 10.4, sharey=True)
     for row, views in zip(ROWS, axes, strict=True):
         for view, (over, label) in zip(views, AXES, strict=True):
             for file, name, colour in row.curves:
@@ -136,7 +139,8 @@ def recipes(results: Path) -> Figure:
             view.xaxis.set_major_formatter(FuncFormatter(_short))
             view.xaxis.set_minor_formatter(NullFormatter())
             view.yaxis.set_major_formatter(PercentFormatter(1.0, decimals=0, symbol=" %"))
-        views[0].set_title(f"{row.title}: success; dashed: collisions")
+        dashed = "; dashed: collisions" if row.printed else ""
+        views[0].set_title(f"{row.title}: success{dashed}")
         if views[0].get_legend_handles_labels()[0]:
             views[0].legend(loc="center right", fontsize=7)
     return figure

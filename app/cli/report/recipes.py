@@ -4,6 +4,7 @@ from app.cli.report.parts import Curve, Item, Measure, trained
 
 CURVES = (
     ("sorting, e0", "thesis-sorting", "sorting-e0-thesis", "sorting-curves", "sorting-e0-dqn"),
+    ("sorting, e1", "thesis-sorting", "sorting-e1-thesis", "sorting-curves", "sorting-e1-dqn"),
     ("reach", "thesis-reach", "reach-ddpg-authors", "reach-curves", "reach-td3"),
     ("pick", "thesis-pick", "pick-td3-thesis", "pick-curves", "pick-td3"),
 )
@@ -18,15 +19,16 @@ def _lines() -> tuple[Measure, ...]:
             f"{scenario}: {text}",
             PRINTED.get(f"{scenario} {key}", ""),
             Curve(file, recipe, key, unit),
-            Curve(own_file, own, key, unit, "sorting-e0" if own == "sorting-e0-dqn" else ""),
+            Curve(own_file, own, key, unit, own.removesuffix("-dqn") if sorts else ""),
         )
         for scenario, file, recipe, own_file, own in CURVES
+        for sorts in (scenario.startswith("sorting"),)
         for text, key, unit in (
             ("success, last point", "success", ""),
             ("collision, last point", "collision", ""),
             ("processor time [s]", "cpu_s", "s"),
         )
-        if not (scenario == "sorting, e0" and key == "collision")
+        if not (sorts and key == "collision")
     )
 
 
@@ -47,7 +49,7 @@ RECIPE_ITEMS = (
         " here includes the grasp and the lift. The thesis prints no rate for sorting.",
         command=" ; ".join(
             (
-                trained("sorting-e0-thesis", "thesis-sorting"),
+                *(trained(f"sorting-{task}-thesis", "thesis-sorting") for task in ("e0", "e1")),
                 trained("pick-td3", "pick-curves"),
                 "python -m tools.docs.recipe_plots",
             )

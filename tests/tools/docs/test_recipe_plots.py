@@ -31,11 +31,11 @@ def test_points_are_joined_to_enough_episodes() -> None:
 def test_picture_has_a_row_per_scenario_also_without_curves(tmp_path: Path) -> None:
     assert curves_of(tmp_path, "pick-curves", "pick-td3") == []
     without = recipes(tmp_path).axes
-    assert [len(view.lines) for view in without] == [0] * 3 + [1] * 3 + [2] * 3
+    assert [len(view.lines) for view in without] == [0] * 6 + [1] * 3 + [2] * 3
     played = [{"step": 1000, "cpu_s": 9.0, "updates": 5, "success": 0.5, "collision": 0.5}]
     one = {"name": "pick-td3", "seed": 1, "played": played}
     (tmp_path / "pick-curves.json").write_text(json.dumps({"curves": [one, one]}))
-    assert [len(view.lines) for view in recipes(tmp_path).axes[6:]] == [6] * 3
+    assert [len(view.lines) for view in recipes(tmp_path).axes[9:]] == [6] * 3
 
 
 def test_folder_of_a_training_is_a_curve(tmp_path: Path) -> None:
