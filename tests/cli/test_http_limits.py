@@ -143,13 +143,14 @@ def large_heads() -> dict[str, bytes]:
 
 
 def test_heads_of_a_hundred_megabytes_are_refused_while_others_are_answered() -> None:
-    with serving() as small:
+    with serving(LINGER_S=0.5) as small:  # each client sends on until then
         before, stop = small.peak_memory, threading.Event()
         meanwhile: list[int] = []
 
         def others() -> None:
             while not stop.is_set():
                 meanwhile.append(status_of(small.ask(NAME + LAST)))
+                time.sleep(0.01)
 
         thread = threading.Thread(target=others)
         thread.start()

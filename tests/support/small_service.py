@@ -69,7 +69,7 @@ app.add_middleware(BodyRules, files={"/length": 64 * 1024 * 1024})
 app.add_middleware(Guard, token=TOKEN, open_paths=())
 
 if __name__ == "__main__":
-    for name in ("HEAD_S", "BODY_S", "DRAIN_S", "BODY_BYTES", "BODY_TOTAL_S"):
+    for name in ("HEAD_S", "BODY_S", "DRAIN_S", "LINGER_S", "BODY_BYTES", "BODY_TOTAL_S"):
         setattr(http_limits, name, float(os.environ.get(name, getattr(http_limits, name))))
     sock = listen("127.0.0.1", 0)
     print(address_of(sock), flush=True)
