@@ -1,6 +1,7 @@
 """Comparison of an answer with the OpenAPI document."""
 
 import re
+from functools import cache
 from typing import Any, Protocol
 
 
@@ -21,10 +22,14 @@ def operation_of(document: dict[str, Any], method: str, path: str) -> dict[str, 
     fitting = [
         (template.count("{"), operations[method])
         for template, operations in document["paths"].items()
-        if method in operations
-        and re.fullmatch(re.sub(r"\\\{\w+\\\}", "[^/]+", re.escape(template)), path)
+        if method in operations and _pattern(template).fullmatch(path)
     ]
     return min(fitting, key=lambda one: one[0])[1] if fitting else None
+
+
+@cache
+def _pattern(template: str) -> re.Pattern[str]:
+    return re.compile(re.sub(r"\\\{\w+\\\}", "[^/]+", re.escape(template)))
 
 
 def undescribed(document: dict[str, Any], answer: Answered) -> str | None:
