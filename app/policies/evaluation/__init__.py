@@ -1,7 +1,7 @@
 """Evaluation: one module per protocol; results carry rates with 95 % intervals.
 
 registry    All protocols by name, as the command line and evaluation jobs know them
-rows        Callback that reports each row of a result as soon as it is measured
+rows        What a protocol is run with, and rows that are reported as soon as measured
 statistics  Rates and means with 95 % intervals, as results carry them
 pick/       Evaluation of the pick scenario
 reach/      Evaluation of the reach scenario

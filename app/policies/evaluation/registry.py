@@ -18,14 +18,14 @@ from app.policies.evaluation.reach.smoothness import run_smoothness
 from app.policies.evaluation.reach.ssm import run_ssm
 from app.policies.evaluation.reach.targets import run_targets
 from app.policies.evaluation.reach.tracker import run_tracker
-from app.policies.evaluation.rows import OnRow, ignore_row
+from app.policies.evaluation.rows import EvaluationRequest, Json, OnRow, ignore_row
 from app.policies.evaluation.safety.ssm import run_safety
 from app.policies.evaluation.sorting.cycle_time import run_cycle_time
 from app.policies.evaluation.sorting.people import run_sorting_people
 from app.policies.evaluation.sorting.runs import run_grid, run_tests
 from app.sim.mocap.importer import Motion
 
-Protocol = Callable[..., dict[str, Any]]
+Protocol = Callable[[Any, EvaluationRequest], Json]
 
 PROTOCOLS: Mapping[str, Protocol] = MappingProxyType(
     {
@@ -57,9 +57,7 @@ PROTOCOLS: Mapping[str, Protocol] = MappingProxyType(
         "reach-oracle": run_oracle,
     }
 )
-"""Protocol by name. Each takes a checkpoint and, by keyword, ``episodes`` (None: the usual
-number), ``seed`` (of the episodes; use one that was not used for tuning), ``on_row`` (callback
-for each finished row) and, where it uses recorded motion, ``motions``."""
+"""Protocol by name."""
 WITH_MOTIONS = frozenset({"pick-mocap"})
 """Protocols that take recorded motion."""
 WITH_OR_WITHOUT_MOTIONS = frozenset({"reach-ssm", "risk-calibration"})
@@ -119,8 +117,8 @@ def evaluate(
     _check_task(name, checkpoint)
     tested = {} if name in WITHOUT_CHECKPOINT else _identity(checkpoint)
     started = time.process_time()
-    more = {"motions": motions} if name in WITH_MOTIONS | WITH_OR_WITHOUT_MOTIONS else {}
-    outcome = PROTOCOLS[name](checkpoint, episodes=episodes, seed=seed, on_row=on_row, **more)
+    request = EvaluationRequest(episodes=episodes, seed=seed, motions=motions, on_row=on_row)
+    outcome = PROTOCOLS[name](checkpoint, request)
     return {
         "protocol": name,
         **tested,

@@ -1,8 +1,12 @@
-"""Callback that reports each row of a result as soon as it is measured."""
+"""What a protocol is run with, and rows that are reported as soon as they are measured."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
+from app.sim.mocap.importer import Motion
+
+Json = dict[str, Any]
 Row = Mapping[str, Any]
 """One row of a result."""
 OnRow = Callable[[int, int, Row], None]
@@ -11,3 +15,39 @@ OnRow = Callable[[int, int, Row], None]
 
 def ignore_row(_done: int, _total: int, _row: Row) -> None:
     """Do nothing: the default callback."""
+
+
+class ReportedRows(list[Json]):
+    """Rows of a result; each is reported when it is appended.
+
+    Args:
+        total: Number of rows of the result.
+        on_row: Callback.
+    """
+
+    def __init__(self, total: int, on_row: OnRow = ignore_row) -> None:
+        super().__init__()
+        self._total, self._on_row = total, on_row
+
+    def append(self, row: Json) -> None:
+        """Add a row and report it."""
+        super().append(row)
+        self._on_row(len(self), self._total, row)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EvaluationRequest:
+    """What a protocol is run with, beside the checkpoint."""
+
+    episodes: int | None = None
+    """Number of episodes of each row; None for the usual one."""
+    seed: int = 11
+    """Seed of the episodes; use one that was not used for tuning."""
+    motions: Sequence[Motion] = ()
+    """Recorded motion without artefacts, for protocols that use it."""
+    on_row: OnRow = ignore_row
+    """Callback for each finished row."""
+
+    def rows(self, total: int) -> ReportedRows:
+        """Return the list of the ``total`` rows of the result, still empty."""
+        return ReportedRows(total, self.on_row)

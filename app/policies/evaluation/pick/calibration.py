@@ -15,7 +15,6 @@ Source: Guo et al., *On calibration of modern neural networks* (2017); Brier (19
 *Probabilistic outputs for support vector machines* (1999).
 """
 
-from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -29,9 +28,8 @@ from app.policies.checkpoints.trained_cell import cell_of
 from app.policies.evaluation.pick.episodes import Evaluator, View, settings_for
 from app.policies.evaluation.pick.people import beside_recordings
 from app.policies.evaluation.pick.tasks import FASTER, PAIR, settings_of
-from app.policies.evaluation.rows import OnRow, ignore_row
+from app.policies.evaluation.rows import EvaluationRequest, Json
 from app.policies.inference.value_networks import ValueNetworks, pick_preset_of
-from app.sim.mocap.importer import Motion
 from app.sim.pick.batch import PickSettings
 from app.sim.scenario.kernels.episode import COLLISION, SUCCESS
 
@@ -66,14 +64,7 @@ class _Predictions:
         return np.zeros(len(view.rows), dtype=np.int64)
 
 
-def run_calibration(
-    checkpoint: Checkpoint,
-    *,
-    episodes: int | None,
-    seed: int,
-    motions: Sequence[Motion] = (),
-    on_row: OnRow = ignore_row,
-) -> dict[str, Any]:
+def run_calibration(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
     """Compare predicted probabilities with rates, for each kind of people by itself.
 
     Raises:
@@ -90,22 +81,21 @@ def run_calibration(
         "off-task": replace(usual, work=replace(usual.work, off_task=1.0)),
         "stops": replace(usual, work=replace(usual.work, at_rest=1.0)),
     }
-    if motions:
-        kinds["recorded"] = beside_recordings(usual, motions, cell)
-    n, rows, stated = episodes or DEFAULT_EPISODES, [], {}
+    if request.motions:
+        kinds["recorded"] = beside_recordings(usual, request.motions, cell)
+    n, rows, stated = request.episodes or DEFAULT_EPISODES, request.rows(len(kinds)), {}
     for name, settings in kinds.items():
-        evaluator = Evaluator(networks, cell, n, seed, settings)
-        rule = _Predictions(n, evaluator.batch.arm.dt, seed)
+        evaluator = Evaluator(networks, cell, n, request.seed, settings)
+        rule = _Predictions(n, evaluator.batch.arm.dt, request.seed)
         run = evaluator.run(rule, predicts=True)
         kept = np.concatenate(rule.rows)
         found = np.concatenate(rule.predictions)
         row: dict[str, Any] = {"name": name, "n": n, "predictions": len(kept)}
         for k, (what, outcome) in enumerate((("success", SUCCESS), ("contact", COLLISION))):
             happened = run.outcome[kept] == outcome
-            row[what] = calibration(found[:, k], found[:, 2 + k], happened, seed)
+            row[what] = calibration(found[:, k], found[:, 2 + k], happened, request.seed)
         rows.append(row)
         stated[name] = settings_of(evaluator)
-        on_row(len(rows), len(kinds), row)
     return {"settings": stated, "results": rows}
 
 

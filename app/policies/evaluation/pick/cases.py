@@ -17,7 +17,7 @@ from app.policies.checkpoints.checkpoint import Checkpoint
 from app.policies.checkpoints.trained_cell import cell_of
 from app.policies.evaluation.pick import selection_rules as choice_rules
 from app.policies.evaluation.pick.episodes import Episodes, Evaluator, Rule, View, settings_for
-from app.policies.evaluation.rows import OnRow, ignore_row
+from app.policies.evaluation.rows import EvaluationRequest, Json
 from app.policies.evaluation.statistics import wilson
 from app.policies.inference.task_selection import HYSTERESIS
 from app.policies.inference.value_networks import ValueNetworks, pick_preset_of
@@ -66,15 +66,13 @@ class _Recorder:
         return choice
 
 
-def run_cases(
-    checkpoint: Checkpoint, *, episodes: int | None, seed: int, on_row: OnRow = ignore_row
-) -> dict[str, Any]:
+def run_cases(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
     """Evaluate the four case studies from jittered starts."""
     cell, networks = cell_of(checkpoint.manifest), ValueNetworks(checkpoint)
-    n, rows, curves = episodes or DEFAULT_EPISODES, [], {}
-    cases = cases_of(cell)
+    n, cases, curves = request.episodes or DEFAULT_EPISODES, cases_of(cell), {}
+    rows = request.rows(len(cases))
     for case in cases:
-        evaluator, start = _evaluator(checkpoint, cell, networks, case, n, seed)
+        evaluator, start = _evaluator(checkpoint, cell, networks, case, n, request.seed)
         recorder = _Recorder(choice_rules.critic(HYSTERESIS), evaluator.batch.arm.dt, {}, [])
         run = evaluator.run(recorder, start=start)
         row = _row(case, run, recorder)
@@ -86,7 +84,6 @@ def run_cases(
         }
         rows.append(row)
         curves[case.id] = _curves(case, recorder, n)
-        on_row(len(rows), len(cases), row)
     return {
         "settings": {
             "hysteresis": HYSTERESIS,

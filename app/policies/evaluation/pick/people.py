@@ -27,7 +27,7 @@ from app.policies.checkpoints.trained_cell import cell_of
 from app.policies.evaluation.pick import selection_rules as choice_rules
 from app.policies.evaluation.pick.episodes import Episodes, Evaluator, settings_for
 from app.policies.evaluation.pick.tasks import settings_of
-from app.policies.evaluation.rows import OnRow, ignore_row
+from app.policies.evaluation.rows import EvaluationRequest, Json
 from app.policies.evaluation.statistics import wilson
 from app.policies.inference.task_selection import HYSTERESIS
 from app.policies.inference.value_networks import ValueNetworks, pick_preset_of
@@ -58,34 +58,27 @@ SMALL, LARGE = 5.0, 95.0
 class ChoiceBench:
     """Evaluate one checkpoint under several settings on episodes of one seed."""
 
-    def __init__(
-        self, checkpoint: Checkpoint, episodes: int | None, seed: int, on_row: OnRow
-    ) -> None:
+    def __init__(self, checkpoint: Checkpoint, request: EvaluationRequest) -> None:
         self._networks = ValueNetworks(checkpoint)
         self.cell = cell_of(checkpoint.manifest)
         self.usual = settings_for(CANDIDATES, pick_preset_of(checkpoint))
-        self._n, self._seed, self._on_row = episodes or DEFAULT_EPISODES, seed, on_row
+        self._request, self._n = request, request.episodes or DEFAULT_EPISODES
 
     def row(self, name: str, settings: PickSettings) -> tuple[dict[str, Any], dict[str, Any]]:
         """Return the result row of the settings, and the settings to state with it."""
-        evaluator = Evaluator(self._networks, self.cell, self._n, self._seed, settings)
+        evaluator = Evaluator(self._networks, self.cell, self._n, self._request.seed, settings)
         row = evaluator.run(choice_rules.critic(HYSTERESIS)).row(name)
         row["touched_at_rest"] = _touched_at_rest(evaluator.batch)
         return row, settings_of(evaluator)
 
     def all(self, rows: Mapping[str, PickSettings]) -> dict[str, Any]:
         """Return the result with one row per settings."""
-        done: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {}
+        stated: Json = {"hysteresis": HYSTERESIS}
+        results = self._request.rows(len(rows))
         for name, settings in rows.items():
-            done[name] = self.row(name, settings)
-            self._on_row(len(done), len(rows), done[name][0])
-        return {
-            "settings": {
-                "hysteresis": HYSTERESIS,
-                **{name: stated for name, (_, stated) in done.items()},
-            },
-            "results": [row for row, _ in done.values()],
-        }
+            row, stated[name] = self.row(name, settings)
+            results.append(row)
+        return {"settings": stated, "results": results}
 
 
 def _touched_at_rest(batch: PickBatch) -> dict[str, float]:
@@ -101,11 +94,9 @@ def _sized(work: HumanMotionConfig, percentile: float, pelvis: float) -> HumanMo
     return replace(work, bodies=(percentile_body(percentile, pelvis=pelvis),))
 
 
-def run_people(
-    checkpoint: Checkpoint, *, episodes: int | None, seed: int, on_row: OnRow = ignore_row
-) -> dict[str, Any]:
+def run_people(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
     """Evaluate beside 0 to 4 people and people of several sizes."""
-    bench = ChoiceBench(checkpoint, episodes, seed, on_row)
+    bench = ChoiceBench(checkpoint, request)
     usual, pelvis = bench.usual, bench.cell.human.pelvis_height
     small, large = (_sized(usual.work, share, pelvis) for share in (SMALL, LARGE))
 
@@ -123,9 +114,7 @@ def run_people(
     return bench.all(rows)
 
 
-def run_rest(
-    checkpoint: Checkpoint, *, episodes: int | None, seed: int, on_row: OnRow = ignore_row
-) -> dict[str, Any]:
+def run_rest(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
     """Evaluate one random target beside people who stand still in any posture.
 
     A timeout is *blocked* where the configuration at the object is closer to the person than a
@@ -140,14 +129,12 @@ def run_rest(
         "reaches": replace(still, motion="reaches"),
         "stops": replace(usual.work, at_rest=1.0, off_task=0.5),
     }
-    results = []
+    results, n = request.rows(len(rows)), request.episodes or DEFAULT_EPISODES
     for name, work in rows.items():
         settings = replace(usual, work=work)
-        evaluator = Evaluator(networks, cell, episodes or DEFAULT_EPISODES, seed, settings)
+        evaluator = Evaluator(networks, cell, n, request.seed, settings)
         run = evaluator.run(choice_rules.fixed(0))
-        row = run.row(name) | _timeouts(evaluator.batch, run)
-        results.append(row)
-        on_row(len(results), len(rows), row)
+        results.append(run.row(name) | _timeouts(evaluator.batch, run))
     return {"settings": settings_of(evaluator), "results": results}
 
 
@@ -172,11 +159,9 @@ def _timeouts(batch: PickBatch, run: Episodes) -> dict[str, dict[str, float]]:
     return {"timeout_blocked": wilson(int(blocked), n), "timeout_alone": wilson(alone, n)}
 
 
-def run_yielding(
-    checkpoint: Checkpoint, *, episodes: int | None, seed: int, on_row: OnRow = ignore_row
-) -> dict[str, Any]:
+def run_yielding(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
     """Evaluate beside people that yield to the arm with strength 0, 0.5 and 1."""
-    bench = ChoiceBench(checkpoint, episodes, seed, on_row)
+    bench = ChoiceBench(checkpoint, request)
     usual = bench.usual
 
     def beside(strength: float) -> PickSettings:
@@ -203,35 +188,28 @@ def beside_recordings(
     return replace(settings, work=replace(settings.work, motion="recorded", recorded=placed))
 
 
-def run_mocap(
-    checkpoint: Checkpoint,
-    *,
-    episodes: int | None,
-    seed: int,
-    motions: Sequence[Motion] = (),
-    on_row: OnRow = ignore_row,
-) -> dict[str, Any]:
+def run_mocap(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
     """Evaluate beside recorded people, with the library's people as the first row.
 
     Raises:
         InvalidInput: There is no recorded motion, or more than ``MAX_RECORDED_S``.
     """
-    if not motions:
+    if not request.motions:
         raise InvalidInput("motions", 0, "must hold at least one recording")
-    bench = ChoiceBench(checkpoint, episodes, seed, on_row)
+    bench = ChoiceBench(checkpoint, request)
     usual, cell = bench.usual, bench.cell
-    files = sorted({motion.name for motion in motions})
-    rows = {"library": usual, "recorded": beside_recordings(usual, motions, cell)}
+    files = sorted({motion.name for motion in request.motions})
+    rows = {"library": usual, "recorded": beside_recordings(usual, request.motions, cell)}
     if len(files) > 1:
         rows |= {
             f"recorded {name}": beside_recordings(
-                usual, [one for one in motions if one.name == name], cell
+                usual, [one for one in request.motions if one.name == name], cell
             )
             for name in files
         }
     result = bench.all(rows)
     result["settings"]["motions"] = [
         {"source": motion.source, "seconds": round(float(motion.times[-1]), 2)}
-        for motion in motions
+        for motion in request.motions
     ]
     return result

@@ -25,14 +25,13 @@ succeed.
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any
 
 from app.policies.checkpoints.checkpoint import Checkpoint
 from app.policies.checkpoints.trained_cell import cell_of
 from app.policies.evaluation.pick import selection_rules as choice_rules
 from app.policies.evaluation.pick.episodes import Evaluator, settings_for
 from app.policies.evaluation.pick.tasks import settings_of
-from app.policies.evaluation.rows import OnRow, ignore_row
+from app.policies.evaluation.rows import EvaluationRequest, Json
 from app.policies.evaluation.statistics import mean_of, wilson
 from app.policies.inference.task_selection import HYSTERESIS
 from app.policies.inference.value_networks import ValueNetworks, pick_preset_of
@@ -42,7 +41,6 @@ from app.sim.pick.monitored_batch import AMONG_HANDS, MonitoredPickBatch
 from app.sim.safety.layer import SafetySettings
 from app.sim.scenario.monitoring import MonitoredEpisodes, MonitoringSettings, joined
 
-Json = dict[str, Any]
 DEFAULT_EPISODES = 20_000
 TIME_LIMIT_S = 20.0
 """Time limit of an episode [s]."""
@@ -149,18 +147,15 @@ def row_of(name: str, runs: MonitoredEpisodes, bare: MonitoredEpisodes | None) -
     }
 
 
-def run_ssm(
-    checkpoint: Checkpoint, *, episodes: int | None, seed: int, on_row: OnRow = ignore_row
-) -> Json:
+def run_ssm(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
     """Evaluate picks under the safety layer, and the same episodes without it."""
-    picks = MonitoredPicks(checkpoint, episodes or DEFAULT_EPISODES, seed)
+    picks = MonitoredPicks(checkpoint, request.episodes or DEFAULT_EPISODES, request.seed)
     runs: dict[str, MonitoredEpisodes] = {}
-    rows: list[Json] = []
+    rows = request.rows(len(CONDITIONS))
     for name, condition in CONDITIONS.items():
         runs[name] = picks.run(condition)
         bare = None if condition.against is None else runs[condition.against]
         rows.append(row_of(name, runs[name], bare))
-        on_row(len(rows), len(CONDITIONS), rows[-1])
     stated = {name: one.safety.describe() for name, one in CONDITIONS.items() if one.active}
     return {
         "settings": {

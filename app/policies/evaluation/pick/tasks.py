@@ -22,7 +22,7 @@ from app.policies.evaluation.pick.episodes import (
     time_limits,
 )
 from app.policies.evaluation.pick.recorded_people import recheck
-from app.policies.evaluation.rows import OnRow, ignore_row
+from app.policies.evaluation.rows import EvaluationRequest, Json
 from app.policies.evaluation.statistics import mcnemar
 from app.policies.inference.task_selection import HYSTERESIS
 from app.policies.inference.value_networks import ValueNetworks, pick_preset_of
@@ -83,18 +83,16 @@ def settings_of(evaluator: Evaluator) -> dict[str, object]:
     }
 
 
-def run_single(
-    checkpoint: Checkpoint, *, episodes: int | None, seed: int, on_row: OnRow = ignore_row
-) -> dict[str, object]:
+def run_single(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
     """Evaluate one random target per episode."""
-    evaluators, rows = evaluators_of(checkpoint, (1, 1), episodes, seed), []
+    evaluators = evaluators_of(checkpoint, (1, 1), request.episodes, request.seed)
+    rows = request.rows(len(evaluators))
     trajectories: tuple[Trajectory, ...] = ()
     for name, evaluator in evaluators.items():
         n_recorded = 0 if trajectories else min(N_RECHECKED, evaluator.batch.n_envs)
         outcome = evaluator.run(choice_rules.fixed(0), n_recorded)
         trajectories = trajectories or outcome.trajectories
         rows.append(outcome.row(f"{name} policy".lstrip()))
-        on_row(len(rows), len(evaluators), rows[-1])
     usual = evaluators[""]
     return {
         "settings": settings_of(usual),
@@ -150,17 +148,15 @@ class ChoiceRun:
         ]
 
 
-def run_choice(
-    checkpoint: Checkpoint, *, episodes: int | None, seed: int, on_row: OnRow = ignore_row
-) -> dict[str, object]:
+def run_choice(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
     """Evaluate the selection among 2-3 random targets, and other rules on the same episodes."""
-    evaluators, rows = evaluators_of(checkpoint, (2, 3), episodes, seed), []
-    runs = {name: ChoiceRun(one, seed, name) for name, one in evaluators.items()}
+    evaluators = evaluators_of(checkpoint, (2, 3), request.episodes, request.seed)
+    rows = request.rows(len(evaluators) * (len(OTHER_RULES) + 2))
+    runs = {name: ChoiceRun(one, request.seed, name) for name, one in evaluators.items()}
     for name, run in runs.items():
         n_recorded = 0 if name else min(N_RECHECKED, evaluators[name].batch.n_envs)
         for row in run.rows(n_recorded):
             rows.append(row)
-            on_row(len(rows), len(runs) * (len(OTHER_RULES) + 2), row)
     usual = evaluators[""]
     return {
         "settings": {**settings_of(usual), "hysteresis": HYSTERESIS},
@@ -170,9 +166,7 @@ def run_choice(
     }
 
 
-def run_choice_hard(
-    checkpoint: Checkpoint, *, episodes: int | None, seed: int, on_row: OnRow = ignore_row
-) -> dict[str, object]:
+def run_choice_hard(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
     """Evaluate the selection beside two people, faster people, and two faster people."""
     usual = settings_for((2, 3), pick_preset_of(checkpoint))
     fast = replace(usual, work=replace(usual.work, pace=FASTER))
@@ -182,15 +176,15 @@ def run_choice_hard(
         "two-people-faster": replace(fast, people=PAIR),
     }
     networks, cell = ValueNetworks(checkpoint), cell_of(checkpoint.manifest)
-    rows: list[dict[str, object]] = []
+    rows = request.rows(len(settings) * (len(OTHER_RULES) + 2))
     paired: list[dict[str, object]] = []
     stated: dict[str, object] = {"hysteresis": HYSTERESIS}
+    n = request.episodes or DEFAULT_EPISODES
     for name, one in settings.items():
-        evaluator = Evaluator(networks, cell, episodes or DEFAULT_EPISODES, seed, one)
-        run = ChoiceRun(evaluator, seed, name)
+        evaluator = Evaluator(networks, cell, n, request.seed, one)
+        run = ChoiceRun(evaluator, request.seed, name)
         for row in run.rows():
             rows.append(row)
-            on_row(len(rows), len(settings) * (len(OTHER_RULES) + 2), row)
         paired += run.paired()
         stated[name] = {**settings_of(evaluator), "pace": one.work.pace}
     return {"settings": stated, "results": rows, "paired": paired}

@@ -26,7 +26,7 @@ from app.policies.checkpoints.checkpoint import Checkpoint
 from app.policies.evaluation.pick import selection_rules as choice_rules
 from app.policies.evaluation.pick.episodes import Index, Seen, Sight, seen_exactly
 from app.policies.evaluation.pick.tasks import evaluators_of, settings_of
-from app.policies.evaluation.rows import OnRow, ignore_row
+from app.policies.evaluation.rows import EvaluationRequest, Json
 from app.policies.inference.task_selection import HYSTERESIS
 from app.sim.core.arrays import Vec
 from app.sim.human import model as human
@@ -158,21 +158,20 @@ class KeypointObserver:
             self.wrist_errors.append(float(np.linalg.norm(one[wrist] - other[wrist])))
 
 
-def run_tracker(
-    checkpoint: Checkpoint, *, episodes: int | None, seed: int, on_row: OnRow = ignore_row
-) -> dict[str, object]:
+def run_tracker(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
     """Evaluate task selection among 2-3 random targets with people observed by a tracker."""
-    evaluator = evaluators_of(checkpoint, (2, 3), episodes or DEFAULT_EPISODES, seed)[""]
-    rule, results = choice_rules.critic(HYSTERESIS), []
+    n = request.episodes or DEFAULT_EPISODES
+    evaluator = evaluators_of(checkpoint, (2, 3), n, request.seed)[""]
+    rule = choice_rules.critic(HYSTERESIS)
     looks: dict[str, Seen] = {"exact": seen_exactly}
-    looks |= {name: KeypointObserver(row, seed) for name, row in ROWS.items()}
+    looks |= {name: KeypointObserver(row, request.seed) for name, row in ROWS.items()}
+    results = request.rows(len(looks))
     for name, look in looks.items():
         row = evaluator.run(rule, seen=look).row(name)
         errors = np.array(look.wrist_errors if isinstance(look, KeypointObserver) else [0.0])
         row["wrist_error_median_mm"] = 1e3 * float(np.median(errors))
         row["wrist_error_p95_mm"] = 1e3 * float(np.percentile(errors, 95))
         results.append(row)
-        on_row(len(results), len(looks), row)
     return {
         "settings": {
             **settings_of(evaluator),

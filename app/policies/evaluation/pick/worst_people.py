@@ -10,13 +10,12 @@ import json
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from app.policies.checkpoints.checkpoint import Checkpoint
 from app.policies.evaluation.pick.people import ChoiceBench
-from app.policies.evaluation.rows import OnRow, ignore_row
+from app.policies.evaluation.rows import EvaluationRequest, Json
 from app.sim.cells.cell import Cell
 from app.sim.core.arrays import Vec
 from app.sim.human.model import Hand
@@ -106,11 +105,9 @@ def stored_motions() -> tuple[HandMotion, ...]:
     )
 
 
-def run_worst(
-    checkpoint: Checkpoint, *, episodes: int | None, seed: int, on_row: OnRow = ignore_row
-) -> dict[str, Any]:
+def run_worst(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
     """Evaluate beside the people who were found, together and one by one."""
-    bench, found = ChoiceBench(checkpoint, episodes, seed, on_row), stored_motions()
+    bench, found = ChoiceBench(checkpoint, request), stored_motions()
     rows = {"library": bench.usual, "found": beside(bench.usual, bench.cell, found)}
     for number, one in enumerate(found, start=1):
         rows[f"found-{number}"] = beside(bench.usual, bench.cell, [one])

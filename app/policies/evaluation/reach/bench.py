@@ -20,7 +20,7 @@ from app.policies.evaluation.reach.episodes import (
     run_episodes,
     target_goals,
 )
-from app.policies.evaluation.rows import OnRow, ignore_row
+from app.policies.evaluation.rows import Json, OnRow, ignore_row
 from app.policies.inference.controllers import (
     ROLLOUT,
     Controller,
@@ -34,8 +34,6 @@ from app.sim.cells.people import CylinderPerson
 from app.sim.core.arrays import Vec
 from app.sim.reach.batch import ReachSettings, goal_region_of, stated_rules
 from app.sim.scenario.kernels.episode import SUCCESS_DISTANCE
-
-Json = dict[str, Any]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

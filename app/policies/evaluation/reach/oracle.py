@@ -31,7 +31,7 @@ import numpy as np
 from app.policies.checkpoints.checkpoint import Checkpoint
 from app.policies.evaluation.reach.bench import ReachBench
 from app.policies.evaluation.reach.episodes import N_ENVS
-from app.policies.evaluation.rows import OnRow, ignore_row
+from app.policies.evaluation.rows import EvaluationRequest, Json
 from app.policies.evaluation.statistics import wilson
 from app.policies.inference.controllers import Controller, controller_of
 from app.sim.cells.cell import Cell
@@ -45,7 +45,6 @@ from app.sim.reach.oracle_search import (
 )
 from app.sim.robot.capsules import load_robot_capsules
 
-Json = dict[str, Any]
 PER_TARGET = 100
 """Episodes of each target (docs/method.md 2.6)."""
 SCRIPTED = (64, 256)
@@ -97,13 +96,11 @@ class StagedSearch:
     Args:
         batch: From :func:`started`.
         seed: Seed of the search.
-        n_stages: Number of rows reported.
-        on_row: Callback for each finished stage.
+        rows: Receives a row of each stage.
     """
 
-    def __init__(self, batch: ReachBatch, seed: int, n_stages: int, on_row: OnRow) -> None:
-        self.search, self._n_stages, self._on_row = OracleSearch(batch, seed), n_stages, on_row
-        self.rows: list[Json] = []
+    def __init__(self, batch: ReachBatch, seed: int, rows: list[Json]) -> None:
+        self.search, self._rows = OracleSearch(batch, seed), rows
 
     def stage(self, name: str, resimulate: Callable[[], None]) -> None:
         """Run a stage and report the episodes solved so far."""
@@ -116,8 +113,7 @@ class StagedSearch:
             "doomed": wilson(int((found.untouched == 0).sum()), self.search.n),
             "resimulations": int(found.n.sum()),
         }
-        self.rows.append(row)
-        self._on_row(len(self.rows), self._n_stages, row)
+        self._rows.append(row)
 
     def run(self, controller: Controller) -> None:
         """Run all stages."""
@@ -156,27 +152,25 @@ def verdict(search: OracleSearch, never: Any, targets: Vec, goals: Vec) -> Json:
     }
 
 
-def run_oracle(
-    checkpoint: Checkpoint, *, episodes: int | None, seed: int, on_row: OnRow = ignore_row
-) -> Json:
+def run_oracle(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
     """Search for solutions of the episodes of ``reach-targets``."""
-    bench = ReachBench(checkpoint, seed)
-    goals = bench.target_goals((episodes or PER_TARGET) * len(bench.targets))
+    bench = ReachBench(checkpoint, request.seed)
+    goals = bench.target_goals((request.episodes or PER_TARGET) * len(bench.targets))
     cell, settings = bench.cell, bench.usual
-    batch = started(cell, settings, goals, seed)
-    n_stages = len(SCRIPTED) + 4
-    search = StagedSearch(batch, seed, n_stages, on_row)
+    batch = started(cell, settings, goals, request.seed)
+    stages = request.rows(len(SCRIPTED) + 4)
+    search = StagedSearch(batch, request.seed, stages)
     search.run(controller_of(bench.actor, "direct"))
     arm = batch.arm
-    soonest = soonest_arrivals(cell, settings, goals, seed)
+    soonest = soonest_arrivals(cell, settings, goals, request.seed)
     base = load_robot_capsules(cell.robot.tool_length, cell.robot.tool_radius).radius[0]
     walks = future_cylinders(batch, round(settings.time_limit_s / arm.dt))
     never = provably_unsolvable(
         walks, goals, soonest, arm.dt, cell.robot.tool_radius, float(base)
     )
     row = verdict(search.search, never, bench.targets, goals)
-    on_row(n_stages, n_stages, row)
+    stages.append(row)
     variant = replace(bench.variant("oracle", goals), goal_set="training targets in turn")
     bench.add(row, variant)
-    result = bench.result(search_seed=seed, soonest_tries=SOONEST_TRIES)
-    return {**result, "stages": search.rows}
+    result = bench.result(search_seed=request.seed, soonest_tries=SOONEST_TRIES)
+    return {**result, "stages": stages[:-1]}

@@ -14,11 +14,10 @@ Source: thesis 4.4.3; docs/method.md 2.6, and 4 for several people.
 
 from dataclasses import replace
 from itertools import product
-from typing import Any
 
 from app.policies.checkpoints.checkpoint import Checkpoint
 from app.policies.evaluation.reach.bench import ReachBench, pedestrian_of, suffix_of
-from app.policies.evaluation.rows import OnRow, ignore_row
+from app.policies.evaluation.rows import EvaluationRequest, Json
 from app.policies.inference.controllers import InferenceMode, inference_modes_of
 from app.sim.cells.cell import Cell
 from app.sim.cells.people import FixedSpeedWalker
@@ -41,12 +40,10 @@ SPEEDS = (0.25, 0.5, 1.0)
 """Speeds of people [m/s] (docs/method.md 2.6)."""
 
 
-def run_people(
-    checkpoint: Checkpoint, *, episodes: int | None, seed: int, on_row: OnRow = ignore_row
-) -> dict[str, Any]:
+def run_people(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
     """Evaluate beside zero to four pedestrians."""
-    bench = ReachBench(checkpoint, seed, on_row)
-    goals = bench.target_goals(episodes or DEFAULT_EPISODES)
+    bench = ReachBench(checkpoint, request.seed, request.on_row)
+    goals = bench.target_goals(request.episodes or DEFAULT_EPISODES)
     allowed = inference_modes_of(bench.actor)
     variants = [
         bench.variant(
@@ -66,12 +63,10 @@ def run_people(
     return bench.result()
 
 
-def run_constant(
-    checkpoint: Checkpoint, *, episodes: int | None, seed: int, on_row: OnRow = ignore_row
-) -> dict[str, Any]:
+def run_constant(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
     """Evaluate beside people whose speed and radius are constant in each episode."""
-    bench = ReachBench(checkpoint, seed, on_row)
-    goals = bench.target_goals(episodes or TARGET_EPISODES)
+    bench = ReachBench(checkpoint, request.seed, request.on_row)
+    goals = bench.target_goals(request.episodes or TARGET_EPISODES)
     bench.measure(
         [
             bench.variant(kind + suffix_of(mode), goals, mode, people=(kind,))
@@ -81,12 +76,10 @@ def run_constant(
     return bench.result()
 
 
-def run_speeds(
-    checkpoint: Checkpoint, *, episodes: int | None, seed: int, on_row: OnRow = ignore_row
-) -> dict[str, Any]:
+def run_speeds(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
     """Evaluate beside people of a given speed."""
-    bench = ReachBench(checkpoint, seed, on_row)
-    goals = bench.target_goals(episodes or DEFAULT_EPISODES)
+    bench = ReachBench(checkpoint, request.seed, request.on_row)
+    goals = bench.target_goals(request.episodes or DEFAULT_EPISODES)
     bench.measure(
         [
             replace(

@@ -26,7 +26,7 @@ import numpy as np
 from app.policies.checkpoints.checkpoint import Checkpoint
 from app.policies.evaluation.reach.bench import ReachBench, Variant, suffix_of
 from app.policies.evaluation.reach.episodes import ReachEpisodes, against
-from app.policies.evaluation.rows import OnRow, ignore_row
+from app.policies.evaluation.rows import EvaluationRequest, Json
 from app.sim.core.arrays import Vec
 
 DEFAULT_EPISODES = 5000
@@ -50,11 +50,10 @@ def between(episodes: ReachEpisodes, targets: Vec) -> list[dict[str, Any]]:
     ]
 
 
-def run_random(
-    checkpoint: Checkpoint, *, episodes: int | None, seed: int, on_row: OnRow = ignore_row
-) -> dict[str, Any]:
+def run_random(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
     """Evaluate on random goals in the box."""
-    bench, n = ReachBench(checkpoint, seed, on_row), episodes or DEFAULT_EPISODES
+    bench = ReachBench(checkpoint, request.seed, request.on_row)
+    n = request.episodes or DEFAULT_EPISODES
     usual, grid, goals = bench.usual, bench.target_goals(n), bench.random_goals(n)
     at_targets: dict[str, ReachEpisodes] = {}
 

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from app.policies.checkpoints.checkpoint import Checkpoint
 from app.policies.evaluation.reach.bench import ReachBench
 from app.policies.evaluation.reach.episodes import run_to_end
-from app.policies.evaluation.rows import OnRow, ignore_row
+from app.policies.evaluation.rows import EvaluationRequest, Json
 from app.policies.evaluation.statistics import wilson
 from app.policies.inference.controllers import Controller, controller_of
 from app.sim.core.arrays import Vec
@@ -179,13 +179,11 @@ def shown_episode(paths: Paths, dt: float) -> dict[str, Any] | None:
     return {"episode": e, "dt_s": dt, **rounded}
 
 
-def run_smoothness(
-    checkpoint: Checkpoint, *, episodes: int | None, seed: int, on_row: OnRow = ignore_row
-) -> dict[str, Any]:
+def run_smoothness(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
     """Measure the smoothness of a policy's joint trajectories."""
-    bench = ReachBench(checkpoint, seed, on_row)
-    settings, n = bench.usual, episodes or DEFAULT_EPISODES
-    batch, goals = ReachBatch(bench.cell, n, seed, settings), bench.target_goals(n)
+    bench = ReachBench(checkpoint, request.seed, request.on_row)
+    settings, n = bench.usual, request.episodes or DEFAULT_EPISODES
+    batch, goals = ReachBatch(bench.cell, n, request.seed, settings), bench.target_goals(n)
     paths = record_paths(batch, controller_of(bench.actor, "direct"), goals)
     row = {
         "name": f"degree-{settings.action.degree}",

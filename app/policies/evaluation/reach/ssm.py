@@ -45,7 +45,6 @@ count contacts with a moving and with a stationary robot.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -67,12 +66,11 @@ from app.policies.evaluation.reach.ssm_rows import (
     crossing_row,
     random_row,
 )
-from app.policies.evaluation.rows import OnRow, ignore_row
+from app.policies.evaluation.rows import EvaluationRequest, Json
 from app.policies.inference.controllers import Controller, RolloutController, controller_of
 from app.policies.inference.reach_policy import ReachPolicy
 from app.policies.inference.rollout import NO_CONSTRAINT, can_roll_out, ssm_constraint_of
 from app.sim.cells.cell import Cell
-from app.sim.mocap.importer import Motion
 from app.sim.reach.batch import ReachSettings
 from app.sim.reach.crossings import N_CROSSINGS, SEED, crossings, recorded_crossings
 from app.sim.reach.monitored.batch import HORIZON_S, MonitoredReachBatch
@@ -81,7 +79,6 @@ from app.sim.safety.layer import SafetySettings, safety_settings
 from app.sim.scenario.kernels.episode import TIMEOUT
 from app.sim.scenario.monitoring import MonitoredEpisodes, joined, selected
 
-Json = dict[str, Any]
 WITH_ROLLOUT = "policy-rollout"
 """Row of the policy with rollout."""
 DIRECTED = "-directed"
@@ -92,19 +89,6 @@ RANDOM_S = 25.0
 """Time limit of a random episode [s], the longer one of docs/method.md 2.6."""
 N_RECORDED = 60
 """Number of recorded crossings."""
-
-
-class _Rows:
-    """Collect and report rows."""
-
-    def __init__(self, total: int, on_row: OnRow) -> None:
-        self.rows: list[Json] = []
-        self._total, self._on_row = total, on_row
-
-    def add(self, row: Json) -> None:
-        """Add a row."""
-        self.rows.append(row)
-        self._on_row(len(self.rows), self._total, row)
 
 
 def controllers_by_row(
@@ -125,17 +109,17 @@ def controllers_by_row(
 
 
 def compare(
-    comparison: Comparison, controllers: Mapping[str, Controller], rows: _Rows, suffix: str = ""
+    comparison: Comparison, controllers: Mapping[str, Controller], rows: list[Json], suffix: str
 ) -> dict[str, CrossingRuns]:
     """Run policies, planners and the oracle over a set of crossings; add and return rows."""
     found, limit = {}, comparison.settings.time_limit_s
     for name, run in comparison.run(controllers).items():
         found[name] = run()
-        rows.add(crossing_row(name + suffix, found[name].episodes, limit))
+        rows.append(crossing_row(name + suffix, found[name].episodes, limit))
     rng = np.random.default_rng(comparison.seed)
     best = best_resimulations(comparison, comparison.settings.n_resimulations, rng)
     for name, episodes in best.items():
-        rows.add(crossing_row(name + suffix, episodes, limit))
+        rows.append(crossing_row(name + suffix, episodes, limit))
         found[name] = CrossingRuns(episodes=episodes, overrides=[])
     return found
 
@@ -156,31 +140,19 @@ def random_episodes(
     return joined(found)
 
 
-def run_ssm(
-    checkpoint: Checkpoint,
-    *,
-    episodes: int | None,
-    seed: int,
-    motions: Sequence[Motion] = (),
-    on_row: OnRow = ignore_row,
-) -> Json:
+def run_ssm(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
     """Compare a policy with planners under the safety layer.
 
-    Args:
-        checkpoint: Policy.
-        episodes: Number of random episodes, by default 10,000; the number of crossings is 200,
-            or ``episodes`` if that is less.
-        seed: Seed of random episodes and planners; the crossings have their own.
-        motions: Recordings without artefacts for a second set of crossings; may be empty.
-        on_row: Callback for each finished row.
+    The request has the number of random episodes, by default 10,000; that of the crossings is
+    200, or the same if that is less. Recorded motion gives a second set of crossings.
     """
-    n_random = episodes or RANDOM_EPISODES
+    n_random = request.episodes or RANDOM_EPISODES
     actor, cell = ReachPolicy(checkpoint), cell_of(checkpoint.manifest)
     reach = ReachSettings(action=actor.action, observation=actor.view)
     n = min(N_CROSSINGS, n_random)
     sets = {"": crossings(cell, n)}
-    if motions:
-        sets["-recorded"] = recorded_crossings(cell, motions, min(N_RECORDED, n_random))
+    if request.motions:
+        sets["-recorded"] = recorded_crossings(cell, request.motions, min(N_RECORDED, n_random))
     assumed = safety_settings(cell)
     layers = {"": assumed, DIRECTED: replace(assumed, use_measured_velocity=True)}
     controllers = {
@@ -188,11 +160,11 @@ def run_ssm(
         for end, safety in layers.items()
     }
     each = sum(len(SETTINGS.planners) + len(some) + 5 for some in controllers.values())
-    rows = _Rows(len(sets) * each + 3, on_row)
+    rows = request.rows(len(sets) * each + 3)
     result: Json = {"paired": {}, "seconds": {}, "example": {}}
     for name, crossed in sets.items():
         for end, safety in layers.items():
-            comparison = Comparison(cell, crossed, reach, safety, seed, SETTINGS)
+            comparison = Comparison(cell, crossed, reach, safety, request.seed, SETTINGS)
             found = compare(comparison, controllers[end], rows, name + end)
             result["paired"] |= paired(found, list(controllers[end]), name + end)
             if not name:
@@ -209,11 +181,12 @@ def run_ssm(
     }
     longer = replace(reach, time_limit_s=RANDOM_S)
     for name, (acts, safety) in trials.items():
-        batch = MonitoredReachBatch(cell, N_ENVS, seed, longer, safety)
-        rows.add(random_row(name, random_episodes(cell, batch, acts, n_random, seed)))
+        batch = MonitoredReachBatch(cell, N_ENVS, request.seed, longer, safety)
+        runs = random_episodes(cell, batch, acts, n_random, request.seed)
+        rows.append(random_row(name, runs))
     return {
-        "settings": stated(assumed, n, [motion.source for motion in motions]),
-        "results": rows.rows,
+        "settings": stated(assumed, n, [motion.source for motion in request.motions]),
+        "results": rows,
         **result,
     }
 

@@ -19,14 +19,13 @@ the start rule of its people.
 """
 
 from itertools import product
-from typing import Any
 
 import numpy as np
 
 from app.policies.checkpoints.checkpoint import Checkpoint
 from app.policies.evaluation.reach.bench import ReachBench, Variant, suffix_of
 from app.policies.evaluation.reach.episodes import ReachEpisodes
-from app.policies.evaluation.rows import OnRow, ignore_row
+from app.policies.evaluation.rows import EvaluationRequest, Json
 from app.policies.evaluation.statistics import wilson
 from app.sim.core.arrays import Vec
 from app.sim.reach.batch import StartRule
@@ -39,7 +38,6 @@ END_STEP_S = 0.1
 """Width of the time intervals in which ends are counted [s]."""
 N_WORST = 5
 """Number of targets listed as the worst."""
-Json = dict[str, Any]
 
 
 def by_target(episodes: ReachEpisodes, targets: Vec, base_height: float) -> list[Json]:
@@ -88,12 +86,10 @@ def reached_after_contact(episodes: ReachEpisodes) -> dict[str, float]:
     return wilson(int(reached.sum()), len(reached))
 
 
-def run_targets(
-    checkpoint: Checkpoint, *, episodes: int | None, seed: int, on_row: OnRow = ignore_row
-) -> Json:
+def run_targets(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
     """Evaluate on all targets of the grid under three start rules."""
-    bench = ReachBench(checkpoint, seed, on_row)
-    per_target = episodes or PER_TARGET
+    bench = ReachBench(checkpoint, request.seed, request.on_row)
+    per_target = request.episodes or PER_TARGET
     goals = bench.target_goals(per_target * len(bench.targets))
 
     def by_targets(variant: Variant, episodes: ReachEpisodes) -> Json:

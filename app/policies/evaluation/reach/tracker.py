@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 from app.policies.checkpoints.checkpoint import Checkpoint
 from app.policies.evaluation.reach.bench import ReachBench, Variant, pedestrian_of, suffix_of
 from app.policies.evaluation.reach.episodes import ReachEpisodes
-from app.policies.evaluation.rows import OnRow, ignore_row
+from app.policies.evaluation.rows import EvaluationRequest, Json
 from app.policies.inference.controllers import Controller, controller_of
 from app.sim.core.arrays import Vec
 from app.sim.people.kernels.pedestrian import AGE, GROWTH, N_PAST, PAST_S, VX, VY, R, X, Y
@@ -139,22 +139,22 @@ class CylinderObserver:
         return past
 
 
-def run_tracker(
-    checkpoint: Checkpoint, *, episodes: int | None, seed: int, on_row: OnRow = ignore_row
-) -> dict[str, Any]:
+def run_tracker(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
     """Evaluate on all targets with people observed through a tracker.
 
     Raises:
         InvalidInput: The checkpoint's cell has no pedestrian.
     """
-    bench = ReachBench(checkpoint, seed, on_row)
+    bench = ReachBench(checkpoint, request.seed, request.on_row)
     pedestrian_of(bench.cell)
-    goals = bench.target_goals(episodes or DEFAULT_EPISODES)
+    goals = bench.target_goals(request.episodes or DEFAULT_EPISODES)
     variants = [bench.variant("exact", goals)]
     variants += [
         replace(
             bench.variant(name + suffix_of(mode), goals, mode),
-            controller=CylinderObserver(controller_of(bench.actor, mode), ROWS[name], seed),
+            controller=CylinderObserver(
+                controller_of(bench.actor, mode), ROWS[name], request.seed
+            ),
             stated={"tracker": asdict(ROWS[name])},
         )
         for mode in bench.direct_modes

@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 
 from app.policies.checkpoints.checkpoint import Checkpoint
-from app.policies.evaluation.rows import OnRow, ignore_row
+from app.policies.evaluation.rows import EvaluationRequest, Json
 from app.policies.evaluation.statistics import wilson
 from app.sim.safety.adversarial_trials import TrialResult, TrialSettings, run_trial
 from app.sim.safety.layer import SafetySettings
@@ -91,34 +91,23 @@ def stated(trial: TrialSettings) -> Mapping[str, Any]:
     }
 
 
-def run_safety(
-    _checkpoint: Checkpoint | None,
-    *,
-    episodes: int | None,
-    seed: int,
-    on_row: OnRow = ignore_row,
-) -> dict[str, Any]:
+def run_safety(_checkpoint: Checkpoint | None, request: EvaluationRequest) -> Json:
     """Evaluate the safety layer beside adversarial people, without a policy.
 
-    Args:
-        _checkpoint: Not used; all protocols have the same signature.
-        episodes: Number of episodes inside the assumptions, by default 100,000; every other
-            row runs a tenth of that.
-        seed: Seed of the episodes.
-        on_row: Called with each row when it is complete.
+    The request has the number of episodes inside the assumptions, by default 100,000; every
+    other row runs a tenth of that.
     """
-    n_inside = episodes or DEFAULT_EPISODES
-    rows, settings = [], {}
-    planned = trials()
+    n_inside = request.episodes or DEFAULT_EPISODES
+    planned, settings = trials(), {}
+    rows = request.rows(len(planned))
     for name, row_trials in planned.items():
         n = n_inside if name == "inside" else max(1, n_inside // OUTSIDE_SHARE)
         shares = [len(part) for part in np.array_split(np.arange(n), len(row_trials))]
         results = [
-            run_trial(trial, share, seed)
+            run_trial(trial, share, request.seed)
             for trial, share in zip(row_trials, shares, strict=True)
             if share
         ]
         rows.append(_row(name, results))
-        on_row(len(rows), len(planned), rows[-1])
         settings[name] = [stated(trial) for trial in row_trials]
     return {"settings": settings, "results": rows}

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from app.errors import InvalidInput
-from app.policies.evaluation.rows import OnRow, ignore_row
+from app.policies.evaluation.rows import EvaluationRequest, Json
 from app.policies.evaluation.sorting.episodes import (
     ENDLESS,
     Chooser,
@@ -114,44 +114,34 @@ def row_of(name: str, episodes: SortingEpisodes) -> dict[str, Any]:
     }
 
 
-def trials(
-    values: Values,
-    shape: SortingShape,
-    fail: Vec,
-    episodes: int | None,
-    seed: int,
-    on_row: OnRow = ignore_row,
-) -> dict[str, Any]:
+def trials(values: Values, shape: SortingShape, fail: Vec, request: EvaluationRequest) -> Json:
     """Evaluate a policy on the tests; tests that need a larger task are left out.
 
     Args:
         values: Q of every move, from observations.
         shape: Size of the task.
         fail: Failure probabilities of the clutter cells, shape (K,).
-        episodes: Number of episodes per test, by default 1000.
-        seed: Seed of the episodes; use one that was not used for tuning.
-        on_row: Callback for each finished row.
+        request: Its episodes are those of each test, by default 1000.
 
     Raises:
         InvalidInput: The task is too small for all six.
     """
-    n = episodes or DEFAULT_EPISODES
+    n = request.episodes or DEFAULT_EPISODES
     fitting = [test for test in TESTS if test.fits(shape)]
     if not fitting:
         raise InvalidInput("n_cells", shape.n_cells, "must be enough for one of the six tests")
-    alone, with_fallback = [], []
+    rows, with_fallback = request.rows(2 * len(fitting)), []
     for test in fitting:
-        one, other = run_test(test, greedy(values), shape, fail, n, seed)
-        alone.append(row_of(test.name, one))
+        one, other = run_test(test, greedy(values), shape, fail, n, request.seed)
+        rows.append(row_of(test.name, one))
         with_fallback.append(row_of(f"{test.name}-planner-fallback", other))
-        on_row(len(alone), 2 * len(fitting), alone[-1])
-    for k, row in enumerate(with_fallback):
-        on_row(len(alone) + k + 1, 2 * len(fitting), row)
+    for row in with_fallback:
+        rows.append(row)
     return {
         "episodes": n,
         "settings": {
             **settings_of(shape, fail),
             "left_out": [test.name for test in TESTS if test not in fitting],
         },
-        "results": [*alone, *with_fallback],
+        "results": rows,
     }

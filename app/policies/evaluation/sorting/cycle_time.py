@@ -27,7 +27,7 @@ from types import MappingProxyType
 from typing import Any
 
 from app.policies.checkpoints.checkpoint import Checkpoint
-from app.policies.evaluation.rows import OnRow, ignore_row
+from app.policies.evaluation.rows import EvaluationRequest, Json
 from app.policies.evaluation.sorting.full_tasks import FullTasks
 from app.policies.evaluation.sorting.order_rules import OrderRule, critic, nearest
 from app.policies.evaluation.sorting.people import (
@@ -87,22 +87,19 @@ def _per_hour(values: Vec) -> dict[str, Any]:
     return {"parts_per_hour": mean_of(values)}
 
 
-def run_cycle_time(
-    checkpoint: Checkpoint, *, episodes: int | None, seed: int, on_row: OnRow = ignore_row
-) -> dict[str, Any]:
+def run_cycle_time(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
     """Evaluate the throughput of a sorting cell."""
     networks, cell, settings = parts_of(checkpoint)
-    n = episodes or DEFAULT_TASKS
+    n = request.episodes or DEFAULT_TASKS
     runs: dict[str, FullTasks] = {}
-    rows: list[dict[str, Any]] = []
+    rows = request.rows(len(ROWS))
     shown: dict[str, Any] = {}
     for name, row in ROWS.items():
         picks = replace(settings, people=()) if row.alone else settings
-        bench = SortingBesidePeople(networks, cell, picks, n, seed, row.condition)
+        bench = SortingBesidePeople(networks, cell, picks, n, request.seed, row.condition)
         shown = shown or stated(bench.batch)
         runs[name] = bench.run(row.rule)
         rows.append(runs[name].row(name) | _per_hour(runs[name].throughput()))
-        on_row(len(rows), len(ROWS), rows[-1])
     safety = AMONG_HANDS.describe() | {
         "protective_distance [m]": [one.protective_distance for one in (AMONG_HANDS, DISTANCE)]
     }

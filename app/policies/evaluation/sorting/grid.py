@@ -23,7 +23,7 @@ from typing import Any
 
 import numpy as np
 
-from app.policies.evaluation.rows import OnRow, ignore_row
+from app.policies.evaluation.rows import EvaluationRequest, Json
 from app.policies.evaluation.sorting.episodes import (
     HORIZON_FACTOR,
     Chooser,
@@ -135,33 +135,23 @@ def share(hits: Index, of: Index) -> dict[str, float] | None:
     return wilson(int(hits.sum()), total) if total else None
 
 
-def grid(
-    values: Values,
-    shape: SortingShape,
-    fail: Vec,
-    episodes: int | None,
-    seed: int,
-    on_row: OnRow = ignore_row,
-) -> dict[str, Any]:
+def grid(values: Values, shape: SortingShape, fail: Vec, request: EvaluationRequest) -> Json:
     """Evaluate a policy on every pair.
 
     Args:
         values: Q of every move, from observations.
         shape: Size of the task.
         fail: Failure probabilities of the clutter cells, shape (K,).
-        episodes: Number of episodes per pair and row; by default 1000 for up to 10 cells and
-            300 for more.
-        seed: Seed of the episodes; use one that was not used for tuning.
-        on_row: Callback for each finished row.
+        request: Its episodes are those of each pair and row; by default 1000 for up to 10
+            cells and 300 for more.
     """
-    per_pair = episodes or episodes_for(shape)
+    per_pair = request.episodes or episodes_for(shape)
     pairs, least, choose = pairs_of(shape), least_success(shape), greedy(values)
-    rows: list[dict[str, Any]] = []
+    rows = request.rows(len(DECIDERS) * len(STARTS))
     for start, disturbed in STARTS.items():
-        found = run_kind(grid_batches(shape, fail, per_pair, seed, disturbed), choose)
+        found = run_kind(grid_batches(shape, fail, per_pair, request.seed, disturbed), choose)
         for end, part in zip(DECIDERS, found, strict=True):
             rows.append(row_of(start + end, part, pairs, least))
-            on_row(len(rows), len(DECIDERS) * len(STARTS), rows[-1])
     return {
         "episodes": per_pair,
         "settings": {**settings_of(shape, fail), "pairs": len(pairs), "least_success": least},

@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from app.policies.checkpoints.checkpoint import Checkpoint
 from app.policies.checkpoints.trained_cell import cell_of
 from app.policies.evaluation.pick.episodes import Sight, seen_exactly, settings_for
-from app.policies.evaluation.rows import OnRow, ignore_row
+from app.policies.evaluation.rows import EvaluationRequest, Json
 from app.policies.evaluation.sorting.full_tasks import FullTasks
 from app.policies.evaluation.sorting.order_rules import (
     ORDER_RULES,
@@ -326,22 +326,19 @@ def stated(batch: PickBatch) -> dict[str, Any]:
     }
 
 
-def run_sorting_people(
-    checkpoint: Checkpoint, *, episodes: int | None, seed: int, on_row: OnRow = ignore_row
-) -> dict[str, Any]:
+def run_sorting_people(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
     """Evaluate full sorting tasks beside a working person under every order rule."""
     networks, cell, settings = parts_of(checkpoint)
-    n = episodes or DEFAULT_TASKS
+    n = request.episodes or DEFAULT_TASKS
     runs: dict[str, FullTasks] = {}
-    rows: list[dict[str, Any]] = []
+    rows = request.rows(2 * len(ORDER_RULES))
     for suffix in ("", NO_SSM):
         condition = CellCondition(active=not suffix)
-        bench = SortingBesidePeople(networks, cell, settings, n, seed, condition)
+        bench = SortingBesidePeople(networks, cell, settings, n, request.seed, condition)
         for rule, choose in ORDER_RULES.items():
             name = rule + suffix
             runs[name] = bench.run(choose)
             rows.append(runs[name].row(name))
-            on_row(len(rows), 2 * len(ORDER_RULES), rows[-1])
     return {
         "settings": {**stated(bench.batch), "safety": AMONG_HANDS.describe()},
         "results": rows,

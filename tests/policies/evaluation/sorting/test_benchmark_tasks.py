@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from app.errors import InvalidInput
+from app.policies.evaluation.rows import EvaluationRequest
 from app.policies.evaluation.sorting.benchmark_tasks import (
     ScriptedInterferences,
     row_of,
@@ -86,9 +87,8 @@ def test_a_move_too_many_in_any_part_is_not_the_fewest():
 
 def test_rows_are_reported_in_order_and_the_fallback_ends_cycles():
     reported = []
-    found = trials(
-        values_of(in_circles, SHAPE), SHAPE, FAIL, 4, 6, lambda *what: reported.append(what)
-    )
+    request = EvaluationRequest(episodes=4, seed=6, on_row=lambda *what: reported.append(what))
+    found = trials(values_of(in_circles, SHAPE), SHAPE, FAIL, request)
     names = [test.name for test in TESTS]
     rows = {row["name"]: row for row in found["results"]}
     assert list(rows) == names + [f"{name}-planner-fallback" for name in names]
@@ -100,10 +100,10 @@ def test_rows_are_reported_in_order_and_the_fallback_ends_cycles():
 
 
 def test_tests_that_are_too_large_are_left_out_and_named():
-    small = SortingShape(n_cells=6, n_colours=1)
-    found = trials(values_of(exactly, small), small, np.zeros(6), 2, 6)
+    small, request = SortingShape(n_cells=6, n_colours=1), EvaluationRequest(episodes=2, seed=6)
+    found = trials(values_of(exactly, small), small, np.zeros(6), request)
     assert [row["name"] for row in found["results"][:2]] == ["test-1", "test-4"]
     assert found["settings"]["left_out"] == ["test-2", "test-3", "test-5", "test-6"]
     tiny = SortingShape(n_cells=3, n_colours=1)
     with pytest.raises(InvalidInput, match="must be enough"):
-        trials(values_of(exactly, tiny), tiny, np.zeros(3), 2, 6)
+        trials(values_of(exactly, tiny), tiny, np.zeros(3), request)

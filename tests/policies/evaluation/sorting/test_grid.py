@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from app.policies.evaluation.rows import EvaluationRequest
 from app.policies.evaluation.sorting.curve import curve_point
 from app.policies.evaluation.sorting.episodes import SortingEpisodes, run_episodes
 from app.policies.evaluation.sorting.grid import grid, row_of, share
@@ -112,9 +113,8 @@ def test_episodes_are_the_same_however_they_are_cut_into_batches(monkeypatch):
 
 def test_rows_are_reported_in_order_and_the_planner_needs_no_fallback():
     reported = []
-    found = grid(
-        values_of(exactly, SHAPE), SHAPE, FAIL, 3, 5, lambda *what: reported.append(what)
-    )
+    request = EvaluationRequest(episodes=3, seed=5, on_row=lambda *what: reported.append(what))
+    found = grid(values_of(exactly, SHAPE), SHAPE, FAIL, request)
     names = [
         f"{a}{b}" for a in ("clean", "disturbed") for b in ("", "-planner-fallback", "-planner")
     ]
@@ -129,7 +129,8 @@ def test_rows_are_reported_in_order_and_the_planner_needs_no_fallback():
 
 
 def test_with_fallback_a_cycling_policy_reaches_every_goal():
-    found = grid(values_of(in_circles, SHAPE), SHAPE, FAIL, 3, 5)["results"]
+    request = EvaluationRequest(episodes=3, seed=5)
+    found = grid(values_of(in_circles, SHAPE), SHAPE, FAIL, request)["results"]
     rows = {row["name"]: row for row in found}
     for start in ("clean", "disturbed"):
         alone, with_fallback = rows[start], rows[f"{start}-planner-fallback"]

@@ -5,6 +5,7 @@ import pytest
 
 from app.policies.checkpoints import pretrained
 from app.policies.evaluation.pick.episodes import settings_for
+from app.policies.evaluation.rows import EvaluationRequest
 from app.policies.evaluation.sorting import order_rules, people
 from app.policies.evaluation.sorting.order_rules import OrderView
 from app.policies.evaluation.sorting.people import (
@@ -127,9 +128,8 @@ def test_task_that_is_cut_off_has_failed(monkeypatch: pytest.MonkeyPatch) -> Non
 
 def test_result_compares_the_rules_on_the_same_tasks() -> None:
     reported = []
-    result = run_sorting_people(
-        pretrained.load("pick"), episodes=2, seed=4, on_row=lambda *what: reported.append(what)
-    )
+    request = EvaluationRequest(episodes=2, seed=4, on_row=lambda *what: reported.append(what))
+    result = run_sorting_people(pretrained.load("pick"), request)
     names = [row["name"] for row in result["results"]]
     rules = ["critic", "planner", "nearest"]
     assert names == rules + [f"{rule}-no-ssm" for rule in rules]
