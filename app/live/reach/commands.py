@@ -2,7 +2,6 @@
 
 from typing import Annotated, Literal
 
-import numpy as np
 from pydantic import Field
 
 from app.live.commands import (
@@ -79,5 +78,4 @@ def lacks_for_reaching(cell: Cell) -> str | None:
 def goal_box(cell: Cell) -> tuple[Vec, Vec]:
     """Return the lower and upper corner of a cell's goal region [m], shape (3,) each."""
     assert cell.goal_region is not None
-    middle, half = np.array(cell.goal_region.center), 0.5 * np.array(cell.goal_region.size)
-    return middle - half, middle + half
+    return cell.goal_region.box()

@@ -146,6 +146,11 @@ class GoalRegion(CellData):
         description="distance of neighbouring grid points; divides every side [m]"
     )
 
+    def box(self) -> tuple[Vec, Vec]:
+        """Return the lower and the upper corner of the box [m], shape (3,) each."""
+        middle, half = np.array(self.center), 0.5 * np.array(self.size)
+        return middle - half, middle + half
+
     def counts(self) -> tuple[int, int, int]:
         """Return the number of grid points along x, y and z."""
         x, y, z = (round(side / self.spacing) + 1 for side in self.size)

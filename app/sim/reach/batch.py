@@ -233,12 +233,11 @@ def reach_cell_of(cell: Cell, people: People, targets: Vec) -> episode.ReachCell
         people: From :func:`~app.sim.scene.scene.people_of`.
         targets: Goals to draw from [m], shape (n, 3).
     """
-    region = goal_region_of(cell)
-    middle, half = np.array(region.center), 0.5 * np.array(region.size)
+    low, high = goal_region_of(cell).box()
     return episode.ReachCell(
         targets=as_kernel_array(targets),
-        low=middle - half,
-        high=middle + half,
+        low=low,
+        high=high,
         arm=arm_of(cell),
         people=people,
     )

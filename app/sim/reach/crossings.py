@@ -141,16 +141,13 @@ def crossings(cell: Cell, n: int = N_CROSSINGS, seed: int = SEED) -> CrossingSet
     return _set_of([_walk(cell, home, seed, number) for number in range(n)])
 
 
-def recorded_crossings(
-    cell: Cell, motions: Sequence[Motion], n: int, seed: int = SEED
-) -> CrossingSet:
+def recorded_crossings(cell: Cell, motions: Sequence[Motion], n: int) -> CrossingSet:
     """Return crossings made from recorded people.
 
     Args:
         cell: Work cell with a goal region.
         motions: Runs of recorded motion without artifacts.
-        n: Number of crossings.
-        seed: Seed; each crossing is determined by (seed, number) and the motions.
+        n: Number of crossings; each is determined by its number and the motions.
 
     Raises:
         InvalidInput: ``n`` is 0, there is no motion, or no motion crosses the segment.
@@ -163,7 +160,7 @@ def recorded_crossings(
     cylinders = [cylinder_track(motion, cell.floor_z, dt) for motion in motions]
     found = []
     for number in range(n):
-        found.append(_recorded(cell, home, motions, cylinders, seed, number))
+        found.append(_recorded(cell, home, motions, cylinders, SEED, number))
     return _set_of(found)
 
 
@@ -283,9 +280,7 @@ def _turn(run: Vec, lead: int, there: Vec, course: Vec, dt: float) -> float:
 
 
 def _goal(cell: Cell, rng: np.random.Generator) -> Vec:
-    region = goal_region_of(cell)
-    middle, half = np.array(region.center), 0.5 * np.array(region.size)
-    return np.asarray(rng.uniform(middle - half, middle + half))
+    return np.asarray(rng.uniform(*goal_region_of(cell).box()))
 
 
 def _across(

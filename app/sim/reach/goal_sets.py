@@ -38,31 +38,11 @@ N_HALTON = 54
 MOST_HALTON = 2000
 """Largest number of targets of a Halton set."""
 AXES = ("x", "y", "z")
-BASES = (2, 3, 5)
-"""Bases of the sequence along x, y and z."""
 N_CORNERS = 8
 SLACK = 1e-9
 """Tolerance for rounding at the faces of the box [m]."""
 _FLAT = 1e-12
 """Volume below which a tetrahedron is dropped [m^3]."""
-
-
-def radical_inverse(numbers: NDArray[np.int64], base: int) -> Vec:
-    """Return the van der Corput sequence: digits mirrored about the point.
-
-    Args:
-        numbers: Indices, not negative, shape (n,).
-        base: Base of the digits.
-
-    Returns:
-        Values in [0, 1), shape (n,).
-    """
-    left, out, scale = np.array(numbers), np.zeros(len(numbers)), 1.0 / base
-    while left.any():
-        out += scale * (left % base)
-        left //= base
-        scale /= base
-    return out
 
 
 def halton_targets(region: GoalRegion, n: int = N_HALTON) -> Vec:
@@ -82,16 +62,16 @@ def halton_targets(region: GoalRegion, n: int = N_HALTON) -> Vec:
     if (size <= 0.0).any():
         rule = "needs a box with a volume for goals of a Halton set"
         raise InvalidInput("goal_region.size", list(region.size), rule)
-    low, high = region.center - 0.5 * size, region.center + 0.5 * size
+    low, high = region.box()
     corners = np.array([[i, j, k] for i in (0, 1) for j in (0, 1) for k in (0, 1)])
     found = dict.fromkeys(map(tuple, np.where(corners, high, low).tolist()))
-    rim, first = 0.5 * region.spacing, 1
+    rim, sequence = (
+        0.5 * region.spacing,
+        scipy.stats.qmc.Halton(3, scramble=False).fast_forward(1),
+    )
     while len(found) < n:
-        places = np.arange(first, first + n)
-        share = np.stack([radical_inverse(places, base) for base in BASES], axis=1)
-        points = np.clip(low - rim + (size + 2.0 * rim) * share, low, high)
+        points = np.clip(low - rim + (size + 2.0 * rim) * sequence.random(n), low, high)
         found.update(dict.fromkeys(map(tuple, points.tolist())))
-        first += n
     return np.array(list(found)[:n])
 
 

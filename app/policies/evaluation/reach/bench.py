@@ -14,7 +14,6 @@ from app.policies.checkpoints.trained_cell import cell_of
 from app.policies.evaluation.reach.episodes import (
     MAX_TIME_LEFT_S,
     ReachEpisodes,
-    goal_box,
     random_goals,
     recheck_contacts,
     run_episodes,
@@ -134,7 +133,7 @@ class ReachBench:
 
     def random_goals(self, n: int) -> Vec:
         """Return ``n`` random goals in the box [m], shape (n, 3)."""
-        return random_goals(*goal_box(self.cell), n, self._seed)
+        return random_goals(*goal_region_of(self.cell).box(), n, self._seed)
 
     def run(self, variant: Variant) -> ReachEpisodes:
         """Run one episode per goal of a variant."""

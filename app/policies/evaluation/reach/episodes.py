@@ -19,7 +19,7 @@ from app.policies.evaluation.statistics import mean_of, wilson
 from app.policies.inference.controllers import Controller
 from app.sim.cells.cell import Cell
 from app.sim.core.arrays import Vec
-from app.sim.reach.batch import ReachBatch, ReachSettings, goal_region_of
+from app.sim.reach.batch import ReachBatch, ReachSettings
 from app.sim.reach.blocked_batch import new_reach_batch
 from app.sim.scenario.kernels import episode as kernel
 
@@ -213,13 +213,6 @@ def recheck_contacts(
 def target_goals(targets: Vec, n: int) -> Vec:
     """Return the goals of ``n`` episodes that cycle through the targets [m], shape (n, 3)."""
     return np.asarray(targets[np.arange(n) % len(targets)])
-
-
-def goal_box(cell: Cell) -> tuple[Vec, Vec]:
-    """Return the lower and the upper corner of a cell's goal box [m], shape (3,) each."""
-    region = goal_region_of(cell)
-    middle, half = np.array(region.center), 0.5 * np.array(region.size)
-    return middle - half, middle + half
 
 
 def random_goals(low: Vec, high: Vec, n: int, seed: int) -> Vec:
