@@ -113,14 +113,13 @@ class PlayedMotion:
         )
 
 
-def is_outside(q: Vec, worker: Worker, slack: float = 0.02) -> bool:
-    """Return whether a pelvis is outside a walking area by more than a tolerance.
+def is_outside(q: Vec, worker: Worker) -> bool:
+    """Return whether a pelvis is outside a walking area by more than 0.02 m.
 
     Args:
         q: Joint positions [m, rad], shape (18,).
         worker: Person with the walking area.
-        slack: Tolerance [m].
     """
-    x, y = float(q[0]), float(q[1])
+    x, y, slack = float(q[0]), float(q[1]), 0.02
     inside_x = worker.x_min - slack <= x <= worker.x_max + slack
     return not (inside_x and worker.y_min - slack <= y <= worker.y_max + slack)

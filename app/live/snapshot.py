@@ -13,7 +13,6 @@ from app.live.reach.snapshot import ReachSnapshot
 from app.live.read_model import Internal, Numbers, ReadModel, frozen
 from app.live.safety.snapshot import SafetySnapshot
 from app.live.sorting.snapshot import SortingSnapshot
-from app.sim.core.arrays import Vec
 from app.sim.core.out_of_range import OutsideField
 from app.sim.pick.case_verdict import Verdict
 from app.sim.pick.task_policy import Candidate, Decision
@@ -310,13 +309,3 @@ class WorldSnapshot(ReadModel):
     def nearest(self) -> PersonSnapshot | None:
         """The person nearest to the robot; None without people."""
         return next((person for person in self.people if person.nearest), None)
-
-    @property
-    def person_q(self) -> Vec:
-        """Joint positions of the first person [m, rad], shape (18,)."""
-        return self.people[0].q
-
-    @property
-    def person_qd(self) -> Vec:
-        """Joint speeds of the first person [m/s, rad/s], shape (18,)."""
-        return self.people[0].qd

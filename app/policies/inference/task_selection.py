@@ -135,15 +135,12 @@ class TaskChooser(TrainedPolicy):
     Args:
         checkpoint: A ``policy`` checkpoint.
         cell: Work cell of the decisions; by default the training cell.
-        hysteresis: Margin by which another candidate must be better.
 
     Raises:
         CheckpointMismatch: The checkpoint is for another cell or layout.
     """
 
-    def __init__(
-        self, checkpoint: Checkpoint, cell: Cell | None = None, hysteresis: float = HYSTERESIS
-    ) -> None:
+    def __init__(self, checkpoint: Checkpoint, cell: Cell | None = None) -> None:
         super().__init__(checkpoint)
         if cell is not None:
             require_cell(cell, self.cell, self.cell_sha256)
@@ -151,15 +148,12 @@ class TaskChooser(TrainedPolicy):
         """Meaning of the actions (docs/method.md 2.2)."""
         self.grasp: GraspRules = pick_preset_of(checkpoint).episode.grasp
         """Phases of a pick."""
-        self._hysteresis = hysteresis
         self._networks = ValueNetworks(checkpoint)
         self._arm, self._people = arm_of(self._cell), people_of(self._cell)
         n_obs = self._networks.n_obs
         self._observer = CandidateObserver(self._cell, n_obs=n_obs, grasp=self.grasp)
-        self._limits, self._ranges = (
-            StateLimits(self._arm, limits_jerk=False),
-            TrainedRanges(checkpoint),
-        )
+        self._limits = StateLimits(self._arm, limits_jerk=False)
+        self._ranges = TrainedRanges(checkpoint)
 
     def decide(
         self,
@@ -261,7 +255,7 @@ class TaskChooser(TrainedPolicy):
             chosen = np.full(len(by_set), last)
         elif outcomes is None or terms.objective == "value":
             before = None if last is None else np.full(len(by_set), last)
-            chosen = select(by_set, before, self._hysteresis)
+            chosen = select(by_set, before, HYSTERESIS)
         else:
             success = outcomes.probability[:, 0]
             per_success = outcomes.time_s / np.maximum(success, LEAST_SUCCESS)

@@ -116,19 +116,14 @@ class Reach:
         side = "too far from" if far > 0.6 else "too near to"
         return f"it lies {far:.2f} m from the robot's base, {side} it at that height"
 
-    def any_posture(self, point: Vec, seed: int = 0) -> Reached:
-        """Find any configuration with the tcp at ``point`` [m], shape (3,).
-
-        Args:
-            point: Target of the tcp [m].
-            seed: Seed of the starts of the search.
-        """
+    def any_posture(self, point: Vec) -> Reached:
+        """Find any configuration with the tcp at ``point`` [m], shape (3,)."""
         if np.linalg.norm(point - SHOULDER) > self._longest:
             return Reached(q=None, reason="it is farther than the arm is long")
         down = self.tool_down(point)
         if down.q is not None:
             return down
-        rng = np.random.default_rng(seed)
+        rng = np.random.default_rng(0)
         starts = [self._home, *rng.uniform(self._q_min, self._q_max, (N_STARTS, 6))]
         reason = "no posture inside the joint limits was found"
         for start in starts:

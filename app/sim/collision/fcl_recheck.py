@@ -118,16 +118,11 @@ def robot_ends(robot: Robot, capsules: RobotCapsules, q: Vec) -> tuple[Vec, Vec]
 
 
 class Recheck:
-    """Looks for the first contact of trajectories; not thread-safe.
+    """Looks for the first contact of trajectories by FCL on raw meshes; not thread-safe."""
 
-    Args:
-        cell: The work cell.
-        reference: Reference checker; FCL on raw meshes by default.
-    """
-
-    def __init__(self, cell: Cell, reference: CollisionReference | None = None) -> None:
+    def __init__(self, cell: Cell) -> None:
         self._cell = cell
-        self._reference = reference or CollisionReference(cell)
+        self._reference = CollisionReference(cell)
         self._robot = Robot(cell.robot.tool_length)
         self._capsules = load_robot_capsules(cell.robot.tool_length, cell.robot.tool_radius)
         self._self_pairs = self_pairs(self._capsules)

@@ -96,20 +96,13 @@ class MultiPersonTracker:
     Args:
         n_people: Number of tracks, at most four.
         size: The person's size [m], shape (12,) (``Cell.body``).
-        settings: Noise, margins and times of all tracks.
         floor_z: Height of the floor [m]; None: heights are not checked.
     """
 
-    def __init__(
-        self,
-        n_people: int,
-        size: Vec,
-        settings: EstimatorSettings | None = None,
-        floor_z: float | None = None,
-    ) -> None:
+    def __init__(self, n_people: int, size: Vec, floor_z: float | None = None) -> None:
         if not 1 <= n_people <= MAX_PEOPLE:
             raise InvalidInput("n_people", n_people, f"must lie in [1, {MAX_PEOPLE}]")
-        self.settings, self._floor_z = settings or EstimatorSettings(), floor_z
+        self.settings, self._floor_z = EstimatorSettings(), floor_z
         self._tracks = [PersonEstimator(size, self.settings, floor_z) for _ in range(n_people)]
         self._order: list[int | None] = [None] * n_people
         self._flags: list[tuple[Flag, ...]] = [()] * n_people

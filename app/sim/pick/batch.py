@@ -303,21 +303,16 @@ def tool_state(arm: Arm, q: Vec, qd: Vec, goal: Vec) -> tuple[float, float, floa
     return distance, tilt, speed, bool(episode.succeeded(distance, tilt, speed))
 
 
-def hand_speeds(
-    batch: PickBatch, n_scripts: int = 200, seconds: float = 10.0
-) -> dict[str, float]:
+def hand_speeds(batch: PickBatch, n_scripts: int = 200) -> dict[str, float]:
     """Return statistics of the speed of the workers' hands while above 0.05 m/s [m/s].
 
-    Args:
-        batch: Environments with the workers.
-        n_scripts: Number of reach scripts.
-        seconds: Time simulated per script [s].
+    They are those of ``n_scripts`` scripts, 10 s of each.
     """
     people, tick = batch.world.people._replace(yielding=0.0), 0.01
     state = new_people_state(batch.cell, people, 1)
     n_workers = state.q.shape[1]
     crowd = new_people_geometry(people, n_workers, state.cylinders.shape[1])
-    palms, rng = np.zeros((int(seconds / tick), n_workers, 2, 3)), np.zeros(1, dtype=np.uint64)
+    palms, rng = np.zeros((int(10.0 / tick), n_workers, 2, 3)), np.zeros(1, dtype=np.uint64)
     rates = []
     for number in range(n_scripts):
         start_stream(batch.seed, 1 << 20, number, rng)

@@ -15,6 +15,8 @@ DAMPING = 0.05
 LONGEST_STEP = 0.3
 """Longest step of a joint per iteration [rad]."""
 ITERATIONS = 60
+N_STARTS = 24
+"""Starts of the search: the cell's home, then random ones."""
 CLOSE = 1e-4
 """Distance of tcp and target at which the iteration ends [m]."""
 APART = 0.1
@@ -22,7 +24,7 @@ APART = 0.1
 
 
 def goal_configurations(
-    arm: Arm, target: Vec, rng: np.random.Generator, *, n_starts: int = 24, spread: float = 0.0
+    arm: Arm, target: Vec, rng: np.random.Generator, *, spread: float = 0.0
 ) -> Vec:
     """Return configurations whose tcp is at a target, of any tilt.
 
@@ -30,7 +32,6 @@ def goal_configurations(
         arm: From ``scene.arm_of``.
         target: Position of the tcp [m], shape (3,).
         rng: Source of the starts of the search and of points near the target.
-        n_starts: Random starts; the first one is the cell's home.
         spread: Greatest distance of the tcp to the target [m]; success counts within 0.1 m.
 
     Returns:
@@ -40,7 +41,7 @@ def goal_configurations(
     """
     robot = Robot(arm.lengths.tool)
     found: list[Vec] = []
-    for k in range(n_starts):
+    for k in range(N_STARTS):
         q = np.array(arm.home)
         if k > 0:
             low, high = arm.limits.q_min[:CONTROLLED], arm.limits.q_max[:CONTROLLED]

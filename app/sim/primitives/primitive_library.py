@@ -93,16 +93,9 @@ class MotionLibrary:
     """Mean and standard deviation of the log of a segment's duration [s], (n_primitives, 2)."""
 
 
-def people_sizes(
-    cell: Cell, percentiles: tuple[tuple[float, float, float], ...] = BODIES
-) -> tuple[BodySize, ...]:
-    """Return body sizes of given percentiles with the pelvis height of a cell's worker.
-
-    Args:
-        cell: Work cell with a worker.
-        percentiles: Of stature, arms and shoulders, one row per body.
-    """
-    return tuple(percentile_body(*row, cell.human.pelvis_height) for row in percentiles)
+def people_sizes(cell: Cell) -> tuple[BodySize, ...]:
+    """Return body sizes of the percentiles BODIES with the pelvis height of a cell's worker."""
+    return tuple(percentile_body(*row, cell.human.pelvis_height) for row in BODIES)
 
 
 @lru_cache(maxsize=8)

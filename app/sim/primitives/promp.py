@@ -338,7 +338,7 @@ def draw_like(weights: Vec, n: int, rng: np.random.Generator, floor: float = FLO
     return np.asarray(mean + drawn + rng.standard_normal(drawn.shape) @ root.T)
 
 
-def gain_of_ends(weights: Vec, floor: float = FLOOR, width: float | None = None) -> Vec:
+def gain_of_ends(weights: Vec, floor: float) -> Vec:
     """Return K of an exact condition on all joints at both ends, (n_weights, 2 n_joints).
 
     Equal to :func:`gain` of :func:`of_weights` with rows of all joints at z = 0, then at
@@ -347,10 +347,9 @@ def gain_of_ends(weights: Vec, floor: float = FLOOR, width: float | None = None)
     Args:
         weights: Weights of each demonstration, shape (m, n_joints, n_basis).
         floor: Standard deviation of the floor [m, rad].
-        width: Width of the Gaussians [phase]; None: :func:`usual_width`.
     """
     m, n_joints, n_basis = weights.shape
-    phi = basis(np.array([0.0, 1.0]), n_basis, usual_width(n_basis) if width is None else width)
+    phi = basis(np.array([0.0, 1.0]), n_basis, usual_width(n_basis))
     away = (weights - weights.mean(axis=0)) / np.sqrt(max(m - 1, 1))
     ends = np.swapaxes(away @ phi.T, 1, 2).reshape(m, -1)
     ground = _floor(n_basis, floor)

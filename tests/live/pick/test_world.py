@@ -43,7 +43,7 @@ def until(world: LivePickWorld, status: str, limit: int = 400) -> WorldSnapshot:
 
 
 def palm(snapshot: WorldSnapshot, cell: Cell, hand: str) -> np.ndarray:
-    return human.joint_points(snapshot.person_q, cell.body)[f"hand_{hand}"]
+    return human.joint_points(snapshot.people[0].q, cell.body)[f"hand_{hand}"]
 
 
 def test_robot_reaches_a_candidate_and_the_next_episode_offers_the_others(
@@ -233,7 +233,7 @@ def test_speed_given_to_the_policy_is_the_speed_of_the_movement(world: LivePickW
     world.apply(commands.MovePerson(pelvis=(0.3, 1.6, -1.2)))
     before = run(world, 3)
     after = run(world, 1)
-    assert np.allclose(after.person_qd, (after.person_q - before.person_q) / 0.05)
+    assert np.allclose(after.people[0].qd, (after.people[0].q - before.people[0].q) / 0.05)
 
 
 def test_contact_is_reported_and_the_robot_restarts_from_home(
@@ -259,8 +259,8 @@ def test_paused_clock_stands_while_the_dragged_person_moves(world: LivePickWorld
     after = run(world, 30)
     assert (after.tick, after.t_s) == (before.tick, before.t_s)
     assert np.array_equal(after.robot_q, before.robot_q)
-    assert abs(after.person_q[0] - 0.5) < 0.05
-    assert not after.person_qd.any()
+    assert abs(after.people[0].q[0] - 0.5) < 0.05
+    assert not after.people[0].qd.any()
 
 
 def test_step_once_advances_by_one_period_and_stays_paused(world: LivePickWorld) -> None:
@@ -273,9 +273,9 @@ def test_step_once_advances_by_one_period_and_stays_paused(world: LivePickWorld)
 
 def test_person_does_not_jump_when_it_goes_back_to_work(world: LivePickWorld) -> None:
     world.apply(commands.SetMode(mode="auto"))
-    q = world.snapshot().person_q
+    q = world.snapshot().people[0].q
     for _ in range(200):
-        after = run(world, 1).person_q
+        after = run(world, 1).people[0].q
         assert np.abs(after - q).max() < 0.5
         q = after
 

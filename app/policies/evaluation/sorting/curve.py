@@ -35,8 +35,6 @@ def curve_point(
     fail: Vec,
     episodes_per_pair: int,
     seed: int,
-    *,
-    disturbed: float = 0.0,
 ) -> CurvePoint:
     """Evaluate a policy on every pair.
 
@@ -46,9 +44,8 @@ def curve_point(
         fail: Failure probabilities of the clutter cells, shape (K,).
         episodes_per_pair: Episodes of each pair; :func:`curve_episodes` gives the source's.
         seed: Seed of the episodes.
-        disturbed: Share of disturbed starts.
     """
-    batches = grid_batches(shape, fail, episodes_per_pair, seed, disturbed)
+    batches = grid_batches(shape, fail, episodes_per_pair, seed, 0.0)
     found = joined([run_episodes(batch, greedy(values)) for batch in batches])
     return CurvePoint(
         success=float(found.success.mean()),

@@ -90,7 +90,7 @@ def test_gizmos_are_seen_in_manual_mode_only_and_sit_on_the_hands(
     assert not node(server, "/gizmos/0/right").visible
     world.apply(commands.SetMode(mode="manual"))
     scene.draw(world.snapshot(), 0.05)
-    palms = human.joint_points(world.snapshot().person_q, cell.body)
+    palms = human.joint_points(world.snapshot().people[0].q, cell.body)
     assert node(server, "/gizmos/0/right").visible
     assert np.allclose(node(server, "/gizmos/0/right").position, palms["hand_r"], atol=1e-3)
 
@@ -110,7 +110,7 @@ def test_contact_shows_what_touched_in_red(
     scene.draw(snapshot, 0.05)
     touched = node(server, f"/touched/people/0/{snapshot.contact.body}")
     assert tuple(touched.color) == HIT
-    ends = human.capsules(snapshot.person_q, cell.body, cell.floor_z)
+    ends = human.capsules(snapshot.people[0].q, cell.body, cell.floor_z)
     body = human.CAPSULE_NAMES.index(snapshot.contact.body)
     assert np.allclose(touched.position, ends[body].mean(axis=0), atol=1e-9)
     assert server.scene.get_handle_by_name("/touched/people/0/head") is None
@@ -125,7 +125,7 @@ def test_collision_shapes_lie_over_the_person_when_asked_for(
 ) -> None:
     snapshot = world.snapshot()
     scene.draw(snapshot, 0.05, shapes=True)
-    ends = human.capsules(snapshot.person_q, cell.body, cell.floor_z)
+    ends = human.capsules(snapshot.people[0].q, cell.body, cell.floor_z)
     for name, pair in zip(human.CAPSULE_NAMES, ends, strict=True):
         capsule = node(server, f"/shapes/people/0/{name}")
         assert capsule.visible
