@@ -10,6 +10,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 
 from app.errors import BadRecording, Fault, digits
 from app.sim.core.arrays import Vec
@@ -157,12 +158,9 @@ def _local(joint: BvhJoint, values: Vec) -> tuple[Vec, Vec | None]:
 
 def axis_turns(axis: int, angle: Vec) -> Vec:
     """Return rotations about one axis (0 x, 1 y, 2 z) by ``angle`` [rad], shape (n, 3, 3)."""
-    c, s = np.cos(angle), np.sin(angle)
-    turns = np.zeros((len(c), 3, 3))
-    j, k = (axis + 1) % 3, (axis + 2) % 3
-    turns[:, axis, axis] = 1.0
-    turns[:, j, j], turns[:, k, k], turns[:, j, k], turns[:, k, j] = c, c, -s, s
-    return turns
+    return np.asarray(
+        scipy.spatial.transform.Rotation.from_euler("xyz"[axis], angle[:, None]).as_matrix()
+    )
 
 
 def read_rows(

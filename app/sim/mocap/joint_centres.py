@@ -3,6 +3,7 @@
 from dataclasses import dataclass, field
 
 import numpy as np
+import scipy
 
 from app.sim.core.arrays import Vec
 from app.sim.human.anthropometry import BodySize
@@ -122,5 +123,8 @@ def model_points(q: Vec, pelvis_z: Vec, size: BodySize) -> Vec:
 
 def euler_turns(a: Vec, b: Vec, c: Vec) -> Vec:
     """Return ``Ry(a) Rx(b) Rz(c)`` for angles [rad] of shape (n,), shape (n, 3, 3)."""
-    turns: Vec = axis_turns(1, a) @ axis_turns(0, b) @ axis_turns(2, c)
-    return turns
+    return np.asarray(
+        scipy.spatial.transform.Rotation.from_euler(
+            "YXZ", np.column_stack([a, b, c])
+        ).as_matrix()
+    )

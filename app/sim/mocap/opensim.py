@@ -24,6 +24,7 @@ from app.sim.mocap.bvh import axis_turns, lines_of
 from app.sim.mocap.csv_tables import AngleTrack, check_times, in_radians, require_places
 from app.sim.mocap.faults import bad, shown
 from app.sim.mocap.inverse_kinematics import euler_angles, one_branch
+from app.sim.mocap.joint_centres import euler_turns
 from app.sim.mocap.tables import (
     MAX_COLUMNS,
     TextTable,
@@ -230,10 +231,10 @@ def _elevated(values: Mapping[str, Vec], hand: str, side: float, first: int) -> 
     The left shoulder rotates about the axes of the right one, with opposite sign.
     """
     plane, elevation, axial = (-side * values[name] for name in ELEVATED[hand])
-    turns = axis_turns(2, plane) @ axis_turns(0, -elevation)
-    axial_turns = scipy.spatial.transform.Rotation.from_rotvec(np.outer(axial, _AXIAL))
-    turns = turns @ axial_turns.as_matrix()
-    return one_branch(euler_angles(turns) * np.array([-1.0, side, 1.0]), first)
+    rotation = scipy.spatial.transform.Rotation
+    turns = rotation.from_euler("ZX", np.column_stack([plane, -elevation]))
+    turns = turns * rotation.from_rotvec(np.outer(axial, _AXIAL))
+    return one_branch(euler_angles(turns.as_matrix()) * np.array([-1.0, side, 1.0]), first)
 
 
 def trunk_angles(angle: Mapping[str, Vec]) -> tuple[Vec, Vec]:
@@ -255,5 +256,4 @@ def trunk_angles(angle: Mapping[str, Vec]) -> tuple[Vec, Vec]:
 
 def _turn(about_z: Vec, about_x: Vec, about_y: Vec) -> Vec:
     """Return OpenSim's ``Rz Rx Ry`` in our axes (x forward, y left, z up), shape (n, 3, 3)."""
-    turns: Vec = axis_turns(1, -about_z) @ axis_turns(0, about_x) @ axis_turns(2, about_y)
-    return turns
+    return euler_turns(-about_z, about_x, about_y)

@@ -65,10 +65,8 @@ def halton_targets(region: GoalRegion, n: int = N_HALTON) -> Vec:
     low, high = region.box()
     corners = np.array([[i, j, k] for i in (0, 1) for j in (0, 1) for k in (0, 1)])
     found = dict.fromkeys(map(tuple, np.where(corners, high, low).tolist()))
-    rim, sequence = (
-        0.5 * region.spacing,
-        scipy.stats.qmc.Halton(3, scramble=False).fast_forward(1),
-    )
+    rim = 0.5 * region.spacing
+    sequence = scipy.stats.qmc.Halton(3, scramble=False).fast_forward(1)
     while len(found) < n:
         points = np.clip(low - rim + (size + 2.0 * rim) * sequence.random(n), low, high)
         found.update(dict.fromkeys(map(tuple, points.tolist())))

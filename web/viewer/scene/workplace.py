@@ -2,12 +2,11 @@
 
 import math
 
-import numpy as np
 import viser
 
 from app.live.reach.commands import is_reaching
 from app.sim.cells.cell import Cell
-from web.viewer.poses import orientation
+from web.viewer.poses import upright
 from web.viewer.scene.solid_meshes import block, material, painted, rod, slab
 
 TOP = material((236, 233, 226), roughness=0.55)
@@ -72,12 +71,11 @@ def table_trim(cell: Cell) -> bytes:
 
 def _obstacles(server: viser.ViserServer, cell: Cell) -> None:
     for box in cell.obstacles:
-        c, s = math.cos(box.yaw), math.sin(box.yaw)
         server.scene.add_box(
             f"/obstacles/{box.id}",
             color=OBSTACLE,
             dimensions=(2.0 * box.half_size[0], 2.0 * box.half_size[1], 2.0 * box.half_size[2]),
-            wxyz=orientation(np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])),
+            wxyz=upright(box.yaw),
             position=box.center,
         )
 
