@@ -130,15 +130,8 @@ class PickEnv(SingleEnv):
 class PickVectorEnv(BatchVectorEnv):
     """Many environments :class:`PickEnv`, stepped together.
 
-    Args:
-        num_envs: Number of environments.
-        cell: Name of a shipped work cell, or a work cell.
-        settings: Settings of the scenario.
-        people: People in each cell, 0 to 4 kinds; None for those of the settings.
-        first_env: Number of the first environment.
-        autoreset_mode: Autoreset mode; see :class:`BatchVectorEnv`.
-        max_episode_steps: Steps after which an episode is truncated; None for no such limit.
-        render_mode: ``rgb_array`` (``render`` returns an image of each environment) or None.
+    Arguments are those of :class:`PickEnv` and :class:`BatchVectorEnv`; ``first_env`` is the
+    number of the first of ``num_envs`` environments.
     """
 
     def __init__(

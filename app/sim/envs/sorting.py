@@ -169,14 +169,8 @@ class SortingVectorEnv(BatchVectorEnv):
 
     ``infos["action_mask"]`` has the shape (num_envs, n_actions).
 
-    Args:
-        num_envs: Number of tasks.
-        cell: Name of a shipped work cell, or a work cell.
-        settings: Starts, disturbances, rewards and ends.
-        first_env: Number of the first task.
-        autoreset_mode: Autoreset mode; see :class:`BatchVectorEnv`.
-        max_episode_steps: Steps after which an episode is truncated; None for no such limit.
-        render_mode: ``rgb_array`` (``render`` gives an image of every task) or None.
+    Arguments are those of :class:`SortingEnv` and :class:`BatchVectorEnv`; ``first_env`` is the
+    number of the first of ``num_envs`` environments.
     """
 
     def __init__(

@@ -39,25 +39,23 @@ def drawn_from(buffer: PrioritisedReplay, t: int):
     return float(sample.rewards[place]), following, float(sample.discounts[place])
 
 
-def test_a_return_sums_discounted_rewards_over_n_steps():
+@pytest.mark.parametrize(
+    ("third", "expected"),
+    [
+        pytest.param({}, (2.0 + 0.5 * 3.0 + 0.25 * 4.0, 4, 0.125), id="over n steps"),
+        pytest.param({"done": True}, (2.0 + 0.5 * 3.0, 3, 0.0), id="to the end"),
+        pytest.param(
+            {"done": True, "cut_off": True},
+            (2.0 + 0.5 * 3.0, 3, 0.25),
+            id="by value if cut off",
+        ),
+    ],
+)
+def test_a_return_sums_discounted_rewards(third, expected):
     buffer = memory(n_steps=3)
     for t in range(6):
-        add(buffer, t)
-    assert drawn_from(buffer, 1) == (2.0 + 0.5 * 3.0 + 0.25 * 4.0, 4, 0.125)
-
-
-def test_a_return_ends_where_the_episode_terminates():
-    buffer = memory(n_steps=3)
-    for t in range(6):
-        add(buffer, t, done=t == 2)
-    assert drawn_from(buffer, 1) == (2.0 + 0.5 * 3.0, 3, 0.0)
-
-
-def test_a_return_goes_on_by_value_where_the_episode_is_cut_off():
-    buffer = memory(n_steps=3)
-    for t in range(6):
-        add(buffer, t, done=t == 2, cut_off=t == 2)
-    assert drawn_from(buffer, 1) == (2.0 + 0.5 * 3.0, 3, 0.25)
+        add(buffer, t, **(third if t == 2 else {}))
+    assert drawn_from(buffer, 1) == expected
 
 
 @pytest.mark.parametrize("n_added", [6, 8, 11])

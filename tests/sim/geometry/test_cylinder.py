@@ -33,30 +33,21 @@ def test_distance_and_overlap_are_fcls(kind: str) -> None:
     assert over_the_top > 0.3 * KINDS[kind]
 
 
-def test_capsule_beside_the_cylinder_is_measured_in_the_plane() -> None:
-    d = distance([[1.0, -1.0, 0.2], [1.0, 1.0, 0.7]], 0.1, (0.2, 0.0, 0.3, 2.0))
-    assert d == pytest.approx(0.8 - 0.3 - 0.1)
-
-
-def test_capsule_over_the_disc_is_measured_upward() -> None:
-    d = distance([[-0.2, 0.0, 1.5], [0.2, 0.1, 1.4]], 0.1, (0.0, 0.0, 0.4, 1.0))
-    assert d == pytest.approx(0.4 - 0.1)
-
-
-def test_capsule_beyond_the_rim_is_measured_to_the_rim() -> None:
-    d = distance([[0.7, 0.0, 1.4], [2.0, 0.0, 1.4]], 0.1, (0.0, 0.0, 0.4, 1.0))
-    assert d == pytest.approx(0.5 - 0.1)
-
-
-def test_upright_capsule_that_leaves_over_the_top_is_measured_beside_it() -> None:
-    up = distance([[0.5, 0.0, 0.5], [0.5, 0.0, 3.0]], 0.05, (0.0, 0.0, 0.4, 1.0))
-    down = distance([[0.5, 0.0, 3.0], [0.5, 0.0, 0.5]], 0.05, (0.0, 0.0, 0.4, 1.0))
-    assert up == pytest.approx(0.05) and down == pytest.approx(0.05)
-
-
-def test_depth_to_the_side_is_negative() -> None:
-    d = distance([[0.1, -1.0, 0.5], [0.1, 1.0, 0.5]], 0.05, (0.0, 0.0, 0.4, 1.0))
-    assert d == pytest.approx(0.1 - 0.4 - 0.05)
+@pytest.mark.parametrize(
+    ("ends", "radius", "cylinder", "expected"),
+    [  # beside it, over the disc, beyond the rim, out over the top, the same downward, inside
+        ([[1.0, -1.0, 0.2], [1.0, 1.0, 0.7]], 0.1, (0.2, 0.0, 0.3, 2.0), 0.8 - 0.3 - 0.1),
+        ([[-0.2, 0.0, 1.5], [0.2, 0.1, 1.4]], 0.1, (0.0, 0.0, 0.4, 1.0), 0.4 - 0.1),
+        ([[0.7, 0.0, 1.4], [2.0, 0.0, 1.4]], 0.1, (0.0, 0.0, 0.4, 1.0), 0.5 - 0.1),
+        ([[0.5, 0.0, 0.5], [0.5, 0.0, 3.0]], 0.05, (0.0, 0.0, 0.4, 1.0), 0.05),
+        ([[0.5, 0.0, 3.0], [0.5, 0.0, 0.5]], 0.05, (0.0, 0.0, 0.4, 1.0), 0.05),
+        ([[0.1, -1.0, 0.5], [0.1, 1.0, 0.5]], 0.05, (0.0, 0.0, 0.4, 1.0), 0.1 - 0.4 - 0.05),
+    ],
+)
+def test_distance_is_that_to_the_nearest_part_of_the_cylinder(
+    ends: list[list[float]], radius: float, cylinder: tuple[float, ...], expected: float
+) -> None:
+    assert distance(ends, radius, cylinder) == pytest.approx(expected)
 
 
 def test_nearest_column_is_named_and_earlier_ones_are_passed_over() -> None:

@@ -81,20 +81,18 @@ def test_an_unseen_arm_keeps_its_angles_and_the_other_follows() -> None:
     assert np.linalg.norm(joints["wrist_l"] - truth["wrist_l"]) < 1e-6
 
 
-def test_an_unseen_wrist_leaves_the_upper_arm_where_the_elbow_is() -> None:
+@pytest.mark.parametrize(
+    ("unseen", "other", "unknown"),
+    [("wrist_l", "elbow_l", [16, 17]), ("elbow_l", "wrist_l", [16])],
+)
+def test_an_unseen_point_of_an_arm_leaves_the_other_where_it_is(
+    unseen: str, other: str, unknown: list[int]
+) -> None:
     q = work(1, 12.0)[1][120]
-    found, held = joint_angles(without(seen(q), "wrist_l"), REST, SIZE)
+    found, held = joint_angles(without(seen(q), unseen), REST, SIZE)
     joints, truth = (human.joint_points(p, SIZE) for p in (found, q))
-    assert np.linalg.norm(joints["elbow_l"] - truth["elbow_l"]) < 1e-6
-    assert list(np.flatnonzero(held)) == [16, 17]
-
-
-def test_an_unseen_elbow_leaves_the_wrist_where_it_is() -> None:
-    q = work(1, 12.0)[1][120]
-    found, held = joint_angles(without(seen(q), "elbow_l"), REST, SIZE)
-    joints, truth = (human.joint_points(p, SIZE) for p in (found, q))
-    assert np.linalg.norm(joints["wrist_l"] - truth["wrist_l"]) < 1e-6
-    assert list(np.flatnonzero(held)) == [16]
+    assert np.linalg.norm(joints[other] - truth[other]) < 1e-6
+    assert list(np.flatnonzero(held)) == unknown
 
 
 def test_sides_stand_in_for_a_missing_middle() -> None:
