@@ -15,11 +15,13 @@ The result is committed as ``app/sim/primitives/data/task_primitives.npz``;
 
 import argparse
 import logging
+from functools import partial
 
 import numpy as np
 
 from app.sim.cells.cell import Cell, cell_names, load_cell
 from app.sim.core.arrays import Vec
+from app.sim.human import model as human
 from app.sim.human.anthropometry import percentile_body
 from app.sim.primitives import promp
 from app.sim.primitives.augmentation import draw_swivel, vary_elbow
@@ -33,7 +35,6 @@ from app.sim.primitives.library_file import (
     segments_of,
     write_primitives,
 )
-from app.sim.primitives.via_points import points_of
 
 logger = logging.getLogger(__name__)
 
@@ -67,7 +68,7 @@ def make_primitive(
         q = motion.q
         if elbow_spread > 0.0:
             swivel = draw_swivel(len(q), rng, elbow_spread)
-            q = vary_elbow(q, segment.hand, swivel, points_of(size))
+            q = vary_elbow(q, segment.hand, swivel, partial(human.joint_points, size=size))
         motions.append(motion)
         paths.append(q)
     durations = np.array([one.duration_s for one in motions])

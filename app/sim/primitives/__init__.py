@@ -9,9 +9,5 @@ phase              Minimum-jerk phase of a motion
 primitive_library  Motion library of a worker: keyframe postures and samples of task primitives
 promp              Probabilistic movement primitives: a normal distribution over a person's
                    trajectories
-sampling           Samples of a movement primitive: motions that meet via points and keep the
-                   joint limits
-via_points         Via points of a movement primitive: postures, speeds and places of the body
-                   it must meet
 kernels/           Compiled movement primitives and scripts
 """

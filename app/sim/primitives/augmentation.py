@@ -1,15 +1,17 @@
 """Variation of the elbow along the same palm path, an augmentation of demonstrations.
 
-The thesis varies the elbow by conditioning the primitive on via points (``via_points.py``),
-which keeps the palm at the via points only. :func:`vary_elbow` rotates the arm about the line
-from shoulder to palm, its one degree of freedom for a given palm, and keeps the palm at every
-sample. ``python -m tools.make_primitives --elbow-spread`` applies it to each demonstration.
+The thesis varies the elbow by conditioning the primitive on via points, which keeps the palm at
+the via points only. :func:`vary_elbow` rotates the arm about the line from shoulder to palm,
+its one degree of freedom for a given palm, and keeps the palm at every sample.
+``python -m tools.make_primitives --elbow-spread`` applies it to each demonstration.
 
 The other augmentations (execution time, pauses, starting phase, reversal) are drawn per episode
 (``kernels/primitives.py``).
 
 Source: docs/method.md 3.4, thesis section 5.3.3.
 """
+
+from collections.abc import Callable
 
 import numpy as np
 
@@ -18,8 +20,9 @@ from app.sim.human import model as human
 from app.sim.human.anthropometry import MEDIAN
 from app.sim.human.model import Hand
 from app.sim.primitives.phase import min_jerk
-from app.sim.primitives.via_points import PointsOf
 
+PointsOf = Callable[[Vec], dict[str, Vec]]
+"""From joint positions (18,) to the body's points by name [m], each (3,)."""
 JUMP = 0.2
 """Largest change that the rotation may add to a joint between two samples [rad]."""
 

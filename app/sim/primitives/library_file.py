@@ -22,8 +22,6 @@ import numpy as np
 from app.sim.cells.cell import Cell, load_cell
 from app.sim.core.arrays import Vec
 from app.sim.human.model import Hand
-from app.sim.primitives import promp
-from app.sim.primitives.promp import ProMP
 
 FILE = Path(str(resources.files("app.sim.primitives"))) / "data" / "task_primitives.npz"
 HANDS: tuple[Hand, Hand] = ("r", "l")
@@ -62,10 +60,6 @@ class TaskPrimitive:
     """Duration of each [s], shape (n,)."""
     residual: Vec
     """Root-mean-square residual of the regression per joint [m, rad], shape (18,)."""
-
-    def primitive(self) -> ProMP:
-        """Return the movement primitive of the demonstrations."""
-        return promp.of_weights(self.weights, self.durations, residual=self.residual)
 
 
 def segments_of(cell: Cell) -> tuple[TaskSegment, ...]:

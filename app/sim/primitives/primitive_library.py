@@ -17,7 +17,7 @@ other bodies. Measured on 4000 random segments, 80 demonstrations, floors of 0.0
 largest |K| 3.4 and 1.25; palm path over straight distance, 99 %, 1.36 and 1.36, largest 1.96
 and 1.66; segments beyond joint limits by more than 1 mrad: 0.05 % and none.
 
-Source: docs/method.md 3.4; ``promp.py``, ``sampling.py``.
+Source: docs/method.md 3.4; ``promp.py``.
 """
 
 from dataclasses import dataclass
@@ -30,7 +30,7 @@ from app.errors import InvalidInput
 from app.sim.cells.cell import Cell, lacks_stations
 from app.sim.core.arrays import Vec
 from app.sim.human import model as human
-from app.sim.human.anthropometry import MEDIAN, BodySize, percentile_body
+from app.sim.human.anthropometry import BodySize, percentile_body
 from app.sim.primitives import promp
 from app.sim.primitives.demonstrations import draw_keyframe
 from app.sim.primitives.library_file import (
@@ -41,8 +41,6 @@ from app.sim.primitives.library_file import (
     primitive_for,
     segments_of,
 )
-from app.sim.primitives.sampling import GRID, sample
-from app.sim.primitives.via_points import points_of
 
 Index = NDArray[np.int64]
 
@@ -59,6 +57,8 @@ VARIANTS = 10
 """Keyframe postures per body, place and hand."""
 GAIN_FLOOR = 0.05
 """Standard deviation of the floor of Sigma in K [m, rad]."""
+GRID = np.linspace(0.0, 1.0, 121)
+"""Phases at which joint limits are checked."""
 ROUNDS = 10
 """Largest number of rounds of rejection sampling."""
 N_SAMPLES = 24
@@ -205,8 +205,8 @@ def _segments(
 def draw_samples(found: TaskPrimitive, n: int, rng: np.random.Generator) -> Vec:
     """Draw weights within the joint limits, shape (n, 18, n_basis).
 
-    Draws beyond the limits are rejected; ``sampling.sample`` supplies those missing after
-    ROUNDS.
+    Draws beyond the limits are rejected. Those missing after ROUNDS, of no shipped primitive,
+    are demonstrations.
     """
     phi = promp.basis(GRID, promp.N_BASIS, promp.usual_width(promp.N_BASIS))
     kept: list[Vec] = []
@@ -216,10 +216,9 @@ def draw_samples(found: TaskPrimitive, n: int, rng: np.random.Generator) -> Vec:
         inside = ((q >= human.Q_MIN) & (q <= human.Q_MAX)).all(axis=(1, 2))
         kept.extend(drawn[inside])
         if len(kept) >= n:
-            return np.array(kept[:n])
-    points = points_of(MEDIAN.vector(0.0))  # without via points the size is irrelevant
-    rest = sample(found.primitive(), n - len(kept), rng, points)
-    return np.array([*kept, *rest])
+            break
+    kept.extend(found.weights[k % len(found.weights)] for k in range(len(kept), n))
+    return np.array(kept[:n])
 
 
 def segment_weights(library: MotionLibrary, primitive: int, sample: int, ends: Vec) -> Vec:

@@ -9,8 +9,8 @@ and the weights of all joints together are normal, ``w ~ N(mu, Sigma)``. Each de
 gives one weight vector by ridge regression, ``w = (Phi^T Phi / T + lambda I)^-1 Phi^T q / T``;
 mu is their mean, Sigma their covariance and a small smooth floor. From there, in closed form:
 
-    mean       E[q(z)] = Phi(z) mu,           E[qd(z)] = Phi'(z) mu dz/dt
-    covariance Cov[q(z)] = Phi(z) Sigma Phi(z)^T, likewise for speeds
+    mean       E[q(z)] = Phi(z) mu
+    covariance Cov[q(z)] = Phi(z) Sigma Phi(z)^T
     observing  y = A w + e, e ~ N(0, R):  K = Sigma A^T (A Sigma A^T + R)^-1,
                mu* = mu + K (y - A mu),       Sigma* = (I - K A) Sigma (I - K A)^T + K R K^T
 
@@ -20,7 +20,7 @@ Autonomous Robots 42, 2018, sections 3.1-3.3.
 
 Deviates: lambda is per sample, so that it means the same for long and short demonstrations. The
 floor ``floor^2 (I x exp(-(c_i - c_k)^2 / (2 l^2)))`` is added to Sigma: n demonstrations span
-n - 1 directions only, and without it a via point off their span could not be met at all. The
+n - 1 directions only, and without it an observation off their span could not be met at all. The
 covariance is in the Joseph form, which is the source's and stays positive semidefinite.
 """
 
@@ -92,13 +92,6 @@ def basis(phase: Vec, n_basis: int, width: float) -> Vec:
     centres = np.linspace(0.0, 1.0, n_basis)
     bumps = np.exp(-((np.asarray(phase)[:, None] - centres) ** 2) / (2.0 * width**2))
     return np.asarray(bumps / bumps.sum(axis=1, keepdims=True))
-
-
-def basis_slope(phase: Vec, n_basis: int, width: float) -> Vec:
-    """Return d phi / dz, shape (m, n_basis): ``phi_i (c_i - sum_k phi_k c_k) / h^2``."""
-    centres = np.linspace(0.0, 1.0, n_basis)
-    phi = basis(phase, n_basis, width)
-    return np.asarray(phi * (centres - (phi @ centres)[:, None]) / width**2)
 
 
 def fit(
@@ -234,19 +227,6 @@ def positions(promp: ProMP, weights: Vec, phase: Vec) -> Vec:
     return np.asarray(phi @ np.swapaxes(weights, -1, -2))
 
 
-def speeds(promp: ProMP, weights: Vec, phase: Vec, rate: Vec) -> Vec:
-    """Return the joint speeds of given weights [m/s, rad/s], shape (..., m, n_joints).
-
-    Args:
-        promp: Primitive.
-        weights: Weights, shape (..., n_joints, n_basis).
-        phase: Phases in [0, 1], shape (m,).
-        rate: dz/dt at each [1/s], shape (m,); 1 / duration for the linear law.
-    """
-    slope = basis_slope(phase, promp.n_basis, promp.width) * np.asarray(rate)[:, None]
-    return np.asarray(slope @ np.swapaxes(weights, -1, -2))
-
-
 def moments(promp: ProMP, phase: Vec) -> tuple[Vec, Vec]:
     """Return mean and covariance of the joint positions at each phase.
 
@@ -295,26 +275,12 @@ def observe(promp: ProMP, rows: Vec, values: Vec, noise: Vec) -> ProMP:
     return replace(promp, mean=mean.reshape(promp.mean.shape), cov=0.5 * (cov + cov.T))
 
 
-def weight_root(promp: ProMP) -> Vec:
-    """Return R with ``R R^T = Sigma``, shape (n_weights, n_weights)."""
+def draw_weights(promp: ProMP, n: int, rng: np.random.Generator) -> Vec:
+    """Draw weights without regard to joint limits, shape (n, n_joints, n_basis)."""
     sizes, directions = np.linalg.eigh(promp.cov)
-    return np.asarray(directions * np.sqrt(np.clip(sizes, 0.0, None)))
-
-
-def draw_weights(
-    promp: ProMP, n: int, rng: np.random.Generator, root: Vec | None = None
-) -> Vec:
-    """Draw weights without regard to joint limits, shape (n, n_joints, n_basis).
-
-    Args:
-        promp: Primitive.
-        n: Number of draws.
-        rng: Source of chance.
-        root: :func:`weight_root`, for a caller that draws again and again.
-    """
-    root = weight_root(promp) if root is None else root
+    root = directions * np.sqrt(np.clip(sizes, 0.0, None))
     away = rng.standard_normal((n, len(root))) @ root.T
-    return promp.mean + away.reshape(n, promp.n_joints, promp.n_basis)
+    return np.asarray(promp.mean + away.reshape(n, promp.n_joints, promp.n_basis))
 
 
 def draw_like(weights: Vec, n: int, rng: np.random.Generator, floor: float = FLOOR) -> Vec:

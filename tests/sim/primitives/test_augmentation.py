@@ -1,5 +1,7 @@
 """Varied elbows keep the palm paths, the joint limits and the ends of a motion."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 
@@ -7,10 +9,9 @@ from app.sim.cells.cell import load_cell
 from app.sim.core.arrays import Vec
 from app.sim.human import model as human
 from app.sim.primitives.augmentation import draw_swivel, vary_elbow
-from app.sim.primitives.via_points import points_of
 from tests.sim.demonstrations import reaches
 
-POINTS = points_of(load_cell().body)
+POINTS = partial(human.joint_points, size=load_cell().body)
 
 
 def motion(i: int = 0) -> Vec:

@@ -7,11 +7,12 @@ from app.errors import InvalidInput, NotFound
 from app.sim.cells.cell import Cell, load_cell
 from app.sim.human import model as human
 from app.sim.human.anthropometry import BodySize
-from app.sim.primitives import promp
+from app.sim.primitives import primitive_library, promp
 from app.sim.primitives.library_file import load_primitives, primitive_for, segments_of
 from app.sim.primitives.primitive_library import (
     BODIES,
     MotionLibrary,
+    draw_samples,
     motion_library,
     people_sizes,
 )
@@ -163,6 +164,13 @@ def test_without_augmentation_samples_are_the_demonstrations(cell: Cell) -> None
     first = load_primitives()[0]
     np.testing.assert_array_equal(library.samples[: len(first.weights)], first.weights)
     np.testing.assert_array_equal(library.duration[:, 1], 0.0)
+
+
+def test_draws_that_are_missing_are_demonstrations(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(primitive_library, "ROUNDS", 0)
+    known = load_primitives()[0].weights
+    drawn = draw_samples(load_primitives()[0], len(known) + 2, np.random.default_rng(1))
+    np.testing.assert_array_equal(drawn, np.concatenate([known, known[:2]]))
 
 
 def test_library_cannot_be_changed(library: MotionLibrary) -> None:

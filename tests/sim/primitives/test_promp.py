@@ -11,7 +11,6 @@ from app.sim.core.arrays import Vec
 from app.sim.primitives.promp import (
     ProMP,
     basis,
-    basis_slope,
     draw_like,
     draw_weights,
     fit,
@@ -21,14 +20,12 @@ from app.sim.primitives.promp import (
     observe,
     of_weights,
     positions,
-    speeds,
     usual_width,
 )
 from tests.sim import make_promp_reference as reference
 from tests.sim.demonstrations import reaches
 
 Z = np.linspace(0.0, 1.0, 41)
-RATE = np.full(41, 1.0)
 
 
 @pytest.fixture(scope="module")
@@ -47,12 +44,6 @@ def test_basis_sums_to_one_and_peaks_at_its_centres() -> None:
     phi = basis(np.linspace(0.0, 1.0, 12), 12, usual_width(12))
     np.testing.assert_allclose(phi.sum(axis=1), 1.0, atol=1e-14)
     assert (phi.argmax(axis=1) == np.arange(12)).all()
-
-
-def test_basis_slope_is_the_derivative_of_the_basis() -> None:
-    step, width = 1e-6, usual_width(12)
-    numeric = (basis(Z + step, 12, width) - basis(Z - step, 12, width)) / (2 * step)
-    np.testing.assert_allclose(basis_slope(Z, 12, width), numeric, atol=1e-7)
 
 
 def test_ridge_regression_is_that_of_its_formula() -> None:
@@ -92,13 +83,6 @@ def test_given_phases_align_demonstrations_of_unlike_pace() -> None:
     aligned = fit([path, late], [1.0, 1.0], phases=[x, x**2], floor=0.0)
     blind = fit([path, late], [1.0, 1.0], floor=0.0)
     assert moments(aligned, Z)[1].max() < 1e-5 < 1e-2 < moments(blind, Z)[1].max()
-
-
-def test_speeds_are_the_derivatives_of_the_positions(promp: ProMP) -> None:
-    weights, step = draw_weights(promp, 3, np.random.default_rng(2)), 1e-6
-    ahead, behind = (positions(promp, weights, Z + s) for s in (step, -step))
-    found = speeds(promp, weights, Z, np.full(41, 0.8))
-    np.testing.assert_allclose(found, 0.8 * (ahead - behind) / (2 * step), atol=1e-6)
 
 
 def test_moments_are_those_of_many_draws(promp: ProMP) -> None:
