@@ -16,11 +16,13 @@ from app.errors import InvalidInput
 from app.policies.configs import presets
 from app.policies.configs.fields import entries
 from app.policies.evaluation.registry import (
+    MAX_EPISODES,
     PROTOCOLS,
     check_motions,
     default_checkpoint,
     most_episodes,
 )
+from app.policies.report.page import evaluations
 from app.store.records import JobRecord, NewJob
 
 MAX_SEED = 2**31 - 1
@@ -297,13 +299,49 @@ class SweepSpec(_Spec):
             raise InvalidInput("objective.episodes", self.objective.episodes, rule)
 
 
-AnySpec = TrainSpec | EvaluateSpec | SweepSpec
+class ReportSpec(_Spec):
+    """Write the report that compares Tandem with the thesis."""
+
+    kind: Literal["report"]
+    measure: bool = Field(
+        False, description="measure again by evaluations; otherwise from stored results"
+    )
+    episodes: int | None = Field(
+        None,
+        ge=1,
+        le=MAX_EPISODES,
+        description="of each evaluation, where it admits so many; its own number if null",
+    )
+    seed: Seed = Field(11, description="seed of the evaluations")
+    parallel: Annotated[int, Field(ge=1, le=MAX_PARALLEL)] = Field(
+        1, description="evaluations that are queued or run at once"
+    )
+
+    def new_job(self) -> NewJob:
+        """Return the job to queue.
+
+        Raises:
+            InvalidInput: A number of episodes is given without evaluations.
+        """
+        if self.episodes is not None and not self.measure:
+            raise InvalidInput("episodes", self.episodes, "must be null without measure")
+        return NewJob(
+            kind=self.kind,
+            spec=self._body(),
+            seed=self.seed,
+            total_steps=len(evaluations()) if self.measure else None,
+            **self.labels(),
+        )
+
+
+AnySpec = TrainSpec | EvaluateSpec | SweepSpec | ReportSpec
 JobSpec = Annotated[AnySpec, Field(discriminator="kind")]
 _JOB_SPEC: TypeAdapter[AnySpec] = TypeAdapter(JobSpec)
 _TYPES: Mapping[str, type[AnySpec]] = {
     "train": TrainSpec,
     "evaluate": EvaluateSpec,
     "sweep": SweepSpec,
+    "report": ReportSpec,
 }
 
 

@@ -33,6 +33,7 @@ from app.store.database.schema import check_schema
 from app.store.engine import Store
 from app.store.records import Claim
 from jobs.executor import Executor, Exit, Handle, LocalProcess
+from jobs.reports import Reports
 from jobs.resume_files import remove_unneeded
 from jobs.retention import Retention
 from jobs.sweeps import Sweeps
@@ -120,7 +121,7 @@ class Supervisor:
         self._tracer = tracer or NoOpTracer()
         self._min_free_bytes = min_free_bytes
         self._retention = retention
-        self._sweeps = Sweeps()
+        self._composed = (Sweeps(), Reports())
         self._workers: dict[Claim, _Worker] = {}
         self._orphans_queued = False
         self._not_before = -math.inf
@@ -216,7 +217,8 @@ class Supervisor:
                 self._fill_reserve()
                 logger.info("the queue goes on after: %s", self._waiting)
             self._waiting = None
-            self._sweeps.advance(self._store)
+            for one in self._composed:
+                one.advance(self._store)
             while len(self._workers) < self._max_running and self._start_next():
                 pass
         elif waiting is not None:

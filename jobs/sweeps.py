@@ -8,7 +8,6 @@ pruned by the median rule.
 Source: Bergstra et al. (2011), Golovin et al. (2017); Optuna (Akiba et al. 2019).
 """
 
-import contextlib
 import logging
 import time
 from collections.abc import Mapping, Sequence
@@ -24,10 +23,10 @@ from optuna.distributions import (
 )
 from optuna.trial import FrozenTrial, TrialState, create_trial
 
-from app.errors import InvalidInput, NotFound, WrongState
+from app.errors import InvalidInput, NotFound
 from app.policies.configs import presets
 from app.policies.configs.fields import entries
-from app.store import jobs, metrics, sweeps
+from app.store import composed_jobs, jobs, metrics
 from app.store.engine import Store
 from app.store.records import JobRecord
 from jobs.spec import SweepSpec, parse_spec
@@ -88,7 +87,7 @@ def trials_of(store: Store, job: JobRecord) -> tuple[SweepTrial, ...]:
     Raises:
         NotFound: The job is no sweep.
     """
-    spec, made = spec_of(job), sweeps.jobs_of(store, job.id)
+    spec, made = spec_of(job), composed_jobs.parts_of(store, job.id)
     evaluations = {one.trial: one for one in made if one.kind == "evaluate"}
     return tuple(
         _trial(spec, one, evaluations.get(one.trial)) for one in made if one.kind == "train"
@@ -162,21 +161,22 @@ class Sweeps:
         """
         if time.monotonic() < self._next:
             return
-        for job in sweeps.open_sweeps(store):
+        for job in composed_jobs.open_jobs(store, "sweep"):
             try:
                 self._advance(store, job)
             except (InvalidInput, NotFound) as error:
                 logger.warning("%s", error.message, extra={"job_id": job.id})
-                sweeps.end_sweep(store, job.id, "failed", error=error.message)
+                composed_jobs.end(store, job.id, "failed", error=error.message)
         self._next = time.monotonic() + PERIOD_S
 
     def _advance(self, store: Store, job: JobRecord) -> None:
         spec, trials = spec_of(job), trials_of(store, job)
         if job.state == "cancelling":
-            _cancel(store, job, trials)
+            made = [part for one in trials for part in (one.training, one.evaluation) if part]
+            composed_jobs.cancel(store, job, made)
             return
         if job.state == "queued":
-            sweeps.start_sweep(store, job.id)
+            composed_jobs.start(store, job.id)
         for one in trials:
             if one.state == "evaluating" and one.evaluation is None:
                 _evaluate(store, job, spec, one)
@@ -186,7 +186,7 @@ class Sweeps:
         ended = [one for one in counted if one.state in ENDED]
         best = best_of(spec, trials)
         mean = best.value["mean"] if best is not None and best.value is not None else None
-        sweeps.record_sweep(store, job.id, len(ended), mean)
+        composed_jobs.record(store, job.id, len(ended), {"best": mean})
         room = min(spec.trials - len(counted), spec.parallel - len(counted) + len(ended))
         if room > 0:
             _start(store, job, spec, trials)
@@ -210,8 +210,8 @@ class Sweeps:
             warm_up = int(WARM_UP * (one.training.total_steps or 0))
             pruner = optuna.pruners.MedianPruner(STARTUP_TRIALS, warm_up)
             if pruner.prune(study, _frozen(spec, one, _curve(store, spec, one))):
-                sweeps.mark_pruned(store, one.training.id)
-                _request_cancel(store, one.training)
+                composed_jobs.mark_pruned(store, one.training.id)
+                composed_jobs.request_cancel(store, one.training)
 
 
 def _start(store: Store, job: JobRecord, spec: SweepSpec, trials: Sequence[SweepTrial]) -> None:
@@ -318,21 +318,6 @@ def _curve(store: Store, spec: SweepSpec, trial: SweepTrial) -> dict[int, float]
     return {step: value for step, value in values.items() if value is not None}
 
 
-def _cancel(store: Store, job: JobRecord, trials: Sequence[SweepTrial]) -> None:
-    """Cancel the jobs of a sweep; the sweep ends after the last of them."""
-    made = [part for one in trials for part in (one.training, one.evaluation) if part]
-    active = [part for part in made if not part.is_final]
-    for part in active:
-        _request_cancel(store, part)
-    if not active:
-        sweeps.end_sweep(store, job.id, "cancelled")
-
-
-def _request_cancel(store: Store, job: JobRecord) -> None:
-    with contextlib.suppress(WrongState, NotFound):  # it has ended since
-        jobs.request_cancel(store, job.id)
-
-
 def _end(
     store: Store, job: JobRecord, best: SweepTrial | None, trials: Sequence[SweepTrial]
 ) -> None:
@@ -340,7 +325,7 @@ def _end(
     if best is None:
         errors = [f"trial {one.number}: {one.error}" for one in trials if one.error]
         text = f"no trial has a value; {errors[-1] if errors else 'all were pruned'}"
-        sweeps.end_sweep(store, job.id, "failed", error=text)
+        composed_jobs.end(store, job.id, "failed", error=text)
         return
     result = {
         "trial": best.number,
@@ -349,4 +334,4 @@ def _end(
         "job": best.training.id,
         "checkpoint": (best.training.result or {}).get("checkpoint"),
     }
-    sweeps.end_sweep(store, job.id, "succeeded", result=result)
+    composed_jobs.end(store, job.id, "succeeded", result=result)

@@ -13,7 +13,7 @@ import typer
 
 from app import logs
 from app.cli import backup, cells, evaluate, export, recordings, serve, train
-from app.cli.report.command import report
+from app.cli.report import report
 from app.errors import InvalidInput, NotFound, ServiceError
 
 app = typer.Typer(

@@ -20,7 +20,7 @@ from app.store.engine import Store
 from app.store.events import append_event
 from app.store.fencing import change_state, fenced_update
 from app.store.jobs import job_from_row, read_job
-from app.store.records import SWEEP, Claim, JobRecord, NewCheckpoint, ResumeState
+from app.store.records import COMPOSED, Claim, JobRecord, NewCheckpoint, ResumeState
 
 logger = logging.getLogger(__name__)
 
@@ -51,7 +51,7 @@ def claim_next(store: Store) -> tuple[Claim, JobRecord] | None:
     Returns:
         The claim and the job, or None if nothing is queued.
     """
-    queued = sa.select(jobs.c.id).where(jobs.c.state == "queued", jobs.c.kind != SWEEP)
+    queued = sa.select(jobs.c.id).where(jobs.c.state == "queued", jobs.c.kind.not_in(COMPOSED))
     first = queued.order_by(jobs.c.priority.desc(), jobs.c.number)
     with store.reading() as connection:  # an empty queue needs no write lock
         if connection.execute(first.limit(1)).scalar() is None:
@@ -227,7 +227,7 @@ def resume_manifests(store: Store, job_id: str) -> tuple[Mapping[str, Any], ...]
 
 def running_jobs(store: Store) -> tuple[RunningJob, ...]:
     """Return the running jobs that have a worker."""
-    query = sa.select(jobs).where(jobs.c.state == "running", jobs.c.kind != SWEEP)
+    query = sa.select(jobs).where(jobs.c.state == "running", jobs.c.kind.not_in(COMPOSED))
     with store.reading() as connection:
         found = [job_from_row(row) for row in connection.execute(query).mappings()]
     return tuple(

@@ -14,7 +14,7 @@ from app.store.database.tables import jobs, resume_states
 from app.store.engine import Store
 from app.store.fencing import change_state, fenced_update, peek
 from app.store.jobs import read_job
-from app.store.records import SWEEP, Claim, JobRecord, Spent
+from app.store.records import COMPOSED, Claim, JobRecord, Spent
 
 MAX_ERROR = 4000
 """Longest error text of a job [characters]."""
@@ -122,7 +122,9 @@ def requeue_orphans(store: Store) -> tuple[str, ...]:
     Raises:
         StorageFull: No room is left.
     """
-    running = sa.select(jobs.c.id).where(jobs.c.state == "running", jobs.c.kind != SWEEP)
+    running = sa.select(jobs.c.id).where(
+        jobs.c.state == "running", jobs.c.kind.not_in(COMPOSED)
+    )
     running = running.order_by(jobs.c.number)
 
     def requeue(connection: sa.Connection) -> tuple[str, ...]:

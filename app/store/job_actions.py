@@ -10,7 +10,7 @@ from app.store.database.tables import jobs, resume_states
 from app.store.engine import Store
 from app.store.fencing import change_state
 from app.store.jobs import read_job
-from app.store.records import SWEEP, JobRecord
+from app.store.records import COMPOSED, JobRecord
 
 REPEATABLE = ("cancelled", "failed")
 """States from which a job is resumed or retried."""
@@ -50,7 +50,7 @@ def resume_job(
             require_repeatable(job, "resume")
         newest = sa.select(sa.func.max(resume_states.c.step))
         step = connection.execute(newest.where(resume_states.c.job_id == job_id)).scalar()
-        if step is None and job.kind == SWEEP:
+        if step is None and job.kind in COMPOSED:
             step = job.step
         elif step is None:
             rule = (

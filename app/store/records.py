@@ -19,8 +19,8 @@ FINAL_STATES: tuple[JobState, ...] = ("succeeded", "failed", "cancelled")
 Spent = Literal["step budget", "time budget", "pruned"]
 """What ended a job before its last step: a budget, or the pruner of its sweep."""
 
-SWEEP = "sweep"
-"""The kind of job that has no worker: the supervisor starts its trials."""
+COMPOSED = ("sweep", "report")
+"""Kinds of jobs that have no worker: the supervisor starts their parts, jobs likewise."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -62,9 +62,9 @@ class NewJob:
     time_budget_s: float | None = None
     """Run time after which the job ends and keeps its state [s]."""
     part_of: str | None = None
-    """Id of the sweep that it is part of; None after its deletion, too."""
+    """Id of the sweep or report that it is part of; None after its deletion, too."""
     trial: int | None = None
-    """Number of its trial in the sweep, from 1."""
+    """Number of its trial in the sweep, or of its evaluation in the report, from 1."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

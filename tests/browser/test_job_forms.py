@@ -147,6 +147,39 @@ def test_sweep_shows_its_trials_and_marks_the_best(
     assert len(page.problems) == 1  # type: ignore[attr-defined]  # one refusal
 
 
+def test_report_is_opened_and_its_evaluations_are_listed_with_it(
+    open_page: Callable[..., Page], server: str
+) -> None:
+    page = open_page((1280, 900), scene=False)
+    open_form(page)
+    page.click('[data-kind="report"]')
+    submit(page)
+    assert state_of(page) == "succeeded"
+    expect(page.locator('.is-open [data-role="report"]')).to_contain_text("From stored results")
+    with page.context.expect_page() as opened:
+        page.click('.is-open [data-action="open-report"]')
+    expect(opened.value.locator("h1")).to_have_text("The thesis beside Tandem")
+    assert opened.value.locator("img").first.evaluate("one => one.naturalWidth") > 100
+    opened.value.close()
+    open_form(page)
+    page.click('[data-kind="report"]')
+    page.select_option("#report-measure", "true")
+    page.fill("#report-episodes", "0")
+    page.click("form.train [type=submit]")
+    expect(page.locator("#report-episodes-error")).to_contain_text("1")
+    page.fill("#report-episodes", "1")
+    job_id = submit(page)
+    row = page.locator('.is-open [data-role="parts"] tbody tr').first
+    expect(row).to_contain_text("pick-cases, pick")
+    query = {"part_of": job_id}
+    (part,) = patient_http.get(f"{server}/v1/jobs", params=query).json()["items"][-1:]
+    expect(page.locator(f'[data-job="{part["id"]}"]')).to_have_count(0)
+    row.locator("button").click()
+    expect(page.locator(f'.is-open[data-job="{part["id"]}"]')).to_have_count(1)
+    patient_http.post(f"{server}/v1/jobs/{job_id}/cancel")
+    assert len(page.problems) == 1  # type: ignore[attr-defined]  # one refusal
+
+
 def test_cell_follows_a_training_and_says_with_which_step(
     open_page: Callable[..., Page], server: str
 ) -> None:

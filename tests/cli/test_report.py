@@ -5,9 +5,9 @@ import re
 from pathlib import Path
 
 from app.__main__ import main
-from app.cli.report.command import PAGE, RESULTS
-from app.cli.report.page import ITEMS, page
-from app.cli.report.parts import Config, Curve, Measure, StoredValue
+from app.cli.report import PAGE, RESULTS
+from app.policies.report.page import ITEMS, page
+from app.policies.report.parts import Config, Curve, Measure, StoredValue
 
 PRINTED = (
     "Table 3.1", "Figure 3.1", "Figure 3.2", "figure 3.3", "Figure 4.1", "Table 4.1",

@@ -1,4 +1,4 @@
-"""Training and evaluation as jobs: post, list, follow."""
+"""Jobs: post, list, follow."""
 
 import asyncio
 from collections.abc import AsyncIterator
@@ -48,7 +48,7 @@ def create_job(
     response: Response,
     idempotency_key: IdempotencyKey = None,
 ) -> JobPublic:
-    """Queue a training or an evaluation; ``Location`` says where to follow it."""
+    """Queue a job of any kind; ``Location`` says where to follow it."""
     return queued(checked(body, services), services, response, idempotency_key)
 
 
@@ -62,8 +62,8 @@ async def list_jobs(
         str | None,
         Query(
             max_length=36,
-            description="only the jobs of the sweep with this id; `none`: only jobs that are "
-            "part of no sweep",
+            description="only the parts of the sweep or report with this id; `none`: only jobs "
+            "that are part of no other",
         ),
     ] = None,
 ) -> Response:

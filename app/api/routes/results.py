@@ -3,12 +3,14 @@
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Query, Response
+from fastapi.responses import HTMLResponse
 
 from app.api.schemas.results import ComparisonPublic, EvaluationList, EvaluationPublic
 from app.api.schemas.sweeps import TrialList
 from app.api.services import ServicesDep
-from app.errors import InvalidInput, NotFound
+from app.errors import InvalidInput, NotFound, WrongState
 from app.policies.evaluation.registry import PROTOCOLS
+from app.policies.report.document import document
 from app.store.jobs import get_job, list_evaluations
 from jobs.comparison import MAX_JOBS, compare, curves_as_csv
 from jobs.sweeps import trials_of
@@ -16,6 +18,7 @@ from jobs.sweeps import trials_of
 JobIds = Annotated[
     list[str], Query(max_length=MAX_JOBS, description="id of a job; repeated, 1 to 20 times")
 ]
+REPORT_POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'; sandbox"
 NO_JOB: dict[int | str, dict[str, Any]] = {404: {"description": "There is no such job"}}
 
 router = APIRouter(prefix="/v1", tags=["results"])
@@ -76,6 +79,24 @@ def list_trials(job_id: str, services: ServicesDep) -> TrialList:
     """Return the trials with their drawn fields and values; `best` marks the best one."""
     job = get_job(services.store, job_id)
     return TrialList.from_domain(job, trials_of(services.store, job))
+
+
+@router.get(
+    "/jobs/{job_id}/report",
+    summary="The page of a report",
+    response_class=HTMLResponse,
+    responses={409: {"description": "It has no page: it has not succeeded"}},
+)
+def get_report(job_id: str, services: ServicesDep) -> HTMLResponse:
+    """Return the report as one HTML file with its figures."""
+    job = get_job(services.store, job_id)
+    if job.kind != "report":
+        raise NotFound("report", job_id)
+    if job.state != "succeeded" or job.result is None:
+        rule = f"of job {job.number}: its page is written at its end"
+        raise WrongState("state", job.state, rule, ("succeeded",))
+    content = document(str(job.result["markdown"]), f"Tandem, report {job.number}")
+    return HTMLResponse(content, headers={"Content-Security-Policy": REPORT_POLICY})
 
 
 @router.get("/evaluations/{job_id}", summary="One evaluation")

@@ -82,6 +82,7 @@ JOBS: dict[str, Any] = {
         "trials": 20,
         "objective": {"protocol": "pick-single", "quantity": "success", "episodes": 1000},
     },
+    "report": {"kind": "report"},
 }
 BUDGET: dict[str, Any] = {"step_budget": 204800, "time_budget_s": None}
 LABELS: dict[str, Any] = {"name": "baseline", "notes": "to compare with", "priority": 5}

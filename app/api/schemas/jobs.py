@@ -45,8 +45,10 @@ class JobPublic(Answer):
     ended_by: str | None = Field(
         description="what ended it early: `step budget`, `time budget` or `pruned`; else null"
     )
-    part_of: str | None = Field(description="id of the sweep that it is part of")
-    trial: int | None = Field(description="number of its trial in the sweep")
+    part_of: str | None = Field(description="id of the sweep or report that it is part of")
+    trial: int | None = Field(
+        description="number of its trial in the sweep, or of its evaluation in the report"
+    )
     progress: float | None = Field(
         description="done share of its steps, or of the budget that is nearer to its end"
     )

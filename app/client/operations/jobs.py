@@ -8,7 +8,7 @@ from app.api.schemas.jobs import JobList, JobPublic, MetricsPublic
 from app.api.schemas.presets import PresetList
 from app.api.schemas.protocols import ProtocolList
 from app.client.transport import StreamEvent, Transport
-from jobs.spec import Budget, EvaluateSpec, JobChanges, SweepSpec, TrainSpec
+from jobs.spec import Budget, EvaluateSpec, JobChanges, ReportSpec, SweepSpec, TrainSpec
 
 
 class JobsOperations(Transport):
@@ -16,7 +16,7 @@ class JobsOperations(Transport):
 
     def create_job(
         self,
-        body: TrainSpec | EvaluateSpec | SweepSpec | Mapping[str, Any],
+        body: TrainSpec | EvaluateSpec | SweepSpec | ReportSpec | Mapping[str, Any],
         *,
         idempotency_key: str | None = None,
     ) -> JobPublic:

@@ -53,6 +53,10 @@ class ResultsOperations(Transport):
             TrialList, self._send("GET", f"/v1/jobs/{quote(job_id, safe='')}/trials")
         )
 
+    def get_report(self, job_id: str) -> str:
+        """The page of a report."""
+        return self._send("GET", f"/v1/jobs/{quote(job_id, safe='')}/report").text
+
     def get_evaluation(self, job_id: str) -> EvaluationPublic:
         """One evaluation."""
         return self._parsed(

@@ -8,6 +8,7 @@ import { EndedByBudget } from "./budgets.js";
 import { MAX_JOBS } from "./compare.js";
 import { JobActions, Labels, isActive } from "./jobactions.js";
 import { Follow } from "./follow.js";
+import { ReportDetail } from "./report.js";
 import { SweepDetail } from "./sweep.js";
 
 const POLL_MS = 2000;
@@ -18,7 +19,7 @@ const OUTCOMES = [
   { key: "collision", label: "collision", colour: "bad" },
   { key: "timeout", label: "time-out", colour: "warn" },
 ];
-const UNITS = { evaluate: "rows", sweep: "trials" };
+const UNITS = { evaluate: "rows", sweep: "trials", report: "evaluations" };
 const REWARD = [{ key: "reward", label: "mean reward of an episode", colour: "accent" }];
 
 /** Newest jobs, asked for again every two seconds while the server is there; parts of others, too. */
@@ -122,7 +123,7 @@ function Job({ job, jobs, open, chosen, onChoose, ...rest }) {
   </li>`;
 }
 
-const DETAILS = { evaluate: Evaluation, sweep: SweepDetail };
+const DETAILS = { evaluate: Evaluation, sweep: SweepDetail, report: ReportDetail };
 
 function stateOf(job) {
   return job.ended_by ? `${job.state}: ${job.ended_by}` : job.state;

@@ -7,11 +7,12 @@ import { isActive } from "./jobactions.js";
 import { JobList, QueueWaits, useOpened } from "./jobs.js";
 import { EvaluateForm } from "./evaluateform.js";
 import { useItems } from "./formfields.js";
+import { ReportForm } from "./reportform.js";
 import { SweepForm } from "./sweepform.js";
 import { TrainForm } from "./trainform.js";
 
 const KINDS = { train: ["Training", TrainForm], evaluate: ["Evaluation", EvaluateForm],
-  sweep: ["Sweep", SweepForm] };
+  sweep: ["Sweep", SweepForm], report: ["Report", ReportForm] };
 
 export function Training({ link, cell, jobs: newest, error, waiting, refresh, acting, onAct }) {
   const presets = useItems(link, "v1/presets");

@@ -1,6 +1,6 @@
 """Report on chapter 5 of the thesis: task and motion together."""
 
-from app.cli.report.parts import (
+from app.policies.report.parts import (
     STANDING_STILL,
     Curve,
     Item,

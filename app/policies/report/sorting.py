@@ -1,6 +1,6 @@
 """Report on chapter 3 of the thesis: sorting."""
 
-from app.cli.report.parts import Curve, Item, Measure, StoredValue, configured, trained
+from app.policies.report.parts import Curve, Item, Measure, StoredValue, configured, trained
 
 SORTING = "Sorting (chapter 3)"
 SORT = trained("sorting-e0-thesis", "thesis-sorting")

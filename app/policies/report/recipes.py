@@ -1,6 +1,6 @@
 """Report on the trainings of all recipes beside ours."""
 
-from app.cli.report.parts import Curve, Item, Measure, trained
+from app.policies.report.parts import Curve, Item, Measure, trained
 
 CURVES = (
     ("sorting, e0", "thesis-sorting", "sorting-e0-thesis", "sorting-curves", "sorting-e0-dqn"),

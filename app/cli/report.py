@@ -9,8 +9,8 @@ from app.cli.options import Json, prepared_settings
 from app.cli.output import print_result
 from app.errors import InvalidInput
 
-ROOT = Path(__file__).resolve().parents[3]
-PAGE, RESULTS = ROOT / "docs/report/index.md", ROOT / "docs/results"
+DOCS = Path(__file__).resolve().parents[2] / "docs"
+PAGE, RESULTS = DOCS / "report/index.md", DOCS / "results"
 
 
 def report(
@@ -22,7 +22,7 @@ def report(
     if not results.is_dir():
         raise InvalidInput("--results", str(results), "must be a folder of result files")
     prepared_settings()
-    from app.cli.report.page import page
+    from app.policies.report.page import page
 
     text, missing = page(results)
     output.parent.mkdir(parents=True, exist_ok=True)

@@ -1,14 +1,17 @@
 """The page of the report: a section per table or figure, with the provenance of its numbers."""
 
 import json
+from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
-from app.cli.report.both import BOTH_ITEMS
-from app.cli.report.motion import MOTION_ITEMS
-from app.cli.report.parts import Config, Item, StoredValue
-from app.cli.report.recipes import RECIPE_ITEMS
-from app.cli.report.sorting import SORTING_ITEMS
+from app.policies.evaluation.registry import PROTOCOLS, default_checkpoint
+from app.policies.report.both import BOTH_ITEMS
+from app.policies.report.motion import MOTION_ITEMS
+from app.policies.report.parts import Config, Item, StoredValue
+from app.policies.report.recipes import RECIPE_ITEMS
+from app.policies.report.sorting import SORTING_ITEMS
 
 MISSING = "not measured"
 ITEMS = (*SORTING_ITEMS, *MOTION_ITEMS, *BOTH_ITEMS, *RECIPE_ITEMS)
@@ -23,24 +26,55 @@ To measure again, run the commands that are named below a table with the files t
 deviation.
 
 """
+MEASURED = """Numbers from a *job*, as named below a table, were measured for this report; all
+others are stored.
+
+"""
 Json = dict[str, Any]
+Find = Callable[[str], Json | None]
+"""Returns the result of a file, by its name without ``.json``."""
+RESULTS = Path(__file__).resolve().parents[3] / "docs/results"
+"""The stored results."""
+TASKS = ("-e0", "-e1")
+"""Ends of the names of files that state the task of a sorting policy."""
 
 
-def page(results: Path) -> tuple[str, list[str]]:
-    """Return the report as Markdown, and the measures without a result file."""
-    parts, missing = [HEAD], []
+def evaluations() -> dict[str, tuple[str, str]]:
+    """Return the result files that evaluations write, with protocol and checkpoint of each."""
+    sources = [
+        one for item in ITEMS for line in item.measures for one in (line.recipe, line.best)
+    ]
+    files = {one.file for one in sources if isinstance(one, StoredValue)}
+    found = {}
+    for file in sorted(files):
+        protocol = next((file[:-3] for end in TASKS if file.endswith(end)), file)
+        if protocol in PROTOCOLS:
+            own = default_checkpoint(protocol)
+            found[file] = protocol, own if protocol == file else f"sorting{file[-3:]}"
+    return found
+
+
+def page(results: Path, measured: Mapping[str, Json] | None = None) -> tuple[str, list[str]]:
+    """Return the report as Markdown, and the measures without a result file.
+
+    Args:
+        results: Folder of the result files.
+        measured: Results in place of files, by the name of the file without ``.json``.
+    """
+    find = partial(_find, results, measured or {})
+    parts, missing = [HEAD, MEASURED if measured else ""], []
     chapter = ""
     for item in ITEMS:
         if item.chapter != chapter:
             chapter = item.chapter
             parts.append(f"## {chapter}\n\n")
-        text, absent = section(item, results)
+        text, absent = section(item, find)
         parts.append(text)
         missing += [f"{item.title}: {name}" for name in absent]
     return "".join(parts).rstrip() + "\n", missing
 
 
-def section(item: Item, results: Path) -> tuple[str, list[str]]:
+def section(item: Item, find: Find) -> tuple[str, list[str]]:
     """Return the section of a table or figure, and the measures without a result file."""
     lines, absent, used = [f"### {item.title}", ""], [], dict[str, Json]()
     if item.measures:
@@ -48,7 +82,7 @@ def section(item: Item, results: Path) -> tuple[str, list[str]]:
     for measure in item.measures:
         cells = []
         for source in (measure.recipe, measure.best):
-            text = _cell(source, results, used)
+            text = _cell(source, find, used)
             absent += [measure.name] if text == MISSING else []
             cells.append(text)
         lines.append(f"| {measure.name} | {measure.thesis} | {cells[0]} | {cells[1]} |")
@@ -62,18 +96,23 @@ def section(item: Item, results: Path) -> tuple[str, list[str]]:
     return "\n".join(lines) + "\n", absent
 
 
-def _cell(source: StoredValue | Config | str, results: Path, used: dict[str, Json]) -> str:
+def _find(results: Path, measured: Mapping[str, Json], file: str) -> Json | None:
+    path = results / f"{file}.json"
+    if file in measured or not path.exists():
+        return measured.get(file)
+    found: Json = json.loads(path.read_text(encoding="utf-8"))
+    return found
+
+
+def _cell(source: StoredValue | Config | str, find: Find, used: dict[str, Json]) -> str:
     """Return a value as text; remember the file that it is from."""
     if isinstance(source, str):
         return source
     if isinstance(source, Config):
         return f"{source.value():,.10g}"
-    path = results / f"{source.file}.json"
-    if not path.exists():
-        return MISSING
-    found = json.loads(path.read_text(encoding="utf-8"))
-    value = source.value(found)
-    if value is None:
+    found = find(source.file)
+    value = None if found is None else source.value(found)
+    if found is None or value is None:
         return MISSING
     used[source.file] = found
     return value
@@ -87,7 +126,8 @@ def _origin(name: str, found: Json) -> str:
         usual += " --checkpoint sorting-e1"
     if name.startswith("thesis-"):
         usual += " --checkpoint FILE"
-    parts = [f"`docs/results/{name}.json`: `{found.get('command', usual)}`"]
+    place = found.get("job") or f"`docs/results/{name}.json`"
+    parts = [f"{place}: `{found.get('command', usual)}`"]
     parts += [f"{key} {found[key]}" for key in ("episodes", "seed") if key in found]
     if "checkpoint" in found:
         parts.append(f"checkpoint `{found['checkpoint'][:12]}`")

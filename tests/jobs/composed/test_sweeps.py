@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 
 from app.errors import InvalidInput
-from app.store import attempts, completion, job_actions, jobs, metrics, sweeps
+from app.store import attempts, completion, composed_jobs, job_actions, jobs, metrics
 from app.store.engine import Store
 from app.store.records import JobRecord
 from jobs.spec import parse_spec
@@ -142,7 +142,7 @@ def test_sweep_is_no_work_for_a_worker_and_outlives_its_server(store: Store) -> 
     look(store, sweep)
     assert attempts.running_jobs(store) == ()
     assert completion.requeue_orphans(store) == ()
-    assert [one.id for one in sweeps.open_sweeps(store)] == [sweep.id]
+    assert [one.id for one in composed_jobs.open_jobs(store, "sweep")] == [sweep.id]
 
 
 @pytest.mark.parametrize(

@@ -2,7 +2,9 @@
 
 from typing import Literal
 
-from app.cli.report.parts import (
+from app.policies.configs import presets
+from app.policies.configs.reach import ReachPreset
+from app.policies.report.parts import (
     STANDING_STILL,
     Curve,
     Item,
@@ -12,8 +14,6 @@ from app.cli.report.parts import (
     rates,
     trained,
 )
-from app.policies.configs import presets
-from app.policies.configs.reach import ReachPreset
 from app.sim.cells.cell import load_cell
 from app.sim.people.pedestrian import PedestrianSettings
 from app.sim.scenario.kernels.episode import SUCCESS_DISTANCE

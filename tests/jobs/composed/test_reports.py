@@ -1,0 +1,106 @@
+"""Reports, looked at by a new server each time; their evaluations are ended by the test."""
+
+from typing import Any
+
+import pytest
+
+from app.errors import InvalidInput
+from app.policies.report.page import RESULTS, evaluations, page
+from app.store import attempts, completion, job_actions, jobs
+from app.store.engine import Store
+from app.store.records import JobRecord
+from jobs.reports import Reports
+from jobs.spec import parse_spec
+
+
+def post(store: Store, **changes: Any) -> JobRecord:
+    return jobs.create_job(store, parse_spec({"kind": "report", **changes}).new_job())
+
+
+def look(store: Store, report: JobRecord) -> JobRecord:
+    """Let a server that has just started look at the reports."""
+    Reports().advance(store)
+    return jobs.get_job(store, report.id)
+
+
+def parts_of(store: Store, report: JobRecord) -> list[JobRecord]:
+    return list(jobs.list_jobs(store, part_of=report.id, limit=200).items)[::-1]
+
+
+def run_one(store: Store) -> JobRecord:
+    """Run the next queued evaluation; each states a success of 12.34 %."""
+    found = attempts.claim_next(store)
+    assert found is not None
+    claim, job = found
+    rate = {"mean": 0.1234, "low": 0.1, "high": 0.2}
+    rows = [{"name": name, "n": 7, "success": rate} for name in ("interpolated", "critic")]
+    result = {"protocol": job.spec["protocol"], "seed": 5, "episodes": 7, "results": rows}
+    completion.finish(store, claim, result=result)
+    return job
+
+
+def test_report_of_stored_results_is_the_page_of_the_command(store: Store) -> None:
+    report = look(store, post(store, priority=3))
+    assert report.state == "succeeded" and not parts_of(store, report)
+    assert report.result is not None
+    assert (report.result["markdown"], report.result["missing"]) == page(RESULTS)
+
+
+def test_evaluations_are_queued_a_few_at_once_and_fill_the_page(store: Store) -> None:
+    report = post(store, measure=True, episodes=300, parallel=2, seed=5, priority=4)
+    assert report.total_steps == len(evaluations())
+    assert look(store, report).state == "running"
+    first, second = parts_of(store, report)
+    assert (first.priority, first.seed, first.spec["episodes"]) == (4, 5, 300)
+    assert look(store, report).step == 0 and len(parts_of(store, report)) == 2
+    for done in range(1, len(evaluations()) + 1):
+        assert run_one(store).part_of == report.id
+        assert look(store, report).step == done
+    asked = [(one.spec["protocol"], one.spec["checkpoint"]) for one in parts_of(store, report)]
+    assert asked == list(evaluations().values())
+    ended = look(store, report)
+    assert ended.state == "succeeded" and ended.result is not None
+    assert ended.result["measured"] == len(evaluations())
+    assert "12.34 % (10.00-20.00)" in ended.result["markdown"]
+    assert f"job {second.number}: `python -m app evaluate" in ended.result["markdown"]
+    oracle = [one.spec["episodes"] for one in parts_of(store, report)]
+    assert max(oracle) == 300
+
+
+def test_evaluation_without_a_result_is_named_and_not_replaced_by_a_stored_one(
+    store: Store,
+) -> None:
+    report = look(store, post(store, measure=True, parallel=8))
+    while report.state == "running":
+        found = attempts.claim_next(store)
+        if found is not None:
+            completion.fail(store, found[0], "no luck")
+        report = look(store, report)
+    assert report.result is not None
+    assert report.result["failed"] == list(evaluations())
+    assert "success" in report.result["markdown"]
+    assert "`docs/results/reach-random.json`" not in report.result["markdown"]
+
+
+def test_cancelled_report_continues_with_what_it_has_when_resumed(store: Store) -> None:
+    report = post(store, measure=True)
+    look(store, report)
+    kept = run_one(store)
+    look(store, report)
+    jobs.request_cancel(store, report.id)
+    assert look(store, report).state == "cancelling"
+    assert look(store, report).state == "cancelled"
+    assert [one.state for one in parts_of(store, report)] == ["succeeded", "cancelled"]
+    job_actions.resume_job(store, report.id)
+    assert look(store, report).state == "running"
+    repeated = parts_of(store, report)
+    assert [one.state for one in repeated] == ["succeeded", "cancelled", "queued"]
+    assert repeated[2].spec == repeated[1].spec != kept.spec
+
+
+@pytest.mark.parametrize(
+    "changes", [{"episodes": 5}, {"measure": True, "episodes": 10**6}, {"parallel": 0}]
+)
+def test_spec_outside_its_limits_is_refused(changes: dict[str, Any]) -> None:
+    with pytest.raises((InvalidInput, ValueError), match=r"episodes|parallel"):
+        parse_spec({"kind": "report", **changes}).new_job()
