@@ -79,8 +79,8 @@ BOTH_ITEMS = (
                 "success with the target that the critic chooses", "chosen", "success"
             ),
         ),
-        agreement="agrees on the values: those of rarely chosen targets are underestimated. The "
-        "success differs by less than three seeds can tell. The thesis prints no numbers "
+        agreement="agrees on the values: those of rarely chosen targets are underestimated. "
+        "The success differs by less than three seeds can tell. The thesis prints no numbers "
         "([notebook](../notebook/pick.md#task-maximisation-bias)).",
         command="python -m tools.docs.task_maximisation FOLDER",
         images=(
