@@ -51,7 +51,8 @@ def names(client: TestClient) -> Iterator[dict[str, str]]:
     training = {"kind": "train", "preset": "pick-td3", "priority": -100}
     job = client.post("/v1/jobs", json=training).json()["id"]
     client.post(f"/v1/jobs/{job}/cancel")
-    yield {"name": "line-2", "tracker_id": tracker, "world_id": "main", "job_id": job}
+    ids = {"tracker_id": tracker, "world_id": "main", "job_id": job}
+    yield {"name": "line-2", "reference": "pick", **ids}
     client.delete(f"/v1/trackers/{tracker}")
 
 

@@ -42,11 +42,12 @@ def _cases(rows: list[Json]) -> list[list[str]]:
 
 def _calibration(rows: list[Json]) -> list[list[str]]:
     head = ["", "outcome", "predictions", "rate [%]", "mean [%]", "ECE [%]", "by chance [%]"]
-    more = ["recalibrated ECE [%]", "recalibrated Brier"]
+    more = ["ECE after 200 [%]", "ECE after half [%]", "Brier after half"]
     lines = [[*head, "Brier", "constant", "AUC", *more]]
     for row in rows:
         for outcome in ("success", "contact"):
             one: Json = row[outcome]
+            again = one["recalibrated"]
             auc = "" if one["auc"] is None else f"{one['auc']:.3f}"
             lines.append(
                 [
@@ -60,8 +61,8 @@ def _calibration(rows: list[Json]) -> list[list[str]]:
                     f"{one['brier']:.4f}",
                     f"{one['brier_constant']:.4f}",
                     auc,
-                    f"{100.0 * one['recalibrated']['ece']:.1f}",
-                    f"{one['recalibrated']['brier']:.4f}",
+                    *(f"{100.0 * again[kind]['ece']:.1f}" for kind in ("few", "half")),
+                    f"{again['half']['brier']:.4f}",
                 ]
             )
     return lines

@@ -1,4 +1,4 @@
-"""Trained policies: list, read, download, upload."""
+"""Trained policies: list, read, download, upload, recalibrate."""
 
 from typing import Annotated, Any
 
@@ -9,11 +9,19 @@ from starlette.responses import Response
 from app.api.bodies import FILE_TYPES
 from app.api.description import CREATED
 from app.api.registry import PolicyRegistry
-from app.api.schemas.checkpoints import CheckpointList, CheckpointPublic
+from app.api.schemas.checkpoints import CheckpointList, CheckpointPublic, Recalibration
 from app.api.services import Services, ServicesDep
 from app.errors import InvalidInput, NotFound
-from app.policies.checkpoints.checkpoint import CHOOSING, REACHING, SORTING, purpose_of
+from app.policies.checkpoints.checkpoint import (
+    CHOOSING,
+    REACHING,
+    SORTING,
+    Checkpoint,
+    purpose_of,
+)
+from app.policies.checkpoints.checkpoint import load as load_checkpoint
 from app.policies.checkpoints.upload import MAX_FILE, read_upload
+from app.policies.inference.recalibration import recalibrated
 from app.store import checkpoints
 from app.store.records import NewCheckpoint
 from jobs.checkpoints import read_sound
@@ -95,6 +103,11 @@ def _store(
         SORTING: services.sorting_policies,
     }
     registries[purpose_of(found.manifest)].check(found.manifest, found.tensors)
+    return _keep(found, services)
+
+
+def _keep(found: Checkpoint, services: Services) -> tuple[CheckpointPublic, bool]:
+    """Store a checkpoint; return whether it is new."""
     try:
         checkpoints.get_checkpoint(services.store, found.sha256)
         new = False
@@ -103,6 +116,35 @@ def _store(
     entry = NewCheckpoint(sha256=found.sha256, manifest=found.manifest, tensors=found.tensors)
     record = checkpoints.put_checkpoint(services.store, entry)
     return CheckpointPublic.from_domain(record), new
+
+
+@router.post(
+    "/{reference}/recalibration",
+    status_code=201,
+    summary="Recalibrate the outcome probabilities of a checkpoint",
+    responses={
+        200: {
+            "model": CheckpointPublic,
+            "description": "The same checkpoint is stored already",
+            **CREATED,
+        },
+        201: CREATED,
+        507: {},
+    },
+)
+def recalibrate_checkpoint(
+    reference: str, request: Recalibration, services: ServicesDep, response: Response
+) -> CheckpointPublic:
+    """Store a copy whose probabilities are corrected by outcomes observed in one cell.
+
+    It acts and values as before. Point an alias to it to use it.
+    """
+    record, tensors = read_sound(services.store, reference)
+    found = recalibrated(load_checkpoint(record.manifest, tensors), *request.to_domain())
+    checkpoint, new = _keep(found, services)
+    response.status_code = 201 if new else 200
+    response.headers["Location"] = f"{router.prefix}/{checkpoint.sha256}"
+    return checkpoint
 
 
 @router.get("/{reference}", summary="One checkpoint, by SHA-256 or alias")

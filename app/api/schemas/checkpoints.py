@@ -1,14 +1,18 @@
 """Checkpoints as they are shown."""
 
 from datetime import datetime
-from typing import Any, Self
+from typing import Any, Literal, Self
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field
 
 from app.api.schemas.examples import shows
 from app.api.schemas.numbers import Answer, Body
 from app.policies.checkpoints import pretrained
 from app.policies.checkpoints.checkpoint import purpose_of
+from app.policies.inference.recalibration import MIN_OUTCOMES, with_timeout
+from app.policies.networks.outcome import OUTCOMES
 from app.store.records import CheckpointRecord, Page
 
 
@@ -59,6 +63,40 @@ class CheckpointList(Answer):
         """Return the schema of a page."""
         items = [CheckpointPublic.from_domain(one) for one in page.items]
         return cls(items=items, next_cursor=page.next_cursor)
+
+
+class ObservedOutcome(Body):
+    """A pick that was carried out after a task selection: what was predicted, what came."""
+
+    success: float = Field(ge=0.0, le=1.0, description="`success.mean` of the answer")
+    contact: float = Field(ge=0.0, le=1.0, description="`contact.mean` of the answer")
+    outcome: Literal["success", "contact", "timeout"]
+
+
+class Recalibration(Body):
+    """Outcomes observed in one cell."""
+
+    model_config = shows(
+        {
+            "outcomes": [
+                {"success": 0.8, "contact": 0.05, "outcome": "success"},
+                {"success": 0.6, "contact": 0.1, "outcome": "timeout"},
+            ]
+            * (MIN_OUTCOMES // 2)
+        }
+    )
+
+    outcomes: list[ObservedOutcome] = Field(
+        min_length=MIN_OUTCOMES,
+        max_length=10_000,
+        description="predictions of this checkpoint whose pick has ended, in any order",
+    )
+
+    def to_domain(self) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+        """Return predicted probabilities, shape (n, 3), and indices of outcomes, (n,)."""
+        said = np.array([(one.success, one.contact) for one in self.outcomes])
+        came = np.array([OUTCOMES.index(one.outcome) for one in self.outcomes])
+        return with_timeout(said[:, 0], said[:, 1]), came
 
 
 class AliasTarget(Body):

@@ -10,6 +10,7 @@ from app.api.schemas.checkpoints import (
     AliasTarget,
     CheckpointList,
     CheckpointPublic,
+    Recalibration,
 )
 from app.client.transport import Transport
 
@@ -37,6 +38,17 @@ class CheckpointsOperations(Transport):
         return self._parsed(
             CheckpointPublic,
             self._send("POST", "/v1/checkpoints", content=content, query={"sha256": sha256}),
+        )
+
+    def recalibrate_checkpoint(
+        self, reference: str, body: Recalibration | Mapping[str, Any]
+    ) -> CheckpointPublic:
+        """Recalibrate the outcome probabilities of a checkpoint."""
+        return self._parsed(
+            CheckpointPublic,
+            self._send(
+                "POST", f"/v1/checkpoints/{quote(reference, safe='')}/recalibration", body=body
+            ),
         )
 
     def get_checkpoint(self, reference: str) -> CheckpointPublic:

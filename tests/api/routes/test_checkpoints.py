@@ -141,3 +141,45 @@ def test_unknown_alias_and_checkpoint_are_named(client: TestClient) -> None:
     assert (answer.status_code, answer.json()["field"]) == (422, "checkpoint")
     answer = client.put("/v1/aliases/MINE", json={"checkpoint": "reach"})
     assert (answer.status_code, answer.json()["field"]) == (422, "alias")
+
+
+CAME = [{"success": 0.9, "contact": 0.05, "outcome": "timeout"}] * 30
+
+
+def test_recalibrated_checkpoint_predicts_what_was_observed(
+    client: TestClient, state: dict[str, Any]
+) -> None:
+    answer = client.post("/v1/checkpoints/pick/recalibration", json={"outcomes": CAME})
+    assert answer.status_code == 201, answer.text
+    made = answer.json()
+    assert answer.headers["location"] == f"/v1/checkpoints/{made['sha256']}"
+    assert made["manifest"]["recalibration"]["outcomes"] == {
+        "success": 0,
+        "contact": 0,
+        "timeout": 30,
+    }
+    again = client.post("/v1/checkpoints/pick/recalibration", json={"outcomes": CAME})
+    assert (again.status_code, again.json()["sha256"]) == (200, made["sha256"])
+    before, after = (
+        client.post("/v1/task-selection", json={**state, "checkpoint": one}).json()
+        for one in ("pick", made["sha256"])
+    )
+    for old, new in zip(before["candidates"], after["candidates"], strict=True):
+        assert old["value"] == new["value"]
+        assert new["outcome"]["success"]["mean"] < old["outcome"]["success"]["mean"] - 0.3
+
+
+@pytest.mark.parametrize(
+    ("reference", "change", "field"),
+    [
+        ("pick", {"outcomes": CAME[:19]}, "outcomes"),
+        ("pick", {"outcomes": [{**CAME[0], "success": 1.5}] * 30}, "outcomes[0].success"),
+        ("pick", {"outcomes": [{**CAME[0], "outcome": "luck"}] * 30}, "outcomes[0].outcome"),
+        ("reach", {"outcomes": CAME}, "checkpoint"),
+    ],
+)
+def test_recalibration_that_cannot_be_is_refused(
+    client: TestClient, reference: str, change: dict[str, Any], field: str
+) -> None:
+    answer = client.post(f"/v1/checkpoints/{reference}/recalibration", json=change)
+    assert (answer.status_code, answer.json()["field"]) == (422, field)

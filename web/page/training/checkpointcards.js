@@ -84,7 +84,15 @@ function facts(one) {
     "CPU time": format.duration(manifest.cpu_s),
     Size: `${format.number(one.size / 1024 ** 2)} MiB`,
     "Trained with": `torch ${manifest.versions?.torch ?? "–"}`,
+    ...recalibration(manifest.recalibration),
   };
+}
+
+/** Origin of recalibrated probabilities, if a checkpoint has them. */
+function recalibration(record) {
+  if (!record) return {};
+  const n = Object.values(record.outcomes).reduce((sum, count) => sum + count, 0);
+  return { "Recalibrated by": `${n} outcomes, from ${format.short(record.from)}` };
 }
 
 function Facts({ entries }) {

@@ -8,11 +8,11 @@ counts. The Brier score stands beside that of a constant, and AUC tells how well
 ranks episodes.
 
 The probabilities are those of the people of the training, a mixture; an observation does not
-tell which kind a person is. ``recalibrated`` states ECE and Brier score after Platt scaling on
-the other half of the episodes of this kind: what outcomes observed in one cell could correct.
+tell which kind a person is. ``recalibrated`` states ECE and Brier score after a recalibration
+(``recalibration.py``) by few and by many predictions beside the same kind of people: what
+outcomes observed in one cell correct. It is measured on the half that the fit did not see.
 
-Source: Guo et al., *On calibration of modern neural networks* (2017); Brier (1950); Platt,
-*Probabilistic outputs for support vector machines* (1999).
+Source: Guo et al., *On calibration of modern neural networks* (2017); Brier (1950).
 """
 
 from dataclasses import replace
@@ -29,6 +29,7 @@ from app.policies.evaluation.pick.episodes import Evaluator, View, settings_for
 from app.policies.evaluation.pick.people import beside_recordings
 from app.policies.evaluation.pick.tasks import FASTER, PAIR, settings_of
 from app.policies.evaluation.rows import EvaluationRequest, Json
+from app.policies.inference.recalibration import fit_map, with_timeout
 from app.policies.inference.value_networks import ValueNetworks, pick_preset_of
 from app.sim.pick.batch import PickSettings
 from app.sim.scenario.kernels.episode import COLLISION, SUCCESS
@@ -36,6 +37,8 @@ from app.sim.scenario.kernels.episode import COLLISION, SUCCESS
 DEFAULT_EPISODES = 2000
 BINS = 10
 """Bins of equal counts."""
+FEW = 200
+"""Predictions of a recalibration by few of them."""
 LATEST_S = 4.0
 """Latest time at which a prediction is taken [s]."""
 Float = NDArray[np.float64]
@@ -91,9 +94,13 @@ def run_calibration(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
         kept = np.concatenate(rule.rows)
         found = np.concatenate(rule.predictions)
         row: dict[str, Any] = {"name": name, "n": n, "predictions": len(kept)}
+        corrected = _recalibrated(found, run.outcome[kept], request.seed)
         for k, (what, outcome) in enumerate((("success", SUCCESS), ("contact", COLLISION))):
             happened = run.outcome[kept] == outcome
             row[what] = calibration(found[:, k], found[:, 2 + k], happened, request.seed)
+            row[what]["recalibrated"] = {
+                name: _errors(one[:, k], happened) for name, one in corrected.items()
+            }
         rows.append(row)
         stated[name] = settings_of(evaluator)
     return {"settings": stated, "results": rows}
@@ -115,8 +122,6 @@ def calibration(
     chance = np.random.default_rng(seed).random((200, len(probability))) < probability
     floor = [_ece(probability, one, parts) for one in chance]
     rate = happened.mean()
-    corrected = _recalibrated(probability, happened, seed)
-    again = np.array_split(np.argsort(corrected, kind="stable"), BINS)
     bins = [
         {
             "probability": float(probability[part].mean()),
@@ -129,33 +134,40 @@ def calibration(
     return {
         "rate": float(rate),
         "mean": float(probability.mean()),
-        "ece": _ece(probability, happened, parts),
+        **_errors(probability, happened),
         "ece_floor": float(np.mean(floor)),
-        "brier": float(((probability - happened) ** 2).mean()),
         "brier_constant": float(rate * (1.0 - rate)),
         "auc": _auc(probability, happened),
-        "recalibrated": {
-            "ece": _ece(corrected, happened, again),
-            "brier": float(((corrected - happened) ** 2).mean()),
-        },
         "bins": bins,
     }
 
 
-def _recalibrated(probability: Float, happened: NDArray[np.bool_], seed: int) -> Float:
-    """Return the probabilities after Platt scaling, each half fitted to the other one."""
-    x = scipy.special.logit(np.clip(probability, 1e-4, 1.0 - 1e-4))
-    halves = np.array_split(np.random.default_rng(seed).permutation(len(x)), 2)
-    corrected = np.empty(len(x))
+def _recalibrated(found: Float, outcome: NDArray[np.int64], seed: int) -> dict[str, Float]:
+    """Return probabilities after recalibrations, each half by predictions of the other one.
+
+    Args:
+        found: Predicted probabilities of success and contact, in the first columns.
+        outcome: Outcome of each episode, shape (n,).
+        seed: Seed of the halves.
+
+    Returns:
+        Probabilities, shape (n, 3), after recalibration by FEW predictions and by a half.
+    """
+    predicted = with_timeout(found[:, 0], found[:, 1])
+    label = np.where(outcome == SUCCESS, 0, np.where(outcome == COLLISION, 1, 2))
+    halves = np.array_split(np.random.default_rng(seed).permutation(len(label)), 2)
+    corrected = {name: np.empty((len(label), 3)) for name in ("few", "half")}
     for rows, others in (halves, halves[::-1]):
-        sign = np.where(happened[others], 1.0, -1.0)
-
-        def loss(line: Float, x: Float = x[others], sign: Float = sign) -> float:
-            return float(np.logaddexp(0.0, -sign * (line[0] * x + line[1])).mean())
-
-        slope, offset = scipy.optimize.minimize(loss, (1.0, 0.0), method="Nelder-Mead").x
-        corrected[rows] = scipy.special.expit(slope * x[rows] + offset)
+        for name, fitted in (("few", others[:FEW]), ("half", others)):
+            corrected[name][rows] = fit_map(predicted[fitted], label[fitted])(predicted[rows])
     return corrected
+
+
+def _errors(probability: Float, happened: NDArray[np.bool_]) -> dict[str, float]:
+    """Return expected calibration error and Brier score."""
+    parts = np.array_split(np.argsort(probability, kind="stable"), BINS)
+    brier = float(((probability - happened) ** 2).mean())
+    return {"ece": _ece(probability, happened, parts), "brier": brier}
 
 
 def _ece(
