@@ -8,7 +8,9 @@ cannot allocate arrays: its caller allocates the work space, once per batch.
 from collections.abc import Callable
 from typing import Any, ParamSpec, TypeVar
 
-from numba import njit, typeof
+from numba import typeof
+
+from app.sim.core.dispatcher import Kernel
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -20,11 +22,12 @@ FAR = 1e3
 
 
 def kernel(**options: Any) -> Callable[[Callable[P, R]], Callable[P, R]]:
-    """Return numba's decorator for kernels that allocate no arrays; ``options`` are njit's."""
-    compile_with: Any = njit  # its types do not know _nrt
-    decorate: Callable[[Callable[P, R]], Callable[P, R]] = compile_with(
-        cache=True, _nrt=False, **options
-    )
+    """Return a decorator for kernels that allocate no arrays; ``options`` are njit's."""
+
+    def decorate(function: Callable[P, R]) -> Callable[P, R]:
+        compiled: Callable[P, R] = Kernel(function, targetoptions={"_nrt": False, **options})
+        return compiled
+
     return decorate
 
 
