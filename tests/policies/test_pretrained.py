@@ -16,5 +16,7 @@ def test_file_that_is_not_the_shipped_one_is_damaged(monkeypatch: pytest.MonkeyP
 
 
 def test_unknown_alias_names_the_known_ones() -> None:
-    with pytest.raises(NotFound, match="known: pick, pick-monitored, sorting-e0, sorting-e1, reach"):
+    with pytest.raises(
+        NotFound, match="known: pick, pick-monitored, sorting-e0, sorting-e1, reach"
+    ):
         pretrained.load("pikc")
