@@ -341,7 +341,7 @@ def test_a_handshake_beyond_the_limits_of_websockets_is_refused(small: Small) ->
 
 def test_idle_connections_are_closed_for_new_ones() -> None:
     n_clients = http_limits.MAX_CONNECTIONS + 40
-    with serving() as small, ExitStack() as stack:
+    with serving(HEAD_S=300.0) as small, ExitStack() as stack:  # none is closed for its age
         idle = [stack.enter_context(small.connect()) for _ in range(n_clients)]
         assert patient_http.get(
             f"http://127.0.0.1:{small.port}/name", headers={"Authorization": f"Bearer {TOKEN}"}

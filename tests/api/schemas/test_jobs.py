@@ -8,9 +8,9 @@ from app.api.schemas.jobs import JobPublic
 from app.store import attempts, jobs
 from app.store.engine import Store
 from app.store.records import JobRecord, MetricRow, NewJob
-from tests.support.databases import database_url, migrated, store
+from tests.support.databases import database_url, migrated, postgresql, store
 
-__all__ = ["database_url", "migrated", "store"]
+__all__ = ["database_url", "migrated", "postgresql", "store"]
 
 POINT = MetricRow(step=25, values={"time_left_s": 75.0}, at=datetime.now(UTC))
 
