@@ -30,7 +30,6 @@ CUDA_PACKAGES := triton cuda-bindings cuda-pathfinder cuda-toolkit \
 # Test files side by side, at most four: each process holds torch and the kernels. Files of a
 # folder follow each other and share its fixtures.
 SIDE_BY_SIDE := --numprocesses auto --maxprocesses 4 --dist loadfile --no-loadscope-reorder
-BROWSERS ?= 2
 
 # $(call INSTALL_LOCK,file): installs exactly what the file lists, and counts along. pip's
 # notes on a configured index that lacks a package are left out: another one has it.
@@ -62,7 +61,7 @@ test-ci: $(VENV)/dev.stamp $(VENV)/setup.stamp ## tests of test, test-postgres a
 	@$(PY) -m pytest -m 'not slow and not bench and not browser' $(SIDE_BY_SIDE) --durations 15
 
 test-browser: $(VENV)/dev.stamp $(VENV)/setup.stamp ## the page in a real Chromium
-	@$(PY) -m pytest -m browser --numprocesses $(BROWSERS) --dist loadfile --durations 15
+	@$(PY) -m pytest -m browser --numprocesses 2 --dist loadfile --durations 15
 
 test-postgres: $(VENV)/dev.stamp ## store and supervisor on a PostgreSQL server of the tests
 	@$(PY) -m pytest -m 'postgres and not slow' $(SIDE_BY_SIDE) tests/store tests/jobs
