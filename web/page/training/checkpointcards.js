@@ -111,7 +111,8 @@ function Uses({ one, acts, jobs }) {
   const maker = jobs?.find((job) => job.id === one.job_id);
   const uses = [
     acts && "Acts in the live cell",
-    one.job_id ? `Made by job ${maker?.number ?? format.short(one.job_id)}` : "Shipped or uploaded",
+    one.job_id ? `Made by job ${maker?.number ?? format.short(one.job_id)}`
+      : one.manifest.recalibration ? "Recalibrated or uploaded" : "Shipped or uploaded",
     ...tested.map((job) => `Job ${job.number} · ${job.spec.protocol}: ${job.state}`),
   ].filter(Boolean);
   return html`<ul class="uses" aria-label="Use">${uses.map((text) => html`<li key=${text}>${text}</li>`)}

@@ -99,7 +99,7 @@ def run_calibration(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
             happened = run.outcome[kept] == outcome
             row[what] = calibration(found[:, k], found[:, 2 + k], happened, request.seed)
             row[what]["recalibrated"] = {
-                name: _errors(one[:, k], happened) for name, one in corrected.items()
+                size: _errors(one[:, k], happened) for size, one in corrected.items()
             }
         rows.append(row)
         stated[name] = settings_of(evaluator)
