@@ -162,6 +162,7 @@ def test_list_shows_each_change_at_once(client: TestClient) -> None:
 
     job = client.post("/v1/jobs", json=TRAIN).json()["id"]
     client.post(f"/v1/jobs/{job}/cancel")
+    client.get(f"/v1/jobs/{job}/events")  # ends with the job; it may have started
     assert listed() == listed() == [(job, None)]
     client.patch(f"/v1/jobs/{job}", json={"name": "renamed"})
     assert listed() == [(job, "renamed")]
