@@ -19,6 +19,7 @@ from app.live import commands
 from app.live.arm import HumanGeometry, LiveArm
 from app.live.command_checks import Command, check
 from app.live.people.interfaces import MovingPeople
+from app.live.planned_motion import PlannedMotion
 from app.live.read_model import frozen
 from app.live.safety import explanation
 from app.live.safety.layer import LiveSafety
@@ -73,6 +74,7 @@ class BaseWorld(ABC, Generic[P]):
         self.robot = LiveArm(cell, pick.DEFAULT_ACTION if policy is None else policy.action)
         self.safety = LiveSafety(self.robot, cell)
         self._planned: TrajectorySegment
+        self.planner = PlannedMotion(self.robot)
         self._touching = False
         self.paused = False
         self.status: Status = "moving"
@@ -208,6 +210,7 @@ class BaseWorld(ABC, Generic[P]):
     def _restart_robot(self) -> None:
         self.robot.place(self._start_configuration())
         self.contact, self._touching = None, False
+        self.planner.reset()
         self._prepare_restart()
         self._begin("blocked" if self.in_contact() else "moving")
 
@@ -287,8 +290,6 @@ class BaseWorld(ABC, Generic[P]):
         self.enter("contact")
 
     def _touched_person(self, found: Contact) -> int | None:
-        if found.kind != "human":
-            return None
         index = found.worker
         if found.walker is not None:
             index = len(self.people.geometry.q) + found.walker
@@ -311,7 +312,7 @@ class BaseWorld(ABC, Generic[P]):
         names = tuple(candidate.id for candidate in offered)
         self.offered = offered
         self.previous = before if before in names else None
-        self.decision = None
+        self.decision = self.planner.act = None
         if self.policy is None or not names:
             return None
         try:

@@ -2,8 +2,9 @@
 
 The policy moves the robot in all phases of a pick (``sim/pick/kernels/grasp.py``). A picked
 station leaves the candidates until all have been picked, and the next pick continues from
-there; a pick that was broken off stays a candidate. A case study starts without the safety
-layer, as in its source.
+there; a pick that was broken off stays a candidate. Beside people at rest a planner moves the
+robot (``sim/pick/resting_people.py``). A case study has neither planner nor safety layer, as in
+its source.
 """
 
 from dataclasses import replace
@@ -131,11 +132,13 @@ class LivePickWorld(BaseWorld[LiveWorkers]):
     def _after_period(self) -> None:
         if self.status in ("moving", "picking"):
             self._decide()
+        decision, phase = self.decision if self._case is None else None, self.progress.phase
+        self.planner.update(self.people, self.policy, decision, self.offered, phase)
 
     def _wanted(self) -> TrajectorySegment:
         act = np.zeros(5)
         if self.decision is not None and self.status in ("moving", "picking"):
-            act = np.asarray(self.decision.actions[self.decision.index], dtype=np.float64)
+            act = self.planner.or_of(self.decision)
         return self.robot.segment(act)
 
     def _move_robot(self, before: HumanGeometry) -> None:
@@ -247,6 +250,8 @@ class LivePickWorld(BaseWorld[LiveWorkers]):
             return self.note
         if status in ("moving", "picking") and (reason := self.slowed()) is not None:
             return reason
+        if status == "moving" and self.decision is not None and self.planner.act is not None:
+            return status_messages.planned(self._label(self.decision.chosen))
         if status == "picking" and self.decision is not None:
             return explanation.picking(self.decision, self.progress, self._label)
         if status == "moving" and self.decision is not None:

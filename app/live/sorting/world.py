@@ -174,6 +174,9 @@ class LiveSortingWorld(BaseWorld[LiveWorkers]):
         if self.status == "moving":
             self._let_interfere()
             self._decide()
+        decision, phase = self.decision, self.progress.phase
+        decision = decision if self.status == "moving" else None
+        self.planner.update(self.people, self.policy, decision, self.offered, phase)
 
     def _move_robot(self, before: HumanGeometry) -> None:
         vertical = self._vertical
@@ -202,9 +205,7 @@ class LiveSortingWorld(BaseWorld[LiveWorkers]):
             return self.robot.toward(self.robot.configuration_at(aim)[0])
         if self._choice is None and self.policy is not None:
             return self.robot.toward(self.robot.home)
-        if self.decision is not None:
-            return np.asarray(self.decision.actions[self.decision.index], dtype=np.float64)
-        return np.zeros(5)
+        return np.zeros(5) if self.decision is None else self.planner.or_of(self.decision)
 
     # Halves of a move.
 

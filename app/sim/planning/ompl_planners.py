@@ -104,6 +104,11 @@ class MotionPlan:
         return self.outcome == "solved"
 
 
+def is_installed() -> bool:
+    """Return whether OMPL is installed."""
+    return ob is not None
+
+
 def plan(
     checker: Checker, start: Vec, goals: Vec, settings: PlanSettings, seed: int = 1
 ) -> MotionPlan:

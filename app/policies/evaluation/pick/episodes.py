@@ -15,6 +15,7 @@ from app.policies.evaluation.pick.recorded_people import Trace
 from app.policies.evaluation.statistics import wilson
 from app.policies.inference.value_networks import ValueNetworks
 from app.sim.cells.cell import Cell
+from app.sim.collision.checker import Shapes
 from app.sim.collision.fcl_recheck import Trajectory
 from app.sim.core.observation_layout import slices_of
 from app.sim.people.human_motion_config import HumanMotionConfig
@@ -30,7 +31,9 @@ from app.sim.pick.batch import (
 from app.sim.pick.kernels.grasp import APPROACH, LIFT
 from app.sim.pick.kernels.observation import observe_batch
 from app.sim.pick.kernels.observation_layout import DISTANCE_SCALE, LAYOUT, N_PICK, PICK_SIZES
+from app.sim.pick.resting_people import PickTarget, RestingPeoplePlanner
 from app.sim.scenario.kernels import episode as kernel
+from app.sim.scene.scene import NO_CYLINDERS, people_geometry_of
 
 Index = NDArray[np.int64]
 SECOND_GOAL = slices_of(PICK_SIZES)["second_goal_clearance"].start
@@ -195,6 +198,7 @@ class Evaluator:
         seen: Seen = seen_exactly,
         start: Callable[[PickBatch], None] = lambda _batch: None,
         predicts: bool = False,
+        planned: bool = False,
     ) -> Episodes:
         """Run all episodes under a rule; record poses of the first ``n_recorded``.
 
@@ -204,16 +208,18 @@ class Evaluator:
             seen: Observation model; a stateful one serves one run only.
             start: Changes the starts of the episodes.
             predicts: Whether the rule reads the predicted outcomes.
+            planned: Whether a planner moves the robot beside people at rest.
         """
         batch, n = self.batch, self.batch.n_envs
         batch.reset()
         start(batch)
         chosen, switches = np.zeros(n, dtype=np.int64), np.zeros(n, dtype=np.int64)
         act = np.zeros((n, 5), dtype=np.float32)
-        trace = Trace(batch, n_recorded)
+        trace, planners = Trace(batch, n_recorded), self._planners() if planned else None
         first = True
         while (rows := np.flatnonzero(batch.state.outcome == kernel.RUNNING)).size:
-            actions, view = self._view(rows, chosen[rows], first, seen, predicts)
+            sight = seen(batch, rows)
+            actions, view = self._view(rows, chosen[rows], first, sight, predicts)
             choice = rule(view)
             lifting = batch.state.phase[rows] == LIFT  # an object in hand is lifted first
             choice = np.where(lifting, chosen[rows], choice)
@@ -223,6 +229,8 @@ class Evaluator:
             act[rows] = actions[np.arange(len(rows)), choice]
             stations = batch.state.candidates[rows, choice]
             batch.set_goals(rows, batch.world.stations[stations])
+            if planners is not None:
+                self._plan(planners, rows, sight, act)
             trace.before(rows)
             batch.step(act, auto_reset=False, features=False)
             trace.after()
@@ -233,8 +241,35 @@ class Evaluator:
             trajectories=trace.trajectories(),
         )
 
+    def _planners(self) -> list[RestingPeoplePlanner]:
+        """Return a planner per environment."""
+        return [RestingPeoplePlanner(self.batch.arm) for _ in range(self.batch.n_envs)]
+
+    def _plan(
+        self,
+        planners: list[RestingPeoplePlanner],
+        rows: Index,
+        sight: Sight,
+        act: NDArray[np.float32],
+    ) -> None:
+        """Replace the policy's actions beside people at rest, in place."""
+        state, people = self.batch.state, self.batch.world.people
+        grasp = self.batch.settings.grasp
+        speeds = np.abs(sight.qd).max(axis=(1, 2))
+        for k, e in enumerate(rows):
+            if not planners[e].note(float(speeds[k])):
+                continue
+            crowd = people_geometry_of(people, sight.q[k], NO_CYLINDERS, sight.size[k])
+            target = PickTarget(
+                q_over=state.q_goal[e], q_grasp=state.q_grasp[e], phase=int(state.phase[e])
+            )
+            shapes = Shapes(columns=crowd.columns, cylinders=np.zeros((0, 4)))
+            found = planners[e].act(state.q[e], state.qd[e], shapes, target, grasp)
+            if found is not None:
+                act[e] = found
+
     def _view(
-        self, rows: Index, chosen: Index, first: bool, seen: Seen, predicts: bool
+        self, rows: Index, chosen: Index, first: bool, sight: Sight, predicts: bool
     ) -> tuple[NDArray[np.float32], View]:
         """Return the policy's action for each candidate, (n, k, 5), and the rule's input."""
         batch, state = self.batch, self.batch.state
@@ -243,7 +278,6 @@ class Evaluator:
         there = stations >= 0
         owner, place = np.nonzero(there)
         env, station = rows[owner], stations[owner, place]
-        sight = seen(batch, rows)
         obs = np.empty((len(env), self._networks.n_obs), dtype=np.float32)
         current = place == chosen[owner]
         phase = np.where(current, state.phase[env], APPROACH)

@@ -117,8 +117,11 @@ def run_people(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
 def run_rest(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
     """Evaluate one random target beside people who stand still in any posture.
 
-    A timeout is *blocked* where the configuration at the object is closer to the person than a
-    grasp permits, and *alone* where nobody is within ALONE_M of the robot.
+    Each kind of people once with the policy alone, and once with a planner beside people at
+    rest (``pick/resting_people.py``); the last two rows beside people who work.
+
+    A timeout is *blocked* where the configuration at the object, or over it, is closer to the
+    person than a grasp permits, and *alone* where nobody is within ALONE_M of the robot.
     """
     usual = settings_for((1, 1), pick_preset_of(checkpoint))
     networks, cell = ValueNetworks(checkpoint), cell_of(checkpoint.manifest)
@@ -128,13 +131,16 @@ def run_rest(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
         "off-task": replace(still, off_task=1.0),
         "reaches": replace(still, motion="reaches"),
         "stops": replace(usual.work, at_rest=1.0, off_task=0.5),
+        "works": usual.work,
     }
-    results, n = request.rows(len(rows)), request.episodes or DEFAULT_EPISODES
+    results, n = request.rows(2 * len(rows)), request.episodes or DEFAULT_EPISODES
     for name, work in rows.items():
         settings = replace(usual, work=work)
         evaluator = Evaluator(networks, cell, n, request.seed, settings)
-        run = evaluator.run(choice_rules.fixed(0))
-        results.append(run.row(name) | _timeouts(evaluator.batch, run))
+        for planned in (False, True):
+            run = evaluator.run(choice_rules.fixed(0), planned=planned)
+            row = run.row(f"{name}, planner" if planned else name)
+            results.append(row | _timeouts(evaluator.batch, run))
     return {"settings": settings_of(evaluator), "results": results}
 
 
@@ -142,21 +148,17 @@ def _timeouts(batch: PickBatch, run: Episodes) -> dict[str, dict[str, float]]:
     """Return the rates of timeouts with a blocked target and with nobody near."""
     n, state = batch.n_envs, batch.state
     late = np.flatnonzero(run.outcome == TIMEOUT)
-    q_goals = state.q_grasp[late]
+    arm, shared, crowd = batch.arm, batch.world.people, state.people
     blocked = sum(
-        clearance(
-            batch.arm,
-            batch.world.people,
-            q,
-            state.people.q[e],
-            state.people.cylinders[e],
-            state.people.size[e],
-        ).people_m
+        min(
+            clearance(arm, shared, q, crowd.q[e], crowd.cylinders[e], crowd.size[e]).people_m
+            for q in (state.q_goal[e], state.q_grasp[e])
+        )
         < batch.settings.grasp.start_clearance
-        for e, q in zip(late, q_goals, strict=True)
+        for e in late
     )
     alone = int((state.clear[late, 0] > ALONE_M).sum())
-    return {"timeout_blocked": wilson(int(blocked), n), "timeout_alone": wilson(alone, n)}
+    return {"timeout_blocked": wilson(blocked, n), "timeout_alone": wilson(alone, n)}
 
 
 def run_yielding(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:

@@ -1,0 +1,105 @@
+"""Planned motion beside people at rest, in place of a pick policy's.
+
+A learned policy is patient beside a person who stands still close to its target: the person
+may set off again. Where all people have been at rest for ``REST_S`` and the grasp is free, a
+motion planner (``planning/replanning.py``) moves the robot around them through the phases of
+the pick. It brakes where somebody enters its path. As soon as somebody moves, the policy moves
+the robot again.
+
+Source: ours; replanning after docs/method.md 2.6.
+"""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from app.sim.collision.checker import Checker, Shapes
+from app.sim.core.arrays import Vec
+from app.sim.pick.kernels.grasp import DESCEND, GraspRules
+from app.sim.planning.ompl_planners import PlanSettings, is_installed
+from app.sim.planning.replanning import EXTRA_MARGIN, ReplanningExecutor, ReplanningSettings
+from app.sim.robot.kernels.arm import CONTROLLED, Arm
+
+REST_S = 3.0
+"""Time at rest after which a planner moves the robot [s]: working people rest less between two
+moves (docs/results/pick.md)."""
+AT_REST = 0.1
+"""Greatest joint speed of a person at rest [m/s, rad/s]."""
+MAX_POSES = 3000
+"""Configurations that one plan may check; it then takes at most about 50 ms."""
+MOVING = ("following", "arrived")
+"""States of the executor in which its motion is used."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PickTarget:
+    """Target of a pick as configurations of the robot."""
+
+    q_over: Vec
+    """Joint positions over the object [rad], shape (6,)."""
+    q_grasp: Vec
+    """Joint positions at the object [rad], shape (6,)."""
+    phase: int
+    """Phase of the pick (``kernels/grasp.py``)."""
+
+    @property
+    def q(self) -> Vec:
+        """Joint positions that the phase asks for [rad], shape (6,)."""
+        return self.q_grasp if self.phase == DESCEND else self.q_over
+
+
+@dataclass(slots=True)
+class RestingPeoplePlanner:
+    """Moves one robot while all people are at rest; :meth:`note` is called every cycle."""
+
+    arm: Arm
+    """Robot in its cell."""
+    _rest_s: float = 0.0
+    _t: float = 0.0
+    _goal: Vec = field(default_factory=lambda: np.full(6, np.nan))
+    _executor: ReplanningExecutor | None = None
+
+    def note(self, speed: float) -> bool:
+        """Note one control cycle; return whether people have been at rest for ``REST_S``.
+
+        Args:
+            speed: Greatest joint speed of all people [m/s, rad/s]; inf without people.
+        """
+        self._t += self.arm.dt
+        self._rest_s = self._rest_s + self.arm.dt if speed <= AT_REST else 0.0
+        if self._rest_s < REST_S - 1e-9 or not is_installed():
+            self._executor = None
+            return False
+        return True
+
+    def act(
+        self, q: Vec, qd: Vec, people: Shapes, target: PickTarget, grasp: GraspRules
+    ) -> Vec | None:
+        """Return the action of a planned motion, shape (5,); None: the policy acts.
+
+        There is none where the target is closer to people than a grasp permits, and where no
+        path was found.
+
+        Args:
+            q: Joint positions [rad], shape (6,).
+            qd: Joint speeds [rad/s], shape (6,).
+            people: People at this moment.
+            target: Target and phase of the pick.
+            grasp: Rules of the grasp.
+        """
+        checker = Checker(self.arm, people, grasp.start_clearance)
+        if not all(checker.is_free(at) for at in (target.q_over, target.q_grasp)):
+            self._executor = None
+            return None
+        if self._executor is None or not np.array_equal(target.q, self._goal):
+            settings = ReplanningSettings(
+                role="replan-on-blocked",
+                plan=PlanSettings(max_poses=MAX_POSES),
+                margin=grasp.start_clearance - EXTRA_MARGIN,
+            )
+            self._goal = target.q.copy()
+            self._executor = ReplanningExecutor(self.arm, self._goal[None], settings)
+        speeds = self._executor.act(q, qd, people, self._t)
+        if self._executor.report.state not in MOVING:
+            return None
+        return np.asarray((speeds / self.arm.limits.qd_max)[:CONTROLLED])

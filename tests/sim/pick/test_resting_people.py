@@ -1,0 +1,101 @@
+"""A planner moves the robot around people at rest, and only then."""
+
+import numpy as np
+import pytest
+
+from app.sim.cells.cell import load_cell
+from app.sim.collision.checker import Checker, Shapes, no_people, shapes_of
+from app.sim.core.arrays import Vec
+from app.sim.human import model as human
+from app.sim.pick.batch import step_robot, target_configurations
+from app.sim.pick.kernels.grasp import APPROACH, DESCEND, LIFT, GraspRules
+from app.sim.pick.resting_people import AT_REST, REST_S, PickTarget, RestingPeoplePlanner
+from app.sim.scene.scene import arm_of
+from tests.sim.configurations import vertical_configuration
+
+CELL = load_cell()
+ARM, GRASP = arm_of(CELL), GraspRules()
+
+
+def station(name: str) -> Vec:
+    return np.array(CELL.station(name).position)
+
+
+def target(name: str, phase: int = APPROACH) -> PickTarget:
+    over, low, reached = target_configurations(ARM, GRASP, station(name)[None])
+    assert reached.all()
+    return PickTarget(q_over=over[0], q_grasp=low[0], phase=phase)
+
+
+def reaching_to(palm: tuple[float, float, float]) -> Shapes:
+    rest = human.rest_posture(*CELL.human.home)
+    posture = human.reach("r", np.array(palm), rest, CELL.body).q
+    return shapes_of(CELL, posture[None])
+
+
+IN_THE_WAY = reaching_to((-0.1, 0.7, 0.2))
+START = vertical_configuration(ARM, station("cube0"))[0]
+GOAL = target("cube4")
+
+
+def rested() -> RestingPeoplePlanner:
+    planner = RestingPeoplePlanner(ARM)
+    while not planner.note(0.0):
+        pass
+    return planner
+
+
+def moved(planner: RestingPeoplePlanner, q: Vec, aim: PickTarget, people: Shapes) -> list[Vec]:
+    """Configurations on the way from ``q`` until the robot stands at the target."""
+    path, qd, qdd = [q], np.zeros(6), np.zeros(6)
+    for _ in range(400):
+        assert planner.note(0.0)
+        act = planner.act(path[-1], qd, people, aim, GRASP)
+        assert act is not None
+        end = step_robot(ARM, path[-1], qd, qdd, act)
+        path, qd, qdd = [*path, end.q], end.qd, end.qdd
+        if np.abs(end.q - aim.q)[:5].max() < 1e-3 and np.abs(qd).max() < 1e-3:
+            return path
+    raise AssertionError("never there")
+
+
+def test_robot_goes_around_a_person_who_is_in_the_straight_way() -> None:
+    checker = Checker(ARM, IN_THE_WAY)
+    assert not checker.edge_free(START, GOAL.q_over)
+    path = moved(rested(), START, GOAL, IN_THE_WAY)
+    assert min(checker.clearance(q).people_m for q in path) > 0.03
+
+
+def test_all_phases_of_a_pick_are_planned() -> None:
+    planner = rested()
+    down = moved(planner, GOAL.q_over, target("cube4", DESCEND), IN_THE_WAY)[-1]
+    assert down == pytest.approx(GOAL.q_grasp, abs=1e-3)
+    up = moved(planner, down, target("cube4", LIFT), IN_THE_WAY)[-1]
+    assert up == pytest.approx(GOAL.q_over, abs=1e-3)
+
+
+def test_planner_waits_until_everybody_has_been_at_rest_for_a_while() -> None:
+    planner, n = RestingPeoplePlanner(ARM), round(REST_S / ARM.dt)
+    assert [planner.note(AT_REST) for _ in range(n)] == [False] * (n - 1) + [True]
+    assert not planner.note(2.0 * AT_REST)
+    assert not any(planner.note(0.0) for _ in range(n - 1))
+    assert planner.note(0.0)
+    assert not planner.note(np.inf)
+
+
+def test_policy_acts_where_a_grasp_would_be_too_close_to_the_person() -> None:
+    x, y, z = station("cube4")
+    near = reaching_to((x, y + 0.05, z + 0.05))
+    assert Checker(ARM, near).clearance(GOAL.q_grasp).people_m < GRASP.start_clearance
+    assert rested().act(START, np.zeros(6), near, GOAL, GRASP) is None
+
+
+def test_policy_acts_when_somebody_enters_the_path() -> None:
+    planner = rested()
+    first = planner.act(START, np.zeros(6), no_people(), GOAL, GRASP)
+    assert first is not None and np.abs(first).max() > 0.0
+    acts = []
+    for _ in range(4):
+        planner.note(0.0)
+        acts.append(planner.act(START, np.zeros(6), IN_THE_WAY, GOAL, GRASP))
+    assert any(act is None for act in acts)
