@@ -2,8 +2,11 @@
 
 Compiled kernels are kept where the service keeps them, apart for each version of their sources.
 Under ``CI=true`` a skip is a failure: a test that silently stops running guards nothing.
+The imports of all tests leave about two million objects that stay. They are kept out of garbage
+collection: a full one takes 0.3 s, which made up a third of the time until the first test.
 """
 
+import gc
 import os
 from collections.abc import Generator
 from pathlib import Path
@@ -12,11 +15,23 @@ import pytest
 
 from app.sim.core.kernel_cache import kernel_cache
 
+gc.disable()  # until the first test
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # as in the service; before torch is loaded
 IN_CI = os.environ.get("CI", "").lower() in ("1", "true")
 
 
 os.environ.setdefault("NUMBA_CACHE_DIR", str(kernel_cache(Path(__file__).parents[1] / "data")))
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtestloop() -> None:
+    gc.collect()
+    gc.freeze()
+    gc.enable()
+
+
+def pytest_unconfigure() -> None:
+    gc.unfreeze()  # the interpreter's end collects everything
 
 
 def _fail_instead_of_skip(report: pytest.TestReport | pytest.CollectReport) -> None:
