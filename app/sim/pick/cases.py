@@ -73,7 +73,7 @@ CASES = (
         expected="cube4",
         first="cube4",
         switches=(0, 0),
-        palm_offset=(0.02, 0.3, 0.02),
+        palm_offset=(-0.1, 0.4, 0.02),
     ),
     Case(
         id="case-2",
