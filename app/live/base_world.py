@@ -19,8 +19,8 @@ from app.live import commands
 from app.live.arm import HumanGeometry, LiveArm
 from app.live.command_checks import Command, check
 from app.live.people.interfaces import MovingPeople
-from app.live.planned_motion import PlannedMotion
 from app.live.read_model import frozen
+from app.live.resting_people import RestingPeopleControl
 from app.live.safety import explanation
 from app.live.safety.layer import LiveSafety
 from app.live.snapshot import (
@@ -74,7 +74,7 @@ class BaseWorld(ABC, Generic[P]):
         self.robot = LiveArm(cell, pick.DEFAULT_ACTION if policy is None else policy.action)
         self.safety = LiveSafety(self.robot, cell)
         self._planned: TrajectorySegment
-        self.planner = PlannedMotion(self.robot)
+        self.planner = RestingPeopleControl(self.robot)
         self._touching = False
         self.paused = False
         self.status: Status = "moving"

@@ -199,10 +199,16 @@ class LivePickWorld(BaseWorld[LiveWorkers]):
 
     def _candidates(self) -> tuple[Candidate, ...]:
         names = [name for name in self._selected if name not in self._picked]
-        return tuple(
+        found = tuple(
             Candidate(id=name, position=np.array(self.cell.station(name).position))
             for name in names or self._selected
         )
+        if self._case is not None:
+            return found
+        begun = None
+        if self.decision is not None and self.progress.phase != APPROACH:
+            begun = self.decision.chosen
+        return self.planner.unblocked(self.people, self.policy, found, begun)
 
     def _decide(self) -> None:
         left = self.query(self._candidates())

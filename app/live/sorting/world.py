@@ -342,9 +342,8 @@ class LiveSortingWorld(BaseWorld[LiveWorkers]):
             point = above(self._table.point_at(choice.move.place))
             return (Candidate(id=name, position=point),)
         points = [(block.id, table.point_of(block)) for block, _ in choice.options]
-        return tuple(
-            Candidate(id=id, position=above(point)) for id, point in points if point is not None
-        )
+        found = tuple(Candidate(id=id, position=above(p)) for id, p in points if p is not None)
+        return self.planner.unblocked(self.people, self.policy, found)
 
     def _decide(self) -> None:
         if self.status != "picking":

@@ -1,10 +1,10 @@
 """Planned motion beside people at rest, in place of a pick policy's.
 
 A learned policy is patient beside a person who stands still close to its target: the person
-may set off again. Where all people have been at rest for ``REST_S`` and the grasp is free, a
-motion planner (``planning/replanning.py``) moves the robot around them through the phases of
-the pick. It brakes where somebody enters its path. As soon as somebody moves, the policy moves
-the robot again.
+may set off again. Where all people have been at rest for ``REST_S``, blocked targets are not
+offered while another is free, and a motion planner (``planning/replanning.py``) moves the robot
+around the people through the phases of the pick. It brakes where somebody enters its path. As
+soon as somebody moves, the policy acts again.
 
 Source: ours; replanning after docs/method.md 2.6.
 """
@@ -15,6 +15,7 @@ import numpy as np
 
 from app.sim.collision.checker import Checker, Shapes
 from app.sim.core.arrays import Vec
+from app.sim.pick.batch import Flags
 from app.sim.pick.kernels.grasp import DESCEND, GraspRules
 from app.sim.planning.ompl_planners import PlanSettings, is_installed
 from app.sim.planning.replanning import EXTRA_MARGIN, ReplanningExecutor, ReplanningSettings
@@ -72,6 +73,19 @@ class RestingPeoplePlanner:
             return False
         return True
 
+    def free(self, people: Shapes, grasp: GraspRules, q_over: Vec, q_grasp: Vec) -> Flags:
+        """Return which targets are as far from people as a grasp demands, shape (n,).
+
+        Args:
+            people: People at this moment.
+            grasp: Rules of the grasp.
+            q_over: Joint positions over the objects [rad], shape (n, 6).
+            q_grasp: Joint positions at the objects [rad], shape (n, 6).
+        """
+        checker = Checker(self.arm, people, grasp.start_clearance)
+        pairs = zip(q_over, q_grasp, strict=True)
+        return np.array([all(checker.is_free(at) for at in pair) for pair in pairs])
+
     def act(
         self, q: Vec, qd: Vec, people: Shapes, target: PickTarget, grasp: GraspRules
     ) -> Vec | None:
@@ -87,8 +101,7 @@ class RestingPeoplePlanner:
             target: Target and phase of the pick.
             grasp: Rules of the grasp.
         """
-        checker = Checker(self.arm, people, grasp.start_clearance)
-        if not all(checker.is_free(at) for at in (target.q_over, target.q_grasp)):
+        if not self.free(people, grasp, target.q_over[None], target.q_grasp[None])[0]:
             self._executor = None
             return None
         if self._executor is None or not np.array_equal(target.q, self._goal):

@@ -1,6 +1,3 @@
-from dataclasses import replace
-from typing import Any
-
 import numpy as np
 import pytest
 from pydantic import ValidationError
@@ -12,7 +9,7 @@ from app.live.snapshot import PICK_PHASES, WorldSnapshot
 from app.sim.cells.cell import Cell, load_cell
 from app.sim.human import model as human
 from app.sim.human.person import Person
-from app.sim.pick.task_policy import Candidate, Decision, PickProgress
+from app.sim.pick.task_policy import Candidate, PickProgress
 from tests.support.straight_policy import StraightPolicy
 
 
@@ -356,35 +353,3 @@ def test_a_place_far_away_in_the_hall_is_reached_for(world: LivePickWorld, far: 
     world.apply(commands.MovePerson(pelvis=(far, far, far), right=(far, far, far)))
     world.apply(commands.MovePerson(left=(-far, far, -far)))
     assert np.isfinite(run(world, 80).people[0].q).all()
-
-
-class WaitingPolicy(StraightPolicy):
-    """Chooses as its parent does, and never moves."""
-
-    def decide(self, *state: Any, **terms: Any) -> Decision:
-        decision = super().decide(*state, **terms)
-        return replace(decision, actions=np.zeros_like(decision.actions))
-
-
-def test_planner_finishes_a_pick_beside_a_person_at_rest(cell: Cell) -> None:
-    world = LivePickWorld(cell, WaitingPolicy(cell), seed=3)
-    world.apply(commands.SetSafety(on=False))
-    world.apply(commands.SetCandidates(ids=("cube4",)))
-    world.apply(commands.MovePerson(pelvis=(0.0, 1.15, -1.57), right=(-0.1, 0.7, 0.2)))
-    messages = []
-    while world.counters.reached == 0 and world.t < 30.0:
-        world.step()
-        messages.append(world.snapshot().message)
-    assert (world.counters.reached, world.counters.contacts) == (1, 0)
-    assert any("on a planned path: nobody has moved for 3 s" in text for text in messages)
-    world.apply(commands.SetMode(mode="auto"))
-    run(world, 20)
-    before = world.snapshot().robot_q
-    assert np.array_equal(run(world, 20).robot_q, before)
-
-
-def test_policy_acts_in_a_cell_without_people(cell: Cell) -> None:
-    world = LivePickWorld(cell, WaitingPolicy(cell), seed=3)
-    world.apply(commands.RemovePerson(person=0))
-    before = world.snapshot().robot_q
-    assert np.array_equal(run(world, 100).robot_q, before)

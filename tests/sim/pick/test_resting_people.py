@@ -33,7 +33,7 @@ def reaching_to(palm: tuple[float, float, float]) -> Shapes:
     return shapes_of(CELL, posture[None])
 
 
-IN_THE_WAY = reaching_to((-0.1, 0.7, 0.2))
+BLOCKING = reaching_to((-0.1, 0.7, 0.2))
 START = vertical_configuration(ARM, station("cube0"))[0]
 GOAL = target("cube4")
 
@@ -59,22 +59,22 @@ def moved(planner: RestingPeoplePlanner, q: Vec, aim: PickTarget, people: Shapes
     raise AssertionError("never there")
 
 
-def test_robot_goes_around_a_person_who_is_in_the_straight_way() -> None:
-    checker = Checker(ARM, IN_THE_WAY)
+def test_robot_goes_around_a_person_who_blocks_the_straight_path() -> None:
+    checker = Checker(ARM, BLOCKING)
     assert not checker.edge_free(START, GOAL.q_over)
-    path = moved(rested(), START, GOAL, IN_THE_WAY)
+    path = moved(rested(), START, GOAL, BLOCKING)
     assert min(checker.clearance(q).people_m for q in path) > 0.03
 
 
 def test_all_phases_of_a_pick_are_planned() -> None:
     planner = rested()
-    down = moved(planner, GOAL.q_over, target("cube4", DESCEND), IN_THE_WAY)[-1]
+    down = moved(planner, GOAL.q_over, target("cube4", DESCEND), BLOCKING)[-1]
     assert down == pytest.approx(GOAL.q_grasp, abs=1e-3)
-    up = moved(planner, down, target("cube4", LIFT), IN_THE_WAY)[-1]
+    up = moved(planner, down, target("cube4", LIFT), BLOCKING)[-1]
     assert up == pytest.approx(GOAL.q_over, abs=1e-3)
 
 
-def test_planner_waits_until_everybody_has_been_at_rest_for_a_while() -> None:
+def test_planner_waits_until_all_people_have_been_at_rest_for_a_while() -> None:
     planner, n = RestingPeoplePlanner(ARM), round(REST_S / ARM.dt)
     assert [planner.note(AT_REST) for _ in range(n)] == [False] * (n - 1) + [True]
     assert not planner.note(2.0 * AT_REST)
@@ -90,12 +90,12 @@ def test_policy_acts_where_a_grasp_would_be_too_close_to_the_person() -> None:
     assert rested().act(START, np.zeros(6), near, GOAL, GRASP) is None
 
 
-def test_policy_acts_when_somebody_enters_the_path() -> None:
+def test_policy_acts_when_a_person_enters_the_path() -> None:
     planner = rested()
     first = planner.act(START, np.zeros(6), no_people(), GOAL, GRASP)
     assert first is not None and np.abs(first).max() > 0.0
     acts = []
     for _ in range(4):
         planner.note(0.0)
-        acts.append(planner.act(START, np.zeros(6), IN_THE_WAY, GOAL, GRASP))
+        acts.append(planner.act(START, np.zeros(6), BLOCKING, GOAL, GRASP))
     assert any(act is None for act in acts)

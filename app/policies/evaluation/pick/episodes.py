@@ -5,7 +5,7 @@ the same start under every rule, so that rules are compared on the same episodes
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -215,11 +215,14 @@ class Evaluator:
         start(batch)
         chosen, switches = np.zeros(n, dtype=np.int64), np.zeros(n, dtype=np.int64)
         act = np.zeros((n, 5), dtype=np.float32)
-        trace, planners = Trace(batch, n_recorded), self._planners() if planned else None
-        first = True
+        trace, first = Trace(batch, n_recorded), True
+        planners = [RestingPeoplePlanner(batch.arm) for _ in range(n if planned else 0)]
         while (rows := np.flatnonzero(batch.state.outcome == kernel.RUNNING)).size:
             sight = seen(batch, rows)
             actions, view = self._view(rows, chosen[rows], first, sight, predicts)
+            resting = self._beside_resting(planners, rows, sight) if planners else {}
+            if resting:
+                view = self._without_blocked(view, resting, planners)
             choice = rule(view)
             lifting = batch.state.phase[rows] == LIFT  # an object in hand is lifted first
             choice = np.where(lifting, chosen[rows], choice)
@@ -229,8 +232,7 @@ class Evaluator:
             act[rows] = actions[np.arange(len(rows)), choice]
             stations = batch.state.candidates[rows, choice]
             batch.set_goals(rows, batch.world.stations[stations])
-            if planners is not None:
-                self._plan(planners, rows, sight, act)
+            self._plan(planners, rows, resting, act)
             trace.before(rows)
             batch.step(act, auto_reset=False, features=False)
             trace.after()
@@ -241,30 +243,48 @@ class Evaluator:
             trajectories=trace.trajectories(),
         )
 
-    def _planners(self) -> list[RestingPeoplePlanner]:
-        """Return a planner per environment."""
-        return [RestingPeoplePlanner(self.batch.arm) for _ in range(self.batch.n_envs)]
+    def _beside_resting(
+        self, planners: list[RestingPeoplePlanner], rows: Index, sight: Sight
+    ) -> dict[int, Shapes]:
+        """Return the people of the running environments where all have been at rest."""
+        people, speeds = self.batch.world.people, np.abs(sight.qd).max(axis=(1, 2))
+        found = {}
+        for k, e in enumerate(rows):
+            if planners[e].note(float(speeds[k])):
+                crowd = people_geometry_of(people, sight.q[k], NO_CYLINDERS, sight.size[k])
+                found[k] = Shapes(columns=crowd.columns, cylinders=np.zeros((0, 4)))
+        return found
+
+    def _without_blocked(
+        self, view: View, resting: dict[int, Shapes], planners: list[RestingPeoplePlanner]
+    ) -> View:
+        """Return the view without candidates that resting people block, where one is free."""
+        values, distances = view.values.copy(), view.distances.copy()
+        for k, people in resting.items():
+            e, here = view.rows[k], np.flatnonzero(np.isfinite(values[k]))
+            at = self.batch.state.candidates[e, here]
+            grasp, targets = self.batch.settings.grasp, (self._station_q[at], self._grasp_q[at])
+            free = planners[e].free(people, grasp, *targets)
+            free |= (here == view.chosen[k]) & (self.batch.state.phase[e] != APPROACH)
+            if free.any():
+                values[k, here[~free]], distances[k, here[~free]] = -np.inf, np.inf
+        return replace(view, values=values, distances=distances)
 
     def _plan(
         self,
         planners: list[RestingPeoplePlanner],
         rows: Index,
-        sight: Sight,
+        resting: dict[int, Shapes],
         act: NDArray[np.float32],
     ) -> None:
         """Replace the policy's actions beside people at rest, in place."""
-        state, people = self.batch.state, self.batch.world.people
-        grasp = self.batch.settings.grasp
-        speeds = np.abs(sight.qd).max(axis=(1, 2))
-        for k, e in enumerate(rows):
-            if not planners[e].note(float(speeds[k])):
-                continue
-            crowd = people_geometry_of(people, sight.q[k], NO_CYLINDERS, sight.size[k])
+        state, grasp = self.batch.state, self.batch.settings.grasp
+        for k, people in resting.items():
+            e = rows[k]
             target = PickTarget(
                 q_over=state.q_goal[e], q_grasp=state.q_grasp[e], phase=int(state.phase[e])
             )
-            shapes = Shapes(columns=crowd.columns, cylinders=np.zeros((0, 4)))
-            found = planners[e].act(state.q[e], state.qd[e], shapes, target, grasp)
+            found = planners[e].act(state.q[e], state.qd[e], people, target, grasp)
             if found is not None:
                 act[e] = found
 

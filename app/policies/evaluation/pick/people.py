@@ -64,21 +64,31 @@ class ChoiceBench:
         self.usual = settings_for(CANDIDATES, pick_preset_of(checkpoint))
         self._request, self._n = request, request.episodes or DEFAULT_EPISODES
 
-    def row(self, name: str, settings: PickSettings) -> tuple[dict[str, Any], dict[str, Any]]:
-        """Return the result row of the settings, and the settings to state with it."""
-        evaluator = Evaluator(self._networks, self.cell, self._n, self._request.seed, settings)
-        row = evaluator.run(choice_rules.critic(HYSTERESIS)).row(name)
-        row["touched_at_rest"] = _touched_at_rest(evaluator.batch)
-        return row, settings_of(evaluator)
+    def all(
+        self, rows: Mapping[str, PickSettings], planners: Sequence[bool] = (False,)
+    ) -> dict[str, Any]:
+        """Return the result with one row per settings.
 
-    def all(self, rows: Mapping[str, PickSettings]) -> dict[str, Any]:
-        """Return the result with one row per settings."""
+        Args:
+            rows: Settings by name.
+            planners: Whether a planner acts beside people at rest, for the rows of one setting.
+        """
         stated: Json = {"hysteresis": HYSTERESIS}
-        results = self._request.rows(len(rows))
+        results, seed = self._request.rows(len(rows) * len(planners)), self._request.seed
         for name, settings in rows.items():
-            row, stated[name] = self.row(name, settings)
-            results.append(row)
+            evaluator = Evaluator(self._networks, self.cell, self._n, seed, settings)
+            touched = _touched_at_rest(evaluator.batch)
+            for planned in planners:
+                run = evaluator.run(choice_rules.critic(HYSTERESIS), planned=planned)
+                row = run.row(_with_planner(name) if planned else name)
+                results.append(row | {"touched_at_rest": touched})
+            stated[name] = settings_of(evaluator)
         return {"settings": stated, "results": results}
+
+
+def _with_planner(name: str) -> str:
+    """Return the name of a row in which a planner acts beside people at rest."""
+    return f"{name}, planner"
 
 
 def _touched_at_rest(batch: PickBatch) -> dict[str, float]:
@@ -139,7 +149,7 @@ def run_rest(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
         evaluator = Evaluator(networks, cell, n, request.seed, settings)
         for planned in (False, True):
             run = evaluator.run(choice_rules.fixed(0), planned=planned)
-            row = run.row(f"{name}, planner" if planned else name)
+            row = run.row(_with_planner(name) if planned else name)
             results.append(row | _timeouts(evaluator.batch, run))
     return {"settings": settings_of(evaluator), "results": results}
 
@@ -162,7 +172,10 @@ def _timeouts(batch: PickBatch, run: Episodes) -> dict[str, dict[str, float]]:
 
 
 def run_yielding(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
-    """Evaluate beside people that yield to the arm with strength 0, 0.5 and 1."""
+    """Evaluate beside people that yield to the arm with strength 0, 0.5 and 1.
+
+    Each with the policy alone, and with a planner beside people at rest.
+    """
     bench = ChoiceBench(checkpoint, request)
     usual = bench.usual
 
@@ -170,7 +183,8 @@ def run_yielding(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
         return replace(usual, work=replace(usual.work, yielding=strength))
 
     return bench.all(
-        {f"yielding-{strength:g}": beside(strength) for strength in YIELDING_LEVELS}
+        {f"yielding-{strength:g}": beside(strength) for strength in YIELDING_LEVELS},
+        planners=(False, True),
     )
 
 

@@ -72,12 +72,13 @@ def test_every_row_is_reported_as_soon_as_it_is_known(beside_people, reported):
 
 def test_yielding_people_touch_a_robot_at_rest_less_often():
     result = evaluate("pick-yielding", pretrained.load("pick"), episodes=80, seed=5)
-    assert [row["name"] for row in result["results"]] == [
-        "yielding-0", "yielding-0.5", "yielding-1"
-    ]  # fmt: skip
-    touched = [row["touched_at_rest"]["mean"] for row in result["results"]]
+    rows, kinds = rows_of(result), ("yielding-0", "yielding-0.5", "yielding-1")
+    assert list(rows) == [name for kind in kinds for name in (kind, f"{kind}, planner")]
+    touched = [rows[kind]["touched_at_rest"]["mean"] for kind in kinds]
     assert touched[0] > touched[2] + 0.05
     assert touched[0] >= touched[1] >= touched[2]
+    late = [row["timeout"]["mean"] for name, row in rows.items() if "yielding-1" in name]
+    assert late[1] < late[0]  # people who yield stop in the robot's path
 
 
 def test_recorded_people_are_evaluated_together_and_one_by_one():

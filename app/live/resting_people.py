@@ -1,4 +1,4 @@
-"""Motion of a live robot beside people at rest: a planner acts in place of the policy."""
+"""A live robot beside people at rest: blocked targets are left out, and a planner acts."""
 
 from collections.abc import Sequence
 
@@ -12,8 +12,8 @@ from app.sim.pick.resting_people import PickTarget, RestingPeoplePlanner
 from app.sim.pick.task_policy import Candidate, Decision, TaskPolicy
 
 
-class PlannedMotion:
-    """Planned action of the next period.
+class RestingPeopleControl:
+    """Candidates and planned action of the next period.
 
     Args:
         robot: The robot it moves.
@@ -26,8 +26,35 @@ class PlannedMotion:
     def reset(self) -> None:
         """Forget for how long people have been at rest."""
         self._planner = RestingPeoplePlanner(self._robot.arm)
+        self._rested = False
         self.act: Vec | None = None
         """The action, shape (5,); None: the policy acts."""
+
+    def unblocked(
+        self,
+        people: MovingPeople,
+        policy: TaskPolicy | None,
+        candidates: tuple[Candidate, ...],
+        begun: str | None = None,
+    ) -> tuple[Candidate, ...]:
+        """Return the candidates without those that people at rest block.
+
+        All of them where none is free or nobody has been at rest.
+
+        Args:
+            people: The people in the cell.
+            policy: The policy that chooses.
+            candidates: What is to be done.
+            begun: The candidate whose pick has begun; it stays.
+        """
+        if not self._rested or policy is None or len(candidates) < 2:
+            return candidates
+        points = np.array([one.position for one in candidates])
+        over, low, _ = target_configurations(self._robot.arm, policy.grasp, points)
+        shapes = self._robot.shapes(people)
+        free = self._planner.free(shapes, policy.grasp, over, low)
+        left = [free[k] or one.id == begun for k, one in enumerate(candidates)]
+        return tuple(one for k, one in enumerate(candidates) if left[k] or not any(left))
 
     def update(
         self,
@@ -47,11 +74,12 @@ class PlannedMotion:
             phase: Phase of the pick.
         """
         speeds = [float(np.abs(one.seen().qd).max()) for one in people]
-        rested, robot = self._planner.note(max(speeds, default=np.inf)), self._robot
-        self.act = None
-        if not rested or policy is None or decision is None or policy.grasp.depth == 0.0:
+        self._rested, self.act = self._planner.note(max(speeds, default=np.inf)), None
+        self._rested &= policy is not None and policy.grasp.depth > 0.0
+        if not self._rested or policy is None or decision is None:
             return
-        grasp, point = policy.grasp, offered[decision.index].position[None]
+        robot, grasp = self._robot, policy.grasp
+        point = offered[decision.index].position[None]
         over, low, _ = target_configurations(robot.arm, grasp, point)
         target = PickTarget(q_over=over[0], q_grasp=low[0], phase=phase)
         self.act = self._planner.act(robot.q, robot.qd, robot.shapes(people), target, grasp)
