@@ -8,6 +8,7 @@ or is refused.
 
 import logging
 import re
+from functools import lru_cache
 from random import Random
 from time import perf_counter
 
@@ -97,8 +98,8 @@ class Answers:
                 headers = message["headers"] = list(message["headers"])
                 if message["status"] == 204:  # FastAPI states the type of its default answer
                     headers[:] = [pair for pair in headers if pair[0] != b"content-type"]
-                given = {name.lower() for name, _ in headers}
-                headers += [pair for pair in _RAW if pair[0] not in given]
+                given = tuple([name for name, _ in headers])
+                headers += _missing(given)
                 headers.append((ID_HEADER, (REQUEST_ID.get() or "").encode()))
                 if b"location" in given:
                     _below_root_path(message, root_path)
@@ -122,6 +123,12 @@ class Answers:
         if (status >= 400 and status != NOT_READY) or changes:
             fields = {"status": status, "duration_s": round(seconds, 6)}
             logger.info("%s %s", method, path_of(scope), extra=fields)
+
+
+@lru_cache(maxsize=256)
+def _missing(given: tuple[bytes, ...]) -> list[tuple[bytes, bytes]]:
+    """Return the defaults of headers that are not among the given names, in lower case."""
+    return [pair for pair in _RAW if pair[0] not in given]
 
 
 def _below_root_path(message: Message, root_path: str) -> None:

@@ -114,9 +114,9 @@ def build_app(
         app.include_router(part.router)
     description.install(app)
     add_page(app, static)
+    app.add_middleware(BodyRules, files=recordings.FILES | checkpoints.FILES | attempts.FILES)
     if traces is None:
         app.add_middleware(DirectRoutes, routes=decision_routes())
-    app.add_middleware(BodyRules, files=recordings.FILES | checkpoints.FILES | attempts.FILES)
     open_paths = (SESSION_PATH, ICON_PATH, *health.PATHS)
     app.add_middleware(Guard, token=token, open_paths=open_paths)
     app.add_middleware(Answers, metrics=counts)

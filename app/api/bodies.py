@@ -5,6 +5,7 @@ type or size and unstorable text or integers (``texts.py``) are answered by prob
 """
 
 from collections.abc import Mapping
+from functools import lru_cache
 
 from starlette.exceptions import HTTPException
 from starlette.routing import compile_path
@@ -20,6 +21,8 @@ JSON_ONLY_PREFIX = "/v1/"
 FILE_TYPES = ("application/octet-stream", "text/plain", "text/csv")
 """Content types of an uploaded file; none is allowed, too."""
 FORM = "application/x-www-form-urlencoded"
+_MANY_PATHS, _MANY_TYPES = 256, 64
+"""Sizes of the caches of paths and content types."""
 
 
 class BodyRules:
@@ -46,6 +49,7 @@ class BodyRules:
         self.files = [
             (compile_path(path)[0], largest) for path, largest in (files or {}).items()
         ]
+        self._largest_file = lru_cache(_MANY_PATHS)(self._find_largest_file)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Pass a request on with a counted body, or answer it here."""
@@ -60,12 +64,14 @@ class BodyRules:
         if refused is None and _has_body(headers) and not takes_file and not _is_form(headers):
             receive, body = await _whole(receive, max_bytes)
             refused = _refused_json(body, path, max_bytes)
+        else:
+            receive = _counted(receive, max_bytes)
         if refused is not None:
             await refused(scope, receive, send)
             return
-        await self.app(scope, _counted(receive, max_bytes), send)
+        await self.app(scope, receive, send)
 
-    def _largest_file(self, method: str, path: str) -> int | None:
+    def _find_largest_file(self, method: str, path: str) -> int | None:
         """Return the size of the largest file that a request may have; None: it takes none."""
         if method not in ("POST", "PUT"):
             return None
@@ -94,7 +100,7 @@ def _refused_head(
         )
     if takes_file and given and _media_type(given) not in FILE_TYPES:
         return _wrong_type(given, "must be a file's", FILE_TYPES, path)
-    if not takes_file and path.startswith(JSON_ONLY_PREFIX) and not _is_json(given):
+    if not takes_file and path.startswith(JSON_ONLY_PREFIX) and not is_json(given):
         return _wrong_type(given, "must be JSON", ("application/json",), path)
     return None
 
@@ -149,6 +155,7 @@ def _counted(receive: Receive, max_bytes: int) -> Receive:
     return receive_counted
 
 
+@lru_cache(_MANY_TYPES)
 def _media_type(content_type: str) -> str:
     return content_type.partition(";")[0].strip().lower()
 
@@ -157,7 +164,8 @@ def _is_form(headers: Mapping[str, str]) -> bool:
     return _media_type(headers.get("content-type", "")) == FORM
 
 
-def _is_json(content_type: str) -> bool:
+def is_json(content_type: str) -> bool:
+    """Return whether a content type is that of a JSON body."""
     kind = _media_type(content_type)
     return kind == "application/json" or (
         kind.startswith("application/") and kind.endswith("+json")

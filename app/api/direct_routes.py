@@ -1,9 +1,9 @@
 """ASGI layer that answers decision routes before the framework's routing.
 
 The route is called with its body, validated as JSON bytes, and its answer is written once.
-Whatever is no success is left to the framework, which receives the body again, so that every
-problem is written in one place. With traces this layer is not used: the framework makes the
-spans of requests.
+Whatever is no ordinary request or no success is left to the body rules and the framework, which
+receive the body again, so that every problem is written in one place. With traces this layer is
+not used: the framework makes the spans of requests.
 """
 
 from collections.abc import Awaitable, Callable, Iterable
@@ -13,10 +13,14 @@ from fastapi.routing import APIRoute
 from pydantic import BaseModel, ValidationError
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from app.api.security import path_of
+from app.api.bodies import MAX_BODY_BYTES, is_json
+from app.api.security import headers_of, path_of
+from app.api.texts import fault_in_json
 from app.errors import ServiceError
 
 JSON_HEAD = (b"content-type", b"application/json")
+_CODINGS = frozenset(("content-encoding", "transfer-encoding"))
+_DIGITS = len(str(MAX_BODY_BYTES))
 
 
 class _Direct(NamedTuple):
@@ -29,10 +33,10 @@ class _Direct(NamedTuple):
 
 
 class DirectRoutes:
-    """ASGI layer around the framework.
+    """ASGI layer around the body rules and the framework.
 
     Args:
-        app: The framework.
+        app: The body rules and the framework.
         routes: The decision routes, with the method ``POST``.
     """
 
@@ -47,7 +51,7 @@ class DirectRoutes:
         """Answer a request, or pass it on."""
         is_post = scope["type"] == "http" and scope["method"] == "POST"
         found = self.routes.get(path_of(scope)) if is_post else None
-        if found is None:
+        if found is None or not _is_ordinary(scope):
             await self.app(scope, receive, send)
             return
         messages: list[Message] = []
@@ -61,6 +65,20 @@ class DirectRoutes:
             {"type": "http.response.start", "status": 200, "headers": [length, JSON_HEAD]}
         )
         await send({"type": "http.response.body", "body": content})
+
+
+def _is_ordinary(scope: Scope) -> bool:
+    """Return whether a request has a JSON body of a known, allowed size, and no query."""
+    headers = headers_of(scope)
+    length = headers.get("content-length", "")
+    return (
+        is_json(headers.get("content-type", ""))
+        and _CODINGS.isdisjoint(headers)
+        and length.isdecimal()
+        and len(length) <= _DIGITS
+        and int(length) <= MAX_BODY_BYTES
+        and not scope["query_string"]
+    )
 
 
 async def _answer(
@@ -81,7 +99,9 @@ async def _answer(
         if message["type"] != "http.request":
             return None
         body += message.get("body", b"")
-        more = message.get("more_body", False)
+        more = message.get("more_body", False) and len(body) <= MAX_BODY_BYTES
+    if len(body) > MAX_BODY_BYTES or fault_in_json(body) is not None:
+        return None
     try:
         request = found.model.model_validate_json(body)
         answer: Any = await found.decide(request, scope["app"].state.services)

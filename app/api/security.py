@@ -22,6 +22,8 @@ from app.api.problems import problem
 
 COOKIE = "tandem_session"
 SESSION_PATH = "/session"
+_HEADERS_KEY = "tandem.headers"
+"""Key of the decoded headers in the scope of a request."""
 
 
 @lru_cache(maxsize=1)
@@ -38,8 +40,12 @@ def path_of(scope: Scope) -> str:
 
 def headers_of(scope: Scope) -> dict[str, str]:
     """Return the headers of a request by lower-case name; of equal names the first."""
-    given = reversed(scope["headers"])
-    return {name.decode("latin-1"): value.decode("latin-1") for name, value in given}
+    found: dict[str, str] | None = scope.get(_HEADERS_KEY)
+    if found is None:
+        given = reversed(scope["headers"])
+        found = {name.decode("latin-1"): value.decode("latin-1") for name, value in given}
+        scope[_HEADERS_KEY] = found
+    return found
 
 
 def session_value(token: str) -> str:

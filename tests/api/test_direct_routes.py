@@ -154,14 +154,22 @@ def test_only_other_requests_and_failures_reach_the_framework(client: TestClient
     alone = TestClient(served, base_url=ADDRESS)
     for url, body in BODIES.items():
         text = json.dumps(body)
-        answer = alone.post(url, content=text)
+        kind = {"Content-Type": "application/json"}
+        answer = alone.post(url, content=text, headers=kind)
         assert (answer.status_code, answer.headers["content-type"]) == (200, "application/json")
         assert not reached
         cell = json.dumps({**body, "cell": "nowhere"})
         for sent in (text[:-1], cell):
-            assert alone.post(url, content=sent).status_code == 204
+            assert alone.post(url, content=sent, headers=kind).status_code == 204
             assert reached.pop() == sent.encode()
-        assert alone.put(url, content=text).status_code == 204
+        assert alone.put(url, content=text, headers=kind).status_code == 204
+        assert reached.pop() == text.encode()
+        unusual = ({}, {"Content-Encoding": "gzip"}, {"Content-Length": f"{2**20 + 1}"})
+        for changes in unusual:
+            given = kind | changes if changes else changes
+            assert alone.post(url, content=text, headers=given).status_code == 204
+            assert reached.pop() == text.encode()
+        assert alone.post(f"{url}?a=%00", content=text, headers=kind).status_code == 204
         assert reached.pop() == text.encode()
 
 

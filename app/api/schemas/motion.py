@@ -268,7 +268,7 @@ class MotionAnswer(Answer):
         dt: float,
         stamp: Stamp,
     ) -> Self:
-        """Return the answer of a decision."""
+        """Return the answer of a decision; models of lists are made in one call."""
         segment, safe = (
             SegmentPublic.commanded(decision.piece, question.q, question.qd, dt),
             decision.safe,
@@ -277,28 +277,27 @@ class MotionAnswer(Answer):
         if safe is not None and safe.override < 1.0:
             segment = SegmentPublic.executed(safe, question, dt)
         to_people, to_cell, to_itself = decision.clearance
-        return cls(
-            joints=list(ROS_NAMES),  # pydantic copies a default deeply
-            dt=dt,
-            segment=segment,
-            commanded=commanded,
-            act=decision.act.tolist(),
-            inference_mode=decision.inference_mode,
-            rollout=decision.rollout,
-            alternative=decision.candidate,
-            targets=[
-                Target(position=list(one.position), weight=one.weight)
-                for one in decision.targets
-            ],
-            safety=Override.from_domain(decision),
-            people=list(people),
-            clearance=Distances(people=to_people, cell=to_cell, robot=to_itself),
-            distance=decision.distance,
-            beyond_reach=decision.beyond_reach,
-            unfeasible=decision.unfeasible,
-            state_outside=[Outside.from_domain(one) for one in decision.state_outside],
-            outside=[Outside.from_domain(one) for one in decision.outside],
-            checkpoint=decision.checkpoint,
-            elapsed_ms=decision.elapsed_ms,
-            stamp=stamp,
+        return cls.model_validate(
+            {
+                "joints": list(ROS_NAMES),  # pydantic copies a default deeply
+                "dt": dt,
+                "segment": segment,
+                "commanded": commanded,
+                "act": decision.act.tolist(),
+                "inference_mode": decision.inference_mode,
+                "rollout": decision.rollout,
+                "alternative": decision.candidate,
+                "targets": [{"position": p, "weight": w} for p, w in decision.targets],
+                "safety": Override.from_domain(decision),
+                "people": people,
+                "clearance": {"people": to_people, "cell": to_cell, "robot": to_itself},
+                "distance": decision.distance,
+                "beyond_reach": decision.beyond_reach,
+                "unfeasible": decision.unfeasible,
+                "state_outside": decision.state_outside,
+                "outside": decision.outside,
+                "checkpoint": decision.checkpoint,
+                "elapsed_ms": decision.elapsed_ms,
+                "stamp": stamp,
+            }
         )

@@ -129,12 +129,13 @@ class PlannedMotion(Answer):
     @classmethod
     def from_domain(cls, estimate: MotionEstimate) -> Self:
         """Return the schema of the estimate."""
-        outcome = estimate.outcome
-        return cls(
-            position=estimate.position.tolist(),
-            value=estimate.value,
-            outcome=None if outcome is None else Outcome.from_domain(outcome),
-            outside=[Outside.from_domain(one) for one in estimate.outside],
+        return cls.model_validate(
+            {
+                "position": estimate.position.tolist(),
+                "value": estimate.value,
+                "outcome": Outcome.data_of(estimate.outcome),
+                "outside": estimate.outside,
+            }
         )
 
 
@@ -240,7 +241,7 @@ class PlanAnswer(Answer):
             people=people,
             state_outside=[]
             if decision is None
-            else [Outside.from_domain(one) for one in decision.outside],
+            else [Outside.model_validate(one) for one in decision.outside],
             checkpoint=plan.checkpoint,
             elapsed_ms=plan.elapsed_ms,
             stamp=request.stamp,

@@ -1,10 +1,10 @@
 """``POST /v1/task-selection``: state in, decision out."""
 
 from collections.abc import Sequence
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
-from pydantic import Field
+from pydantic import ConfigDict, Field
 
 from app.api.schemas.examples import TASK_SELECTION, shows
 from app.api.schemas.numbers import Answer, Body, Finite, Vector3, Vector6
@@ -13,7 +13,6 @@ from app.api.schemas.people import PersonState as PersonState
 from app.api.schemas.robot_state import RobotState
 from app.errors import InvalidInput
 from app.sim.core.arrays import Vec
-from app.sim.core.out_of_range import OutsideField
 from app.sim.perception.multi_person_tracker import MAX_SKELETONS
 from app.sim.pick.task_policy import (
     Candidate,
@@ -105,6 +104,8 @@ class TaskSelectionRequest(Body):
         )
 
     def _check_ids_are_unique(self) -> None:
+        if len({one.id for one in self.candidates}) == len(self.candidates):
+            return
         seen: set[str] = set()
         for index, candidate in enumerate(self.candidates):
             if candidate.id in seen:
@@ -114,18 +115,15 @@ class TaskSelectionRequest(Body):
 
 
 class Outside(Answer):
-    """An input outside the training range, or a joint outside its limits."""
+    """An input outside the training range, or a joint outside its limits: ``OutsideField``."""
+
+    model_config = ConfigDict(frozen=True, from_attributes=True)
 
     field: str
     value: float
     low: float = Field(description="least value of training, or the joint's lower limit")
     high: float = Field(description="greatest value of training, or its upper limit")
     of: Literal["training", "limits"] = Field("training", description="kind of the bounds")
-
-    @classmethod
-    def from_domain(cls, outside: OutsideField) -> Self:
-        """Return the schema of the simulator's data."""
-        return cls(**{name: getattr(outside, name) for name in cls.model_fields})
 
 
 class Action(Answer):
@@ -149,15 +147,17 @@ class Outcome(Answer):
     contact: Probability
     time_s: float = Field(description="expected time to success [s]")
 
-    @classmethod
-    def from_domain(cls, outcome: OutcomeEstimate) -> Self:
-        """Return the schema of the prediction."""
-        (low, high), (least, most) = outcome.success_interval, outcome.contact_interval
-        return cls(
-            success=Probability(mean=outcome.success, low=low, high=high),
-            contact=Probability(mean=outcome.contact, low=least, high=most),
-            time_s=outcome.time_s,
-        )
+    @staticmethod
+    def data_of(outcome: OutcomeEstimate | None) -> dict[str, Any] | None:
+        """Return the data of a prediction, if there is one."""
+        if outcome is None:
+            return None
+        success, (low, high), contact, (least, most), time_s = outcome
+        return {
+            "success": {"mean": success, "low": low, "high": high},
+            "contact": {"mean": contact, "low": least, "high": most},
+            "time_s": time_s,
+        }
 
 
 class CandidateValue(Answer):
@@ -196,28 +196,28 @@ class TaskSelection(Answer):
         people: list[PersonUse],
         stamp: Stamp,
     ) -> Self:
-        """Return the answer of a decision."""
-        return cls(
-            chosen=decision.chosen,
-            candidates=[
-                CandidateValue(
-                    id=candidate.id,
-                    value=decision.values[index],
-                    chosen=index == decision.index,
-                    outcome=None
-                    if decision.outcomes is None
-                    else Outcome.from_domain(decision.outcomes[index]),
-                    reachable=decision.reachable[index],
-                    action=Action(qd_target=decision.qd_target[index].tolist()),
-                    outside=[
-                        Outside.from_domain(o) for o in decision.outside_candidates[index]
-                    ],
-                )
-                for index, candidate in enumerate(candidates)
-            ],
-            people=people,
-            state_outside=[Outside.from_domain(one) for one in decision.outside],
-            checkpoint=decision.checkpoint,
-            elapsed_ms=decision.elapsed_ms,
-            stamp=stamp,
+        """Return the answer of a decision; all of its models are made in one call."""
+        speeds = decision.qd_target.tolist()
+        outcomes = decision.outcomes or (None,) * len(candidates)
+        return cls.model_validate(
+            {
+                "chosen": decision.chosen,
+                "candidates": [
+                    {
+                        "id": candidate.id,
+                        "value": decision.values[index],
+                        "chosen": index == decision.index,
+                        "outcome": Outcome.data_of(outcomes[index]),
+                        "reachable": decision.reachable[index],
+                        "action": {"qd_target": speeds[index]},
+                        "outside": decision.outside_candidates[index],
+                    }
+                    for index, candidate in enumerate(candidates)
+                ],
+                "people": people,
+                "state_outside": decision.outside,
+                "checkpoint": decision.checkpoint,
+                "elapsed_ms": decision.elapsed_ms,
+                "stamp": stamp,
+            }
         )
