@@ -27,9 +27,11 @@ RESOLVE = $(VENV)/bin/uv pip compile --quiet --no-config --universal --python-ve
 CUDA_PACKAGES := triton cuda-bindings cuda-pathfinder cuda-toolkit \
 	$(addprefix nvidia-,cublas cuda-cupti cuda-nvrtc cuda-runtime cudnn-cu13 cufft cufile curand cusolver cusparse cusparselt-cu13 nccl-cu13 nvjitlink nvshmem-cu13 nvtx)
 
-# Test files side by side, at most four: each process holds torch and the kernels. Files of a
-# folder follow each other and share its fixtures.
-SIDE_BY_SIDE := --numprocesses auto --maxprocesses 4 --dist loadfile --no-loadscope-reorder
+# Test files side by side, at most four: each process holds torch and the kernels. One more than
+# cores, because tests of jobs wait for other processes. Files of a folder follow each other and
+# share its fixtures.
+SIDE_BY_SIDE = --numprocesses $$((1 + $$(getconf _NPROCESSORS_ONLN))) --maxprocesses 4 \
+	--dist loadgroup --no-loadscope-reorder
 
 # $(call INSTALL_LOCK,file): installs exactly what the file lists, and counts along. pip's
 # notes on a configured index that lacks a package are left out: another one has it.

@@ -4,6 +4,9 @@ Compiled kernels are kept where the service keeps them, apart for each version o
 Under ``CI=true`` a skip is a failure: a test that silently stops running guards nothing.
 The imports of all tests leave about two million objects that stay. They are kept out of garbage
 collection: a full one takes 0.3 s, which made up a third of the time until the first test.
+
+Several processes take the tests file by file. Files of one ``xdist_group`` go to one process,
+because each process would compile the kernels that they share; they are long and come first.
 """
 
 import gc
@@ -12,6 +15,8 @@ from collections.abc import Generator
 from pathlib import Path
 
 import pytest
+from xdist.remote import Producer
+from xdist.scheduler import LoadFileScheduling
 
 from app.sim.core.kernel_cache import kernel_cache
 
@@ -21,6 +26,23 @@ IN_CI = os.environ.get("CI", "").lower() in ("1", "true")
 
 
 os.environ.setdefault("NUMBA_CACHE_DIR", str(kernel_cache(Path(__file__).parents[1] / "data")))
+
+
+class _GroupOrFile(LoadFileScheduling):
+    """Hands a process all tests of a group, or those of a file."""
+
+    def _split_scope(self, nodeid: str) -> str:
+        file, _, test = nodeid.partition("::")
+        group = test.rpartition("]")[2].partition("@")[2]  # which --dist loadgroup appends
+        return group or file
+
+
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Producer) -> _GroupOrFile | None:
+    return _GroupOrFile(config, log) if config.getvalue("dist") == "loadgroup" else None
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    items.sort(key=lambda item: item.get_closest_marker("xdist_group") is None)
 
 
 @pytest.hookimpl(tryfirst=True)

@@ -18,6 +18,8 @@ from app.sim.scenario.kernels.episode import COLLISION, RUNNING, SUCCESS, TIMEOU
 from app.sim.scenario.monitoring import MonitoringSettings
 from app.sim.scene.scene import NO_CYLINDERS, people_of
 
+pytestmark = pytest.mark.xdist_group("monitored-reaching")
+
 CELL = load_cell("shared-workspace")
 SAFETY = safety_settings(CELL)
 BOX = ReachSettings(goals="box")
