@@ -14,6 +14,9 @@ from tests.browser.test_drag import VIEWER, state, tell, until
 from tests.support import patient_http
 
 pytestmark = pytest.mark.browser
+WINDOWS = pytest.mark.xdist_group("scenes-in-windows")
+SERVERS = pytest.mark.xdist_group("scenes-and-servers")
+"""At most two processes draw the scene, which takes all cores; others have time to wait."""
 
 REACH, SORT = "shared-workspace", "sorting-e0"
 UP = f'{VIEWER}[data-state="up"]'
@@ -63,6 +66,7 @@ def shown(server: str) -> Iterator[str]:
     show(server, load_cell().name)
 
 
+@WINDOWS
 def test_scene_goes_on_in_two_windows_while_people_come_and_go(
     open_page: Callable[..., Page], shown: str
 ) -> None:
@@ -88,6 +92,7 @@ def test_scene_goes_on_in_two_windows_while_people_come_and_go(
         assert page.problems == []  # type: ignore[attr-defined]
 
 
+@SERVERS
 def test_scene_follows_into_other_cells_and_back_in_every_window(
     open_page: Callable[..., Page], shown: str
 ) -> None:
@@ -103,6 +108,7 @@ def test_scene_follows_into_other_cells_and_back_in_every_window(
             assert page.locator('[data-role="scene-note"]').count() == 0
 
 
+@WINDOWS
 @pytest.mark.parametrize(
     "harm",
     [
@@ -125,6 +131,7 @@ def test_failed_scene_is_reloaded_with_a_message(
     expect(page.locator('[data-link="live"]')).to_be_visible()
 
 
+@SERVERS
 def test_page_says_stale_while_the_server_is_frozen_and_goes_on_when_it_thaws(
     open_page: Callable[..., Page], tmp_path: Path
 ) -> None:
@@ -153,6 +160,7 @@ def test_page_says_stale_while_the_server_is_frozen_and_goes_on_when_it_thaws(
             expect_drawing(page)
 
 
+@SERVERS
 def test_page_and_scene_come_back_by_themselves_after_the_server_was_killed(
     open_page: Callable[..., Page], tmp_path: Path
 ) -> None:

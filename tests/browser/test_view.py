@@ -6,8 +6,9 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from tests.browser.test_drag import VIEWER
+from tests.browser.test_scene import WINDOWS
 
-pytestmark = pytest.mark.browser
+pytestmark = [pytest.mark.browser, WINDOWS]
 
 SMALL, PHONE = (400, 320), (390, 500)
 BEHIND = "getComputedStyle(document.querySelector('[data-dock-root]')).backgroundImage"
