@@ -6,6 +6,7 @@ cell_catalog       Work cells by name: the shipped ones, and the user's own from
 checkpoints        Reading of stored checkpoints; a damaged shipped one is restored
 comparison         Comparison of jobs: the fields that differ, and learning curves with a band
                    over seeds
+composed/          Jobs made of jobs: sweeps and reports
 executor           Executors of attempts: the interface, and one local process per attempt
 import_process     Import of a file in its own process: ``python -m jobs.import_process``
 inputs             Inputs of a job: its cell, checkpoint and recordings, and the files of its
@@ -13,7 +14,6 @@ inputs             Inputs of a job: its cell, checkpoint and recordings, and the
 recording_catalog  Stored recordings by name: files in, runs of the 18-DoF human model out
 recording_format   The stored form of a recording
 remote/            Workers that reach their job over HTTP, and the executor on Ray
-reports            Reports: their evaluations as jobs, and their pages
 resume_files       Files that trainings need to resume: the transitions of their replay
                    memories
 retention          Retention of ended jobs: how many are kept, and what is removed with a job
@@ -22,6 +22,5 @@ spec               Job specs: the body of ``POST /v1/jobs``, stored unchanged wi
 start              Start of a child process: the parent-death signal, before heavy imports
 supervisor         The supervisor: a thread of the server that starts, monitors and stops
                    workers
-sweeps             Sweeps: trainings with drawn fields, and their evaluations, as jobs
 worker             The worker of a job: one attempt in one process
 """

@@ -32,11 +32,11 @@ from app.store.database.migrate import migrate
 from app.store.database.schema import check_schema
 from app.store.engine import Store
 from app.store.records import Claim
+from jobs.composed.reports import Reports
+from jobs.composed.sweeps import Sweeps
 from jobs.executor import Executor, Exit, Handle, LocalProcess
-from jobs.reports import Reports
 from jobs.resume_files import remove_unneeded
 from jobs.retention import Retention
-from jobs.sweeps import Sweeps
 
 logger = logging.getLogger(__name__)
 

@@ -1,6 +1,6 @@
 """Jobs that are made of jobs: sweeps and reports.
 
-``jobs.sweeps`` and ``jobs.reports`` decide what is next.
+``jobs.composed.sweeps`` and ``jobs.composed.reports`` decide what is next.
 """
 
 import contextlib

@@ -13,7 +13,7 @@ from app.policies.evaluation.registry import PROTOCOLS
 from app.policies.report.document import document
 from app.store.jobs import get_job, list_evaluations
 from jobs.comparison import MAX_JOBS, compare, curves_as_csv
-from jobs.sweeps import trials_of
+from jobs.composed.sweeps import trials_of
 
 JobIds = Annotated[
     list[str], Query(max_length=MAX_JOBS, description="id of a job; repeated, 1 to 20 times")

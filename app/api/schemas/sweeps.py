@@ -7,7 +7,7 @@ from pydantic import Field
 
 from app.api.schemas.numbers import Answer
 from app.store.records import JobRecord
-from jobs.sweeps import SweepTrial, best_of, spec_of
+from jobs.composed.sweeps import SweepTrial, best_of, spec_of
 
 
 class TrialPublic(Answer):

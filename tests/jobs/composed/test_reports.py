@@ -9,7 +9,7 @@ from app.policies.report.page import RESULTS, evaluations, page
 from app.store import attempts, completion, job_actions, jobs
 from app.store.engine import Store
 from app.store.records import JobRecord
-from jobs.reports import Reports
+from jobs.composed.reports import Reports
 from jobs.spec import parse_spec
 
 

@@ -8,8 +8,8 @@ from app.errors import InvalidInput
 from app.store import attempts, completion, composed_jobs, job_actions, jobs, metrics
 from app.store.engine import Store
 from app.store.records import JobRecord
+from jobs.composed.sweeps import Sweeps, SweepTrial, trials_of
 from jobs.spec import parse_spec
-from jobs.sweeps import Sweeps, SweepTrial, trials_of
 from tests.support.databases import SQLITE_ONLY
 
 SWEEP: dict[str, Any] = {

@@ -8,8 +8,6 @@ pruned by the median rule.
 Source: Bergstra et al. (2011), Golovin et al. (2017); Optuna (Akiba et al. 2019).
 """
 
-import logging
-import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal
@@ -29,13 +27,11 @@ from app.policies.configs.fields import entries
 from app.store import composed_jobs, jobs, metrics
 from app.store.engine import Store
 from app.store.records import JobRecord
+from jobs.composed.composer import Composer
 from jobs.spec import SweepSpec, parse_spec
 
-logger = logging.getLogger(__name__)
 optuna.logging.set_verbosity(optuna.logging.ERROR)
 
-PERIOD_S = 1.0
-"""Least time between two looks at the sweeps [s]."""
 STARTUP_TRIALS = 4
 """Number of complete trials before any is pruned."""
 WARM_UP = 0.2
@@ -145,29 +141,14 @@ def _outcome(
     return "failed", None, f"{wanted} of the evaluation, which has the rows {names}"
 
 
-class Sweeps:
+class Sweeps(Composer):
     """Starts, prunes and ends the trials of the open sweeps."""
 
+    kind = "sweep"
+
     def __init__(self) -> None:
-        self._next = 0.0
+        super().__init__()
         self._judged: dict[str, int] = {}
-
-    def advance(self, store: Store) -> None:
-        """Do what is due; at most once in a period.
-
-        Raises:
-            StorageFull: No room is left.
-            StorageUnavailable: The database does not answer.
-        """
-        if time.monotonic() < self._next:
-            return
-        for job in composed_jobs.open_jobs(store, "sweep"):
-            try:
-                self._advance(store, job)
-            except (InvalidInput, NotFound) as error:
-                logger.warning("%s", error.message, extra={"job_id": job.id})
-                composed_jobs.end(store, job.id, "failed", error=error.message)
-        self._next = time.monotonic() + PERIOD_S
 
     def _advance(self, store: Store, job: JobRecord) -> None:
         spec, trials = spec_of(job), trials_of(store, job)

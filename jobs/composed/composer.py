@@ -1,0 +1,50 @@
+"""Base class of what advances jobs that are made of jobs."""
+
+import logging
+import time
+from abc import ABC, abstractmethod
+from typing import ClassVar
+
+from app.errors import InvalidInput, NotFound
+from app.store import composed_jobs
+from app.store.engine import Store
+from app.store.records import JobRecord
+
+logger = logging.getLogger(__name__)
+
+PERIOD_S = 1.0
+"""Least time between two looks at the open jobs [s]."""
+
+
+class Composer(ABC):
+    """Advances the open jobs of one kind."""
+
+    kind: ClassVar[str]
+    """Kind of the jobs."""
+
+    def __init__(self) -> None:
+        self._next = 0.0
+
+    def advance(self, store: Store) -> None:
+        """Do what is due; at most once in a period.
+
+        Raises:
+            StorageFull: No room is left.
+            StorageUnavailable: The database does not answer.
+        """
+        if time.monotonic() < self._next:
+            return
+        for job in composed_jobs.open_jobs(store, self.kind):
+            try:
+                self._advance(store, job)
+            except (InvalidInput, NotFound) as error:
+                self._fail(store, job, error.message)
+        self._next = time.monotonic() + PERIOD_S
+
+    @abstractmethod
+    def _advance(self, store: Store, job: JobRecord) -> None:
+        """Start, cancel and collect the parts of one job."""
+
+    def _fail(self, store: Store, job: JobRecord, reason: str) -> None:
+        logger.warning("%s", reason, extra={"job_id": job.id})
+        composed_jobs.end(store, job.id, "failed", error=reason)
