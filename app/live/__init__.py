@@ -9,6 +9,8 @@ factory          Live world of a cell: sorting, reaching or pick-and-place, by i
 lateness         Histogram of the lateness of a live world's ticks
 playback         Playback of a recorded motion in a cell, in real time
 read_model       Base class and array types of snapshots, the JSON of the HTTP API
+resting_people   A live robot beside people at rest: blocked targets are left out, and a planner
+                 acts
 snapshot         Immutable state of a live world at one tick, for any thread and as JSON of the
                  HTTP API
 status_messages  Status messages common to the live worlds, one sentence each

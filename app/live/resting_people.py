@@ -10,6 +10,7 @@ from app.sim.core.arrays import Vec
 from app.sim.pick.batch import target_configurations
 from app.sim.pick.resting_people import PickTarget, RestingPeoplePlanner
 from app.sim.pick.task_policy import Candidate, Decision, TaskPolicy
+from app.sim.robot.trajectory_segment import TrajectorySegment
 
 
 class RestingPeopleControl:
@@ -28,7 +29,8 @@ class RestingPeopleControl:
         self._planner = RestingPeoplePlanner(self._robot.arm)
         self._rested = False
         self.act: Vec | None = None
-        """The action, shape (5,); None: the policy acts."""
+        """The action, a straight motion (``LiveArm.segment``), shape (5,); None: the policy
+        acts."""
 
     def unblocked(
         self,
@@ -84,8 +86,9 @@ class RestingPeopleControl:
         target = PickTarget(q_over=over[0], q_grasp=low[0], phase=phase)
         self.act = self._planner.act(robot.q, robot.qd, robot.shapes(people), target, grasp)
 
-    def or_of(self, decision: Decision) -> Vec:
-        """Return the planned action, or that of a decision, shape (5,)."""
+    def segment(self, decision: Decision) -> TrajectorySegment:
+        """Return the planned motion of the next period, or that of a decision."""
         if self.act is not None:
-            return self.act
-        return np.asarray(decision.actions[decision.index], dtype=np.float64)
+            return self._robot.segment(self.act, straight=True)
+        act = np.asarray(decision.actions[decision.index], dtype=np.float64)
+        return self._robot.segment(act)

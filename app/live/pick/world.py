@@ -136,10 +136,9 @@ class LivePickWorld(BaseWorld[LiveWorkers]):
         self.planner.update(self.people, self.policy, decision, self.offered, phase)
 
     def _wanted(self) -> TrajectorySegment:
-        act = np.zeros(5)
         if self.decision is not None and self.status in ("moving", "picking"):
-            act = self.planner.or_of(self.decision)
-        return self.robot.segment(act)
+            return self.planner.segment(self.decision)
+        return self.robot.segment(np.zeros(5))
 
     def _move_robot(self, before: HumanGeometry) -> None:
         if self.follow_plan(before):

@@ -193,11 +193,12 @@ class LiveSortingWorld(BaseWorld[LiveWorkers]):
             self._end_motion(self.decision.index)
 
     def _wanted(self) -> TrajectorySegment:
-        straight = self._vertical is not None or self.decision is None
-        return self.robot.segment(self._action(), straight=straight)
+        if self.status == "moving" and self.decision is not None:
+            return self.planner.segment(self.decision)
+        return self.robot.segment(self._action(), straight=True)
 
     def _action(self) -> Vec:
-        """Return joint speeds over their limits, in [-1, 1], shape (5,)."""
+        """Return joint speeds over their limits without the policy, in [-1, 1], shape (5,)."""
         if self.status not in ("moving", "picking"):
             return np.zeros(5)
         if self._vertical is not None:
@@ -205,7 +206,7 @@ class LiveSortingWorld(BaseWorld[LiveWorkers]):
             return self.robot.toward(self.robot.configuration_at(aim)[0])
         if self._choice is None and self.policy is not None:
             return self.robot.toward(self.robot.home)
-        return np.zeros(5) if self.decision is None else self.planner.or_of(self.decision)
+        return np.zeros(5)
 
     # Halves of a move.
 

@@ -12,6 +12,8 @@ curriculum_batch
 monitored_batch
               The pick scenario under speed and separation monitoring
 raw_state     The raw state of (5.8) from the features that contain it
+resting_people
+              Planned motion beside people at rest, in place of a pick policy's
 task_policy   Interface of a policy that selects a task, and its decision
 valued_targets
               Pick environments whose targets are chosen by their values

@@ -11,6 +11,7 @@ from app.live.pick.world import LivePickWorld
 from app.sim.cells.cell import Cell, load_cell
 from app.sim.core.arrays import Vec
 from app.sim.pick.task_policy import Decision
+from app.sim.robot.actions import ActionSettings
 from tests.support.straight_policy import StraightPolicy
 
 
@@ -34,8 +35,11 @@ class WaitingPolicy(StraightPolicy):
         return replace(decision, actions=np.zeros_like(decision.actions))
 
 
-def test_planner_finishes_a_pick_beside_a_person_at_rest(cell: Cell) -> None:
-    world = LivePickWorld(cell, WaitingPolicy(cell), seed=3)
+@pytest.mark.parametrize("degree", [2, 3])
+def test_planner_finishes_a_pick_beside_a_person_at_rest(cell: Cell, degree: int) -> None:
+    policy = WaitingPolicy(cell)
+    policy.action = ActionSettings(degree=degree)
+    world = LivePickWorld(cell, policy, seed=3)
     world.apply(commands.SetSafety(on=False))
     world.apply(commands.SetCandidates(ids=("cube4",)))
     world.apply(commands.MovePerson(pelvis=(0.0, 1.15, -1.57), right=(-0.1, 0.7, 0.2)))

@@ -36,7 +36,7 @@ from app.sim.collision.contact import clearance
 from app.sim.human.anthropometry import percentile_body
 from app.sim.mocap.importer import Motion
 from app.sim.people.human_motion_config import HumanMotionConfig, at_the_table
-from app.sim.pick.batch import PickBatch, PickSettings
+from app.sim.pick.batch import DEFAULT_ACTION, PickBatch, PickSettings
 from app.sim.robot.kernels.arm import CONTROLLED
 from app.sim.scenario.kernels.episode import COLLISION, RUNNING, TIMEOUT
 from app.sim.scene.scene import HumanKind
@@ -84,6 +84,15 @@ class ChoiceBench:
                 results.append(row | {"touched_at_rest": touched})
             stated[name] = settings_of(evaluator)
         return {"settings": stated, "results": results}
+
+
+def _planners(settings: PickSettings) -> tuple[bool, ...]:
+    """Return whether a planner acts, for each row of one kind of people.
+
+    Policies that do not pick objects up, or whose actions are no speeds, have no planner.
+    """
+    whole = settings.grasp.depth > 0.0 and settings.action == DEFAULT_ACTION
+    return (False, True) if whole else (False,)
 
 
 def _with_planner(name: str) -> str:
@@ -143,11 +152,12 @@ def run_rest(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
         "stops": replace(usual.work, at_rest=1.0, off_task=0.5),
         "works": usual.work,
     }
-    results, n = request.rows(2 * len(rows)), request.episodes or DEFAULT_EPISODES
+    planners, n = _planners(usual), request.episodes or DEFAULT_EPISODES
+    results = request.rows(len(rows) * len(planners))
     for name, work in rows.items():
         settings = replace(usual, work=work)
         evaluator = Evaluator(networks, cell, n, request.seed, settings)
-        for planned in (False, True):
+        for planned in planners:
             run = evaluator.run(choice_rules.fixed(0), planned=planned)
             row = run.row(_with_planner(name) if planned else name)
             results.append(row | _timeouts(evaluator.batch, run))
@@ -184,7 +194,7 @@ def run_yielding(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
 
     return bench.all(
         {f"yielding-{strength:g}": beside(strength) for strength in YIELDING_LEVELS},
-        planners=(False, True),
+        planners=_planners(usual),
     )
 
 
