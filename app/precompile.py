@@ -12,7 +12,7 @@ from multiprocessing import get_context
 
 import numpy as np
 
-from app.live.commands import MovePerson
+from app.live.commands import MovePerson, SetMode
 from app.live.factory import new_world
 from app.live.pick.world import LivePickWorld
 from app.live.reach.world import LiveReachWorld
@@ -25,6 +25,7 @@ from app.policies.inference.reach_policy import ReachPolicy
 from app.policies.inference.task_selection import TaskChooser
 from app.sim.cells.cell import load_cell
 from app.sim.pick.batch import PickBatch, PickSettings
+from app.sim.pick.resting_people import REST_S
 from app.sim.robot.kernels.arm import CONTROLLED
 from app.sim.sorting import decision as sorting_decision
 from app.sim.sorting.batch import batch_in
@@ -58,6 +59,9 @@ def _choosing() -> None:
         x, y, z = cell.stations[0].position
         world.apply(MovePerson(right=(x, y, z + 0.1)))
         world.step()
+        world.apply(SetMode(mode="still"))
+        for _ in range(round(2.0 * REST_S / cell.robot.dt)):  # until a planner acts
+            world.step()
         query = world.risk_query()
         assert query is not None  # there is a policy, and a person
         replace(query, people=[*query.people, *query.people]).answer()
