@@ -8,7 +8,7 @@ from app.live.arm import LiveArm
 from app.live.people.interfaces import MovingPeople
 from app.sim.core.arrays import Vec
 from app.sim.pick.batch import target_configurations
-from app.sim.pick.resting_people import PickTarget, RestingPeoplePlanner
+from app.sim.pick.resting_people import REST_S, PickTarget, RestingPeoplePlanner
 from app.sim.pick.task_policy import Candidate, Decision, TaskPolicy
 from app.sim.robot.trajectory_segment import TrajectorySegment
 
@@ -31,6 +31,16 @@ class RestingPeopleControl:
         self.act: Vec | None = None
         """The action, a straight motion (``LiveArm.segment``), shape (5,); None: the policy
         acts."""
+
+    def message(self, goal: str) -> str | None:
+        """Return what the robot does beside people at rest; None where the policy acts.
+
+        Args:
+            goal: Name of its target.
+        """
+        if self.act is not None:
+            return f"Moving to {goal} on a planned path: nobody has moved for {REST_S:.0f} s."
+        return f"Waiting: a person at rest blocks {goal}." if self._planner.blocked else None
 
     def unblocked(
         self,

@@ -3,7 +3,6 @@
 from collections.abc import Callable
 
 from app.live.snapshot import ContactSnapshot, Status
-from app.sim.pick.resting_people import REST_S
 
 Label = Callable[[str], str]
 """Maps a station id to its name for people."""
@@ -33,11 +32,6 @@ def touched(contact: ContactSnapshot, *, final: bool) -> str:
     body = _TOUCHED.get(contact.body, contact.body)
     then = "The scenario ended." if final else "The robot starts again from home."
     return f"Contact: {link} touched {body}. {then}"
-
-
-def planned(goal: str) -> str:
-    """Return that a planner moves the robot, and why."""
-    return f"Moving to {goal} on a planned path: nobody has moved for {REST_S:.0f} s."
 
 
 def resting(status: Status, goal: str | None, label: Label) -> str:

@@ -255,13 +255,12 @@ class LivePickWorld(BaseWorld[LiveWorkers]):
             return self.note
         if status in ("moving", "picking") and (reason := self.slowed()) is not None:
             return reason
-        if status == "moving" and self.decision is not None and self.planner.act is not None:
-            return status_messages.planned(self._label(self.decision.chosen))
         if status == "picking" and self.decision is not None:
             return explanation.picking(self.decision, self.progress, self._label)
         if status == "moving" and self.decision is not None:
             names = tuple(candidate.id for candidate in self.offered)
-            return explanation.going(self.decision, names, self._label)
+            planned = self.planner.message(self._label(self.decision.chosen))
+            return planned or explanation.going(self.decision, names, self._label)
         if status == "case done" and self._case is not None:
             if self.contact is not None:
                 return status_messages.touched(self.contact, final=True)

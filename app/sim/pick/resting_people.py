@@ -55,6 +55,8 @@ class RestingPeoplePlanner:
 
     arm: Arm
     """Robot in its cell."""
+    blocked: bool = False
+    """Whether people at rest block the target of the last :meth:`act`."""
     _rest_s: float = 0.0
     _t: float = 0.0
     _goal: Vec = field(default_factory=lambda: np.full(6, np.nan))
@@ -69,7 +71,7 @@ class RestingPeoplePlanner:
         self._t += self.arm.dt
         self._rest_s = self._rest_s + self.arm.dt if speed <= AT_REST else 0.0
         if self._rest_s < REST_S - 1e-9 or not is_installed():
-            self._executor = None
+            self._executor, self.blocked = None, False
             return False
         return True
 
@@ -101,7 +103,9 @@ class RestingPeoplePlanner:
             target: Target and phase of the pick.
             grasp: Rules of the grasp.
         """
-        if not self.free(people, grasp, target.q_over[None], target.q_grasp[None])[0]:
+        free = self.free(people, grasp, target.q_over[None], target.q_grasp[None])
+        self.blocked = not free[0]
+        if self.blocked:
             self._executor = None
             return None
         if self._executor is None or not np.array_equal(target.q, self._goal):

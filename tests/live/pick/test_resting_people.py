@@ -81,3 +81,17 @@ def test_target_that_a_resting_person_blocks_is_left_out(cell: Cell) -> None:
         world.step()
     assert (chosen, world.counters.reached, world.counters.contacts) == ("cube2", 1, 0)
     assert [one.id for one in world.snapshot().candidates] == ["cube2"]  # cube 4 was picked
+
+
+def test_robot_waits_and_says_so_where_a_resting_person_blocks_every_target(cell: Cell) -> None:
+    world = LivePickWorld(cell, WaitingPolicy(cell), seed=3)
+    world.apply(commands.SetSafety(on=False))
+    world.apply(commands.SetCandidates(ids=("cube2",)))
+    x, y, z = cell.station("cube2").position
+    world.apply(commands.MovePerson(pelvis=(x, 1.15, -1.57), right=(x, y, z)))
+    before = run(world, 120)
+    assert world.snapshot().message == "Waiting: a person at rest blocks Cube 2."
+    assert np.array_equal(run(world, 20), before)
+    world.apply(commands.MovePerson(pelvis=(0.0, 2.4, -1.57)))
+    run(world, 20)
+    assert world.snapshot().message.startswith("Moving to Cube 2 (Q")
