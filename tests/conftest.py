@@ -37,6 +37,7 @@ class _GroupOrFile(LoadFileScheduling):
         return group or file
 
 
+@pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Producer) -> _GroupOrFile | None:
     return _GroupOrFile(config, log) if config.getvalue("dist") == "loadgroup" else None
 

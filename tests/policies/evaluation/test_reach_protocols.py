@@ -19,9 +19,9 @@ from app.sim.cells.cell import load_cell
 from app.sim.scenario.kernels.episode import COLLISION
 from tests.policies.untrained import shipped_as, untrained_reach
 
-N = 24
-EPISODES = {"reach-targets": 2}
-"""Episodes of each target; of other protocols N."""
+N = 12
+EPISODES = {"reach-targets": 2, "reach-people": 24, "reach-tracker": 24}
+"""Episodes of each target, and those whose rates or errors are compared; of other protocols N."""
 MEASURED = sorted(
     f"reach-{name}"
     for name in "targets random constant speeds smoothness people tracker".split()
@@ -31,7 +31,7 @@ MEASURED = sorted(
 
 @pytest.fixture(autouse=True)
 def few_rows(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(reach_episodes, "N_ENVS", N)
+    monkeypatch.setattr(reach_episodes, "N_ENVS", 24)
     monkeypatch.setattr(reach_episodes, "N_RECHECKED", 2)
 
 
@@ -77,7 +77,7 @@ def test_a_result_is_json_and_states_the_rules_of_each_row(name: str) -> None:
         assert {"cell", "people", "start", "collision_ends", "goals", "time_limit_s"} <= set(
             rules
         )
-        assert row["n"] == (108 if name == "reach-targets" else N)
+        assert row["n"] == (108 if name == "reach-targets" else EPISODES.get(name, N))
         assert all("mean" in one for one in row.values() if isinstance(one, dict))
     assert result["checkpoint"] == pretrained.load("reach").sha256
 
