@@ -15,7 +15,7 @@ from app.sim.core.arrays import Vec
 from app.sim.core.jit import FAR, FAST, kernel
 from app.sim.geometry.capsules import RADIUS, UX, UY, UZ, X, Y, Z, segment_distance
 
-_POINT = 1e-12
+UPRIGHT = 1e-12
 """Squared length in the plane below which a segment is upright [m^2]."""
 _TOLERANCE = 1e-11
 """Bracket at which the search above the cylinder ends [m]."""
@@ -49,7 +49,7 @@ def cylinder_clearance(
         wx, wy = robot[X, k] - x, robot[Y, k] - y
         uu, wu = ux * ux + uy * uy, wx * ux + wy * uy
         # Upright segments count from their lower end.
-        s = -wu / uu if uu > _POINT else (1.0 if robot[UZ, k] < 0.0 else 0.0)
+        s = -wu / uu if uu > UPRIGHT else (1.0 if robot[UZ, k] < 0.0 else 0.0)
         s = min(1.0, max(0.0, s))
         px, py = wx + s * ux, wy + s * uy
         away = r + robot[RADIUS, k]
@@ -81,12 +81,12 @@ def swept_clearance(robot: Vec, x: float, y: float, sx: float, sy: float, r: flo
         r: Radius of the cylinder [m].
     """
     best, square = FAR, sx * sx + sy * sy
-    path = (sx, sy, 0.0, square, 1.0 / square if square > _POINT else 0.0)
+    path = (sx, sy, 0.0, square, 1.0 / square if square > UPRIGHT else 0.0)
     origin = (0.0, 0.0, 0.0)
     for k in range(robot.shape[1]):
         ux, uy = robot[UX, k], robot[UY, k]
         uu = ux * ux + uy * uy
-        inverse_u = 1.0 / uu if uu > _POINT else 0.0
+        inverse_u = 1.0 / uu if uu > UPRIGHT else 0.0
         start = (robot[X, k] - x, robot[Y, k] - y, 0.0)
         d = segment_distance(start, (ux, uy, 0.0, uu, inverse_u), origin, path)
         best = min(best, d - robot[RADIUS, k] - r)

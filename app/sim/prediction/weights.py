@@ -8,7 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.sim.core.arrays import Vec
-from app.sim.prediction.kernels.networks import N_IN, N_TIMES, MotionPredictor, Network
+from app.sim.prediction.kernels.networks import (
+    N_IN,
+    N_TIMES,
+    MotionPredictor,
+    Network,
+    new_hidden,
+)
 from app.sim.prediction.kernels.worker import WorkerPredictor
 
 FOLDER = Path(str(resources.files("app.sim.prediction"))) / "data"
@@ -30,17 +36,12 @@ def new_motion_predictor() -> MotionPredictor:
         Network(*(arrays[f"{kind}.{field}"] for field in Network._fields)) for kind in KINDS
     )
 
-    def floats(n: int) -> NDArray[np.float32]:
-        return np.zeros(n, dtype=np.float32)
-
-    width = len(radius.b1)
     return MotionPredictor(
         radius=radius,
         path=path,
-        x=floats(N_IN),
-        h1=floats(width),
-        h2=floats(width),
-        y=floats(N_TIMES),
+        x=np.zeros(N_IN, dtype=np.float32),
+        hidden=new_hidden(radius),
+        y=np.zeros(N_TIMES, dtype=np.float32),
     )
 
 
@@ -63,10 +64,8 @@ def worker_predictor(network: Network, mean: Vec, scale: Vec) -> WorkerPredictor
         mean: Mean of its inputs, shape (36,).
         scale: Their scales, shape (36,).
     """
-    sizes = (len(network.w1), len(network.b1), len(network.b2), len(network.b3))
-    return WorkerPredictor(
-        network, mean, scale, *(np.zeros(size, dtype=np.float32) for size in sizes)
-    )
+    x, y = (np.zeros(size, dtype=np.float32) for size in (len(network.w1), len(network.b3)))
+    return WorkerPredictor(network, mean, scale, x, new_hidden(network), y)
 
 
 def new_worker_predictor() -> WorkerPredictor:

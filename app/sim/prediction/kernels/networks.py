@@ -52,6 +52,24 @@ class Network(NamedTuple):
     """(n_out,)."""
 
 
+class Hidden(NamedTuple):
+    """Work space in which a network is evaluated; for one thread."""
+
+    first: Floats
+    """First hidden layer, shape (width,)."""
+    second: Floats
+    """Second hidden layer, shape (width,)."""
+    nonzero: NDArray[np.int64]
+    """Indices of the inputs of a layer that are not zero, as long as its longest input."""
+
+
+def new_hidden(net: Network) -> Hidden:
+    """Return work space for a network."""
+    longest = max(len(net.w1), len(net.w2), len(net.w3))
+    first, second = (np.zeros(len(bias), dtype=np.float32) for bias in (net.b1, net.b2))
+    return Hidden(first, second, np.zeros(longest, dtype=np.int64))
+
+
 class MotionPredictor(NamedTuple):
     """Networks and work space; for one thread."""
 
@@ -62,43 +80,71 @@ class MotionPredictor(NamedTuple):
     SPEED_SCALE."""
     x: Floats
     """Input, shape (N_IN,)."""
-    h1: Floats
-    """First hidden layer, shape (width,)."""
-    h2: Floats
-    """Second hidden layer, shape (width,)."""
+    hidden: Hidden
+    """Of either network."""
     y: Floats
     """Output, shape (N_TIMES,)."""
 
 
 @kernel(fastmath=FAST)
-def layer(x: Floats, w: Floats, b: Floats, rectified: bool, out: Floats) -> None:
+def layer(
+    x: Floats,
+    w: Floats,
+    b: Floats,
+    rectified: bool,
+    nonzero: NDArray[np.int64],
+    out: Floats,
+) -> None:
     """Write the output of one layer.
+
+    Inputs that are zero are left out, the others added in their order, four at once: a sum is
+    read and written once for four products. They are listed first, without branches, which a
+    processor would predict badly.
 
     Args:
         x: Inputs, shape (n,).
         w: Weights, shape (n, width).
         b: Biases, shape (width,).
         rectified: Whether negative outputs become 0.
+        nonzero: Work space, shape (>= n,).
         out: Filled, shape (width,).
     """
-    for j in range(out.shape[0]):
+    width, n = out.shape[0], 0
+    for j in range(width):
         out[j] = b[j]
     for i in range(x.shape[0]):
-        value = x[i]
-        if value != 0.0:
-            for j in range(out.shape[0]):
-                out[j] += value * w[i, j]
+        nonzero[n] = i
+        n += x[i] != 0.0
+    whole = n - n % 4
+    for k in range(0, whole, 4):
+        i0, i1, i2, i3 = nonzero[k], nonzero[k + 1], nonzero[k + 2], nonzero[k + 3]
+        x0, x1, x2, x3 = x[i0], x[i1], x[i2], x[i3]
+        w0, w1, w2, w3 = w[i0], w[i1], w[i2], w[i3]
+        for j in range(width):
+            out[j] = out[j] + x0 * w0[j] + x1 * w1[j] + x2 * w2[j] + x3 * w3[j]
+    for k in range(whole, n):
+        value, row = x[nonzero[k]], w[nonzero[k]]
+        for j in range(width):
+            out[j] += value * row[j]
     if rectified:
         for j in range(out.shape[0]):
             out[j] = max(out[j], np.float32(0.0))
 
 
 @kernel()
-def _evaluate(net: Network, predictor: MotionPredictor) -> None:
-    """Fill ``predictor.y`` from ``predictor.x``."""
-    layer(predictor.x, net.w1, net.b1, True, predictor.h1)
-    layer(predictor.h1, net.w2, net.b2, True, predictor.h2)
-    layer(predictor.h2, net.w3, net.b3, False, predictor.y)
+def evaluate(net: Network, x: Floats, hidden: Hidden, out: Floats) -> None:
+    """Write the output of a network for one input.
+
+    Args:
+        net: Network.
+        x: Input, shape (n_in,).
+        hidden: Work space.
+        out: Filled, shape (n_out,).
+    """
+    first, second, nonzero = hidden
+    layer(x, net.w1, net.b1, True, nonzero, first)
+    layer(first, net.w2, net.b2, True, nonzero, second)
+    layer(second, net.w3, net.b3, False, nonzero, out)
 
 
 @kernel(inline="always")
@@ -142,10 +188,10 @@ def predict_pedestrian(
     """
     x, y = predictor.x, predictor.y
     write_predictor_input(r, growth, age, radii, RADIUS_MIDDLE, RADIUS_SCALE, x)
-    _evaluate(predictor.radius, predictor)
+    evaluate(predictor.radius, x, predictor.hidden, y)
     for i in range(N_TIMES):
         out[i, 0] = r + RADIUS_SCALE * y[i]
     write_predictor_input(speed, 0.0, age, speeds, SPEED_MIDDLE, SPEED_SCALE, x)
-    _evaluate(predictor.path, predictor)
+    evaluate(predictor.path, x, predictor.hidden, y)
     for i in range(N_TIMES):
         out[i, 1] = max(0.0, STEP_S * (i + 1) * (speed + SPEED_SCALE * y[i]))

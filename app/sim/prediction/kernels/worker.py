@@ -13,7 +13,7 @@ import numpy as np
 
 from app.sim.core.arrays import Vec
 from app.sim.core.jit import kernel
-from app.sim.prediction.kernels.networks import Floats, Network, layer
+from app.sim.prediction.kernels.networks import Floats, Hidden, Network, evaluate
 
 TIMES = (0.25, 0.5, 1.0)
 """Times of the predictions [s]."""
@@ -34,10 +34,8 @@ class WorkerPredictor(NamedTuple):
     """Their scales, shape (36,)."""
     x: Floats
     """Input, shape (36,)."""
-    h1: Floats
-    """First hidden layer, shape (width,)."""
-    h2: Floats
-    """Second hidden layer, shape (width,)."""
+    hidden: Hidden
+    """Of the network."""
     y: Floats
     """Output, shape (3 * 18,)."""
 
@@ -64,11 +62,9 @@ def predict_worker(predictor: WorkerPredictor, q: Vec, qd: Vec, out: Vec) -> Non
         qd: Joint speeds [m/s, rad/s], shape (18,).
         out: Filled with the joint positions at each time, shape (3, 18).
     """
-    net, y, inside = predictor.network, predictor.y, standardise(predictor, q, qd)
+    y, inside = predictor.y, standardise(predictor, q, qd)
     if inside:
-        layer(predictor.x, net.w1, net.b1, True, predictor.h1)
-        layer(predictor.h1, net.w2, net.b2, True, predictor.h2)
-        layer(predictor.h2, net.w3, net.b3, False, y)
+        evaluate(predictor.network, predictor.x, predictor.hidden, y)
     for i in range(len(TIMES)):
         for j in range(N_JOINTS):
             out[i, j] = q[j] + (y[N_JOINTS * i + j] if inside else TIMES[i] * qd[j])

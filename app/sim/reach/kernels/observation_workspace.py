@@ -15,6 +15,7 @@ from app.sim.people.kernels.people import (
 )
 from app.sim.prediction.kernels.networks import N_TIMES, MotionPredictor
 from app.sim.robot.kernels.arm import Arm, RobotPose, new_robot_pose
+from app.sim.robot.kernels.configuration_lanes import new_lanes
 from app.sim.scenario.kernels.person_observation import PersonWorkspace, new_person_workspace
 
 N_PERSON = 6
@@ -58,6 +59,8 @@ class ReachObservationWorkspace(NamedTuple):
     """Distance of each of a worker's capsules to the robot [m], shape (16,)."""
     moved: RobotPose
     """The robot further along a motion."""
+    lanes: Vec
+    """The robot in the configurations of the option features."""
     q: Vec
     """Its joint positions [rad], shape (6,)."""
     step: Vec
@@ -97,6 +100,7 @@ def new_observation_workspace(
         body=body,
         gap=np.zeros(body.now.shape[1]),
         moved=new_robot_pose(arm),
+        lanes=new_lanes(),
         q=np.zeros(6),
         step=np.zeros(6),
         base=np.zeros(6),

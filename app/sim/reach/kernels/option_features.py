@@ -15,7 +15,6 @@ from app.sim.core.arrays import Vec
 from app.sim.core.jit import FAR, kernel
 from app.sim.core.observation_layout import slices_of
 from app.sim.geometry.capsules import copy_values
-from app.sim.geometry.cylinder import cylinder_clearance
 from app.sim.people.kernels.pedestrian import AGE, N_PAST, PAST_RADIUS, PAST_SPEED
 from app.sim.people.kernels.people import PeopleState
 from app.sim.prediction.kernels.networks import N_TIMES, STEP_S, predict_pedestrian
@@ -28,7 +27,17 @@ from app.sim.reach.kernels.observation_workspace import (
     ReachObservationWorkspace,
     ReachQuery,
 )
-from app.sim.robot.kernels.arm import Arm, place_robot
+from app.sim.robot.kernels.arm import Arm
+from app.sim.robot.kernels.configuration_lanes import (
+    AXIS_R,
+    AXIS_X,
+    AXIS_Y,
+    CLEARANCE,
+    JOINTS,
+    N_LANES,
+    measure_lanes,
+    place_lanes,
+)
 from app.sim.scenario.kernels.person_observation import Obs
 
 LAG_S = 0.05
@@ -112,16 +121,24 @@ def _cut(d: float) -> float:
     return max(-1.0, min(2.0, d / NEAR))
 
 
-@kernel(inline="always")
-def _clearance(arm: Arm, top_z: float, i: int, work: ReachObservationWorkspace) -> float:
-    """Return the clearance of the robot at ``work.q`` to all people at time ``i`` [m]."""
-    place_robot(arm, work.q, work.moved)
-    least = FAR
+@kernel()
+def _measure_people(arm: Arm, top_z: float, n: int, work: ReachObservationWorkspace) -> None:
+    """Fill the clearances of ``n`` configurations, at the looks in turn, to all people.
+
+    Args:
+        arm: Robot in its cell.
+        top_z: Height of people's tops [m].
+        n: Number of configurations in ``work.lanes``.
+        work: Holds the predicted people.
+    """
+    lanes = work.lanes
+    place_lanes(arm.lengths, n, lanes)
     for p in range(work.n[0]):
-        x, y, r = work.predicted[i, p, 0], work.predicted[i, p, 1], work.predicted[i, p, 2]
-        d, _ = cylinder_clearance(work.moved.columns, 0, x, y, r, top_z)
-        least = min(least, d)
-    return least
+        for m in range(n):
+            there = work.predicted[LOOKS[m % N_LOOKS] - 1, p]
+            lanes[AXIS_X + m], lanes[AXIS_Y + m] = there[0], there[1]
+            lanes[AXIS_R + m] = there[2]
+        measure_lanes(arm, top_z, n, work.q, work.moved, lanes)
 
 
 @kernel()
@@ -137,21 +154,26 @@ def predict_option_clearances(
         qd: Joint speeds [rad/s], shape (6,).
         work: Holds the predicted people.
     """
+    lanes = work.lanes
     for option in range(N_ASIDE):
         longest = 1e-9
         if option > 0:
             for j in range(6):
                 left = abs(work.retreats[option - 1, j] - q[j])
                 longest = max(longest, left / arm.limits.qd_max[j])
-        k, least = option * (N_LOOKS + 1), FAR
         for i in range(N_LOOKS):
-            t = STEP_S * LOOKS[i]
+            t, m = STEP_S * LOOKS[i], option * N_LOOKS + i
             share = min(1.0, max(0.0, t - LAG_S) / longest)
             for j in range(6):
-                work.q[j] = q[j] + 0.5 * qd[j] * min(t, ROLL_S)
+                there = q[j] + 0.5 * qd[j] * min(t, ROLL_S)
                 if option > 0:
-                    work.q[j] += share * (work.retreats[option - 1, j] - q[j])
-            d = _clearance(arm, top_z, LOOKS[i] - 1, work)
+                    there += share * (work.retreats[option - 1, j] - q[j])
+                lanes[JOINTS + j * N_LANES + m] = there
+    _measure_people(arm, top_z, N_ASIDE * N_LOOKS, work)
+    for option in range(N_ASIDE):
+        k, least = option * (N_LOOKS + 1), FAR
+        for i in range(N_LOOKS):
+            d = lanes[CLEARANCE + option * N_LOOKS + i]
             least = min(least, d)
             work.aside[k + i] = _cut(d)
         work.aside[k + N_LOOKS] = _cut(least)
@@ -182,16 +204,18 @@ def write_option_features(
     arrival, least, p = 1.0 / rate, FAR, work.n[1]
     out[k] = arrival
     for i in range(N_LOOKS):
-        t, step = STEP_S * LOOKS[i], LOOKS[i] - 1
+        t = STEP_S * LOOKS[i]
         share = min(1.0, rate * max(0.0, t - LAG_S))
         for j in range(6):
             rolled = 0.5 * qd[j] * min(t, ROLL_S)
-            work.q[j] = q[j] + rolled + share * work.step[j]
-        d = _clearance(arm, top_z, step, work)
-        if t <= arrival + AFTER_S:
+            work.lanes[JOINTS + j * N_LANES + i] = q[j] + rolled + share * work.step[j]
+    _measure_people(arm, top_z, N_LOOKS, work)
+    for i in range(N_LOOKS):
+        d = work.lanes[CLEARANCE + i]
+        if STEP_S * LOOKS[i] <= arrival + AFTER_S:
             least = min(least, d)
         out[k + BASE + i] = _cut(d)
-        there = work.predicted[step, p]
+        there = work.predicted[LOOKS[i] - 1, p]
         distance = math.hypot(there[0] - goal[0], there[1] - goal[1])
         out[k + GOAL + i] = min(3.0, (distance - there[2]) / SCALE)
         out[k + GROWTH + i] = (there[2] - work.seen[4]) / GROWN

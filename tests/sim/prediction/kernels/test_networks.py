@@ -11,6 +11,7 @@ from app.sim.prediction.kernels.networks import (
     SPEED_MIDDLE,
     SPEED_SCALE,
     STEP_S,
+    layer,
     predict_pedestrian,
 )
 from app.sim.prediction.weights import new_motion_predictor
@@ -45,6 +46,21 @@ def test_the_kernel_computes_the_networks() -> None:
 def _said(net, seen: np.ndarray) -> np.ndarray:
     hidden = np.maximum(seen.astype(np.float32) @ net.w1 + net.b1, 0.0)
     return np.maximum(hidden @ net.w2 + net.b2, 0.0) @ net.w3 + net.b3
+
+
+@pytest.mark.parametrize("n_nonzero", [0, 1, 3, 4, 5, 7, 11])
+@pytest.mark.parametrize("rectified", [True, False])
+def test_a_layer_leaves_out_no_input_but_zeros(n_nonzero: int, rectified: bool) -> None:
+    rng = np.random.default_rng(n_nonzero)
+    x, nonzero = np.zeros(11, dtype=np.float32), np.zeros(11, dtype=np.int64)
+    x[rng.permutation(11)[:n_nonzero]] = 1.0 + rng.random(n_nonzero)
+    w, b = rng.normal(size=(11, 20)).astype(np.float32), rng.normal(size=20).astype(np.float32)
+    out = np.full(20, np.nan, dtype=np.float32)
+    layer(x, w, b, rectified, nonzero, out)
+    expected = x @ w + b
+    np.testing.assert_allclose(
+        out, np.maximum(expected, 0.0) if rectified else expected, atol=1e-5
+    )
 
 
 @pytest.mark.parametrize("r", [0.22, 0.35, 0.48])

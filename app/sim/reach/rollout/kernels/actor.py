@@ -8,10 +8,8 @@ skipped, which a library's matrix product cannot do; a library is as fast beyond
 import math
 from typing import NamedTuple
 
-import numpy as np
-
 from app.sim.core.jit import kernel
-from app.sim.prediction.kernels.networks import Floats, Network, layer
+from app.sim.prediction.kernels.networks import Floats, Hidden, Network, evaluate, new_hidden
 from app.sim.reach.kernels.observation import BASE_START
 from app.sim.scenario.kernels.person_observation import Obs
 
@@ -28,16 +26,13 @@ class CompiledActor(NamedTuple):
     """The network."""
     base_weight: float
     """Weight of the base motion in the action."""
-    h1: Floats
-    """First hidden layer, shape (width,)."""
-    h2: Floats
-    """Second hidden layer, shape (width,)."""
+    hidden: Hidden
+    """Of the network."""
 
 
 def new_compiled_actor(net: Network, base_weight: float) -> CompiledActor:
     """Return a network with its own work space."""
-    h1, h2 = np.zeros((2, len(net.b1)), dtype=np.float32)
-    return CompiledActor(net, base_weight, h1, h2)
+    return CompiledActor(net, base_weight, new_hidden(net))
 
 
 @kernel()
@@ -49,10 +44,7 @@ def act_once(actor: CompiledActor, obs: Obs, act: Floats) -> None:
         obs: Observation, shape (n_obs,).
         act: Filled, in [-1, 1], shape (N_ACT,).
     """
-    net = actor.net
-    layer(obs, net.w1, net.b1, True, actor.h1)
-    layer(actor.h1, net.w2, net.b2, True, actor.h2)
-    layer(actor.h2, net.w3, net.b3, False, act)
+    evaluate(actor.net, obs, actor.hidden, act)
     for j in range(N_ACT):
         base = min(1.0, max(-1.0, obs[BASE_START + j]))
         act[j] = math.tanh(act[j] + math.atanh(actor.base_weight * base))
