@@ -74,12 +74,11 @@ _FAR_PERSON = Person(q=human.rest_posture(*FAR_AWAY), qd=np.zeros(18))
 def estimates(predicted: OutcomePrediction) -> tuple[OutcomeEstimate, ...]:
     """Return predicted outcomes one by one, with the intervals of their probabilities."""
     mean, spread = predicted.probability, predicted.spread
-    low, high = np.maximum(mean - spread, 0.0).tolist(), np.minimum(mean + spread, 1.0).tolist()
-    rows = zip(mean.tolist(), low, high, predicted.time_s.tolist(), strict=True)
-    return tuple(
-        OutcomeEstimate(mean[0], (low[0], high[0]), mean[1], (low[1], high[1]), time_s)
-        for mean, low, high, time_s in rows
-    )
+    low, high = np.maximum(mean - spread, 0.0), np.minimum(mean + spread, 1.0)
+    (success, contact, _), lows, highs = (rows.T.tolist() for rows in (mean, low, high))
+    intervals = [zip(lows[k], highs[k], strict=True) for k in range(2)]
+    times = predicted.time_s.tolist()
+    return tuple(map(OutcomeEstimate, success, intervals[0], contact, intervals[1], times))
 
 
 def select(
