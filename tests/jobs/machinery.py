@@ -45,6 +45,14 @@ def wait_for(store: Store, job_id: str, reached: Callable[[JobRecord], bool]) ->
     raise AssertionError(f"not reached within {WAIT_S} s: {job}")
 
 
+def wait_until(reached: Callable[[], bool]) -> None:
+    """Wait until something is reached."""
+    deadline = time.monotonic() + WAIT_S
+    while not reached():
+        assert time.monotonic() < deadline
+        time.sleep(0.02)
+
+
 def wait_until_final(store: Store, job_id: str) -> JobRecord:
     return wait_for(store, job_id, lambda job: job.is_final)
 

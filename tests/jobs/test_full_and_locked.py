@@ -4,7 +4,7 @@ import errno
 import sqlite3
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -25,10 +25,10 @@ from jobs.worker import JobWorker
 from tests.jobs.counting_worker import count
 from tests.jobs.machinery import (
     PATIENCE,
-    WAIT_S,
     assert_counted_once,
     queue,
     wait_for,
+    wait_until,
     wait_until_final,
 )
 from tests.support.databases import SQLITE_ONLY
@@ -36,13 +36,6 @@ from tests.support.databases import SQLITE_ONLY
 pytestmark = SQLITE_ONLY  # its limits and locks are those of a file
 
 UNLIMITED = "1000000"
-
-
-def wait_until(reached: Callable[[], bool]) -> None:
-    deadline = time.monotonic() + WAIT_S
-    while not reached():
-        assert time.monotonic() < deadline
-        time.sleep(0.02)
 
 
 def n_pages(store: Store) -> int:

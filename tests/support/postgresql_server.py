@@ -18,6 +18,13 @@ WAIT_S = 300.0
 """Far above the duration of a start or stop; only a hang reaches it."""
 TEMPLATE = "migrated"
 """A database whose copies have tables and no rows."""
+SMALL = "small"
+"""Tablespace of a server with a small disk."""
+_WITH_SMALL_DISK = (
+    *("unshare", "--user", "--map-current-user", "--mount", "--keep-caps", "sh", "-c"),
+    'mount -t tmpfs -o size="$0" tmpfs "$1" && shift && exec "$@"',
+)
+"""Runs a program beside a memory file system that only this program sees; needs no root."""
 
 
 class PostgresqlServer:
@@ -25,10 +32,12 @@ class PostgresqlServer:
 
     Args:
         folder: A folder of the server's user.
+        disk_bytes: Size of a disk of its own for the tablespace ``SMALL``, which is lost when
+            the server stops; None: it has none. The write-ahead log is not on it.
     """
 
-    def __init__(self, folder: Path) -> None:
-        self._folder = folder
+    def __init__(self, folder: Path, disk_bytes: int | None = None) -> None:
+        self._folder, self._disk_bytes = folder, disk_bytes
         self._number = 0
         _run(
             "initdb",
@@ -42,13 +51,24 @@ class PostgresqlServer:
             "-A",
             "trust",
         )
+        if disk_bytes is not None:
+            self._disk.mkdir()
+            shutil.chown(self._disk, _user().get("user", os.geteuid()))
         self.start()
+        if disk_bytes is not None:
+            self.execute(f"CREATE TABLESPACE {SMALL} LOCATION '{self._disk}'")
+
+    @property
+    def _disk(self) -> Path:
+        return self._folder / SMALL
 
     def start(self) -> None:
         """Start; returns when it answers."""
         options = ["-k", self._folder, "-c", "listen_addresses=", "-c", "fsync=off"]
         with (self._folder / "log").open("ab") as log:
             command = [_program("postgres"), "-D", self._folder / "data", *options]
+            if self._disk_bytes is not None:
+                command = [*_WITH_SMALL_DISK, str(self._disk_bytes), self._disk, *command]
             self._process = subprocess.Popen(
                 command, stdout=log, stderr=log, cwd=self._folder, **_user()
             )
@@ -76,12 +96,31 @@ class PostgresqlServer:
         """Return the URL of a database."""
         return f"postgresql://tandem@/{database}?host={self._folder}"
 
+    def fill_disk(self) -> None:
+        """Write a file to the small disk until it is full."""
+        rows = (self._disk_bytes or 0) // 1000
+        try:
+            self._write_to_disk(f"SELECT repeat('x', 1000) FROM generate_series(0, {rows})")
+        except sa.exc.OperationalError as error:
+            assert getattr(error.orig, "sqlstate", None) == "53100", error
+        else:
+            raise AssertionError("the disk is not full")
+
+    def free_disk(self) -> None:
+        """Remove the content of that file."""
+        self._write_to_disk("SELECT WHERE false")
+
+    def _write_to_disk(self, query: str) -> None:
+        self.execute(f"COPY ({query}) TO '{self._disk}/ballast'")
+
     @contextmanager
-    def database(self, template: str = TEMPLATE) -> Iterator[str]:
+    def database(
+        self, template: str = TEMPLATE, tablespace: str = "pg_default"
+    ) -> Iterator[str]:
         """Create a database and yield its URL; it is dropped at the end."""
         self._number += 1
         name = f"test{self._number}"
-        self.execute(f"CREATE DATABASE {name} TEMPLATE {template}")
+        self.execute(f"CREATE DATABASE {name} TEMPLATE {template} TABLESPACE {tablespace}")
         yield self.url(name)
         self.execute(f"DROP DATABASE {name} WITH (FORCE)")
 
@@ -93,14 +132,14 @@ class PostgresqlServer:
 
 
 @contextmanager
-def postgresql_server() -> Iterator[PostgresqlServer]:
+def postgresql_server(disk_bytes: int | None = None) -> Iterator[PostgresqlServer]:
     """Run a server; its folder is removed at the end."""
     with tempfile.TemporaryDirectory(prefix="tandem-pg-", dir="/tmp") as name:
         folder = Path(name)
         user = _user().get("user")
         if user is not None:
             shutil.chown(folder, user)
-        server = PostgresqlServer(folder)
+        server = PostgresqlServer(folder, disk_bytes)
         try:
             yield server
         finally:
