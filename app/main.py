@@ -50,6 +50,8 @@ from app.store.checkpoints import find_damaged
 from app.store.engine import Store
 from jobs.cell_catalog import CellCatalog
 from jobs.checkpoints import shipped
+from jobs.composed.reports import Reports
+from jobs.composed.sweeps import Sweeps
 from jobs.executor import Executor, LocalProcess
 from jobs.import_process import ImportProcess
 from jobs.recording_catalog import RecordingCatalog
@@ -137,6 +139,7 @@ class Service:
             retention=retention,
             tracer=tracer,
         )
+        supervisor.composed = Sweeps(), Reports()
         self._imports = ImportProcess()
         recordings = RecordingCatalog(store, self._imports)
         try:

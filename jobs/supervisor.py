@@ -32,8 +32,7 @@ from app.store.database.migrate import migrate
 from app.store.database.schema import check_schema
 from app.store.engine import Store
 from app.store.records import Claim
-from jobs.composed.reports import Reports
-from jobs.composed.sweeps import Sweeps
+from jobs.composed.composer import Composer
 from jobs.executor import Executor, Exit, Handle, LocalProcess
 from jobs.resume_files import remove_unneeded
 from jobs.retention import Retention
@@ -121,7 +120,8 @@ class Supervisor:
         self._tracer = tracer or NoOpTracer()
         self._min_free_bytes = min_free_bytes
         self._retention = retention
-        self._composed = (Sweeps(), Reports())
+        self.composed: tuple[Composer, ...] = ()
+        """What advances jobs made of jobs; set before the start."""
         self._workers: dict[Claim, _Worker] = {}
         self._orphans_queued = False
         self._not_before = -math.inf
@@ -217,7 +217,7 @@ class Supervisor:
                 self._fill_reserve()
                 logger.info("the queue goes on after: %s", self._waiting)
             self._waiting = None
-            for one in self._composed:
+            for one in self.composed:
                 one.advance(self._store)
             while len(self._workers) < self._max_running and self._start_next():
                 pass

@@ -35,7 +35,7 @@ from tests.support.postgresql_server import PostgresqlServer, postgresql_server
 
 SERIES = 25
 """Kills of one database, below the number that ends a job."""
-LONGEST_S = 2.0
+LONGEST_S = 1.0
 """Longest time from the start of a server, its readiness or the last kill to a kill [s]."""
 NATURAL_END_S = 20.0
 """Longest time in which the kernel ends the workers of a killed server [s]."""
