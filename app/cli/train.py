@@ -47,22 +47,24 @@ def train(
     The same command continues an interrupted training, with the same result as without the
     interruption.
     """
-    with in_use(output):
-        _train(preset, seed, sets or [], output, as_json)
-
-
-def _train(preset: str, seed: int, sets: Sequence[str], output: Path, as_json: bool) -> None:
-    """Train in a folder that no other process uses."""
     settings = prepared_settings()
-    import torch
-
     from app.cli.cells import named_cell
     from app.policies.configs import presets
+
+    configuration = presets.resolve(preset, presets.nested(parse_overrides(sets or [])))
+    cell = named_cell(configuration.cell, settings)
+    with in_use(output):
+        path = _train(configuration, cell, seed, output)
+    print_result(f"wrote {path}", {"checkpoint": str(path)}, as_json=as_json)
+
+
+def _train(configuration: "Preset", cell: "Cell", seed: int, output: Path) -> Path:
+    """Train in a folder that no other process uses; return the path of the policy."""
+    import torch
+
     from app.policies.training import train as training
     from app.policies.training.state_folder import StateFolder
 
-    configuration = presets.resolve(preset, presets.nested(parse_overrides(sets)))
-    cell = named_cell(configuration.cell, settings)
     torch.set_num_threads(1)
     path, states = output / "policy.safetensors", StateFolder(output / "resume")
     resume = states.newest()
@@ -101,7 +103,7 @@ def _train(preset: str, seed: int, sets: Sequence[str], output: Path, as_json: b
         )
         raise typer.Exit(INTERRUPTED)
     states.remove()
-    print_result(f"wrote {path}", {"checkpoint": str(path)}, as_json=as_json)
+    return path
 
 
 @contextmanager

@@ -135,8 +135,10 @@ def test_wrong_call_ends_with_status_2(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     monkeypatch.setenv("TANDEM_DATA", str(tmp_path))
+    monkeypatch.chdir(tmp_path)
     assert main(arguments) == 2
     assert capsys.readouterr().err
+    assert not (tmp_path / "train.lock").exists()
 
 
 @pytest.mark.parametrize(
