@@ -52,6 +52,11 @@ def test_a_training_counts_episodes_that_end_unfeasible():
     assert min(shares) < 1.0 and max(shares) <= 1.0 + 1e-12
 
 
+@pytest.mark.usefixtures("tiny_run")
+def test_thread_of_a_training_keeps_denormal_numbers_afterwards():
+    assert np.float64(1e-300) * np.float64(1e-15) > 0.0
+
+
 def test_the_same_seed_trains_the_same_bits(tiny_preset, tiny_run):
     again = Recorder()
     result = again.run(tiny_preset)
