@@ -59,9 +59,6 @@ def _choosing() -> None:
         x, y, z = cell.stations[0].position
         world.apply(MovePerson(right=(x, y, z + 0.1)))
         world.step()
-        world.apply(SetMode(mode="still"))
-        for _ in range(round(2.0 * REST_S / cell.robot.dt)):  # until a planner acts
-            world.step()
         query = world.risk_query()
         assert query is not None  # there is a policy, and a person
         replace(query, people=[*query.people, *query.people]).answer()
@@ -69,6 +66,9 @@ def _choosing() -> None:
         batch.reset()
         batch.step(np.zeros((N_ENVS, CONTROLLED), dtype=np.float32))
         new_world(load_cell(SORTING_CELL), policy, seed=0).step()
+    world.apply(SetMode(mode="still"))
+    for _ in range(round(REST_S / world.robot.dt) + 5):  # a planner acts at the end
+        world.step()
 
 
 def _sorting() -> None:
