@@ -11,8 +11,10 @@ import time
 from collections import deque
 from dataclasses import dataclass, field
 
-MAX_SHARE = 0.7
-"""Largest share of the time for decisions at which a socket is admitted."""
+MAX_SHARE = 0.92
+"""Largest share of the time for decisions at which a socket is admitted. Whole decisions are
+counted, and loaded servers shorten them: at 0.95, two cores still answer 16 sockets at 50 Hz
+within 20 ms in 99 % of the requests (``bench sockets``)."""
 MAX_SOCKETS = 64
 """Largest number of open sockets."""
 LOOP_HZ = 50.0

@@ -144,8 +144,8 @@ def test_socket_beyond_the_measured_capacity_is_refused_with_the_reason(
             code, reason = close_of(second)
         assert code == 1013
         assert reason == (
-            "motion sockets use 42 % of the time for decisions (1 are open); one more would "
-            "exceed 70 %"
+            "motion sockets use 55 % of the time for decisions (1 are open); one more would "
+            "exceed 92 %"
         )
         load.decision_s = 0.4 * MAX_SHARE / LOOP_HZ
         with connect(url) as second:
