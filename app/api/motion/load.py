@@ -13,8 +13,8 @@ from dataclasses import dataclass, field
 
 MAX_SHARE = 0.92
 """Largest share of the time for decisions at which a socket is admitted. Whole decisions are
-counted, and loaded servers shorten them: at 0.95, two cores still answer 16 sockets at 50 Hz
-within 20 ms in 99 % of the requests (``bench sockets``)."""
+counted, and a loaded server shortens them: two cores answer 16 sockets at 50 Hz within 20 ms in
+99 % of the requests (``bench sockets``)."""
 MAX_SOCKETS = 64
 """Largest number of open sockets."""
 LOOP_HZ = 50.0
@@ -50,7 +50,7 @@ class MotionLoad:
     idle_s: float = 60.0
     """Time without a request after which a socket is closed [s]."""
     decision_s: float = FIRST_GUESS_S
-    """Mean time of a decision [s]."""
+    """Mean time of a decision of which nothing was left out [s]."""
     turn: asyncio.Lock = field(default_factory=asyncio.Lock)
     """Held during a decision; others wait in order."""
     _open: set[SocketRate] = field(default_factory=set)
@@ -85,12 +85,14 @@ class MotionLoad:
         """Count a socket no more."""
         self._open.discard(socket)
 
-    def note(self, socket: SocketRate, seconds: float) -> None:
+    def note(self, socket: SocketRate, seconds: float, *, whole: bool) -> None:
         """Count a decision of a socket.
 
         Args:
             socket: The socket.
             seconds: Time of the decision on the clock [s].
+            whole: Whether no part of it was left out; only such decisions enter the mean.
         """
         socket.decided.append(time.monotonic())
-        self.decision_s += SMOOTHING * (seconds - self.decision_s)
+        if whole:
+            self.decision_s += SMOOTHING * (seconds - self.decision_s)

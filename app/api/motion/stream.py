@@ -144,7 +144,8 @@ class MotionSocket:
                 self._taken.set()
                 begin = time.perf_counter()
                 text = await self._reply(request, begin)
-                self._load.note(self._rate, time.perf_counter() - begin)
+                whole = begin - request.at <= SHARES[0][1] * self._deadline_s
+                self._load.note(self._rate, time.perf_counter() - begin, whole=whole)
             await self._client.send_text(text)
 
     async def _reply(self, request: Waiting, begin: float) -> str:

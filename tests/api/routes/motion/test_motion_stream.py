@@ -162,6 +162,16 @@ def test_idle_socket_does_not_count_but_their_number_is_limited() -> None:
     assert load.refusal() == "64 motion sockets are open already: close one of them"
 
 
+def test_shortened_decisions_do_not_make_room_for_more_sockets() -> None:
+    load, socket = MotionLoad(decision_s=2e-3), SocketRate()
+    for _ in range(100):
+        load.note(socket, 1e-4, whole=False)
+    assert load.decision_s == 2e-3
+    for _ in range(100):
+        load.note(socket, 1e-4, whole=True)
+    assert 1e-4 < load.decision_s < 1e-3
+
+
 def test_idle_socket_is_closed(services: Services, url: str) -> None:
     services.motion_load.idle_s = 0.3
     with connect(url) as socket:
