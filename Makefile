@@ -91,9 +91,12 @@ bench: $(VENV)/dev.stamp ## every benchmark, as tables
 docs: $(VENV)/dev.stamp ## build the site of the documents in build/site, strictly
 	@NO_MKDOCS_2_WARNING=1 $(PY) -m mkdocs build --quiet --config-file tools/docs/mkdocs.yml
 
-tables: $(VENV)/dev.stamp ## write the tables of README, docs and model cards from docs/results
+tables: $(VENV)/dev.stamp ## write the tables, figures and report of the documents from docs/results
 	@$(PY) -m tools.docs.tables
 	@$(PY) -m tools.docs.world.page --page
+	@$(PY) -m tools.docs.pick_plots
+	@$(PY) -m tools.docs.recipe_plots
+	@$(PY) -m app report
 
 world: $(VENV)/dev.stamp ## measure, draw and write docs/world.md
 	@$(PY) -m tools.docs.world.page
