@@ -1,10 +1,7 @@
 """The report: tables and figures of the thesis beside the results of Tandem.
 
-page      the page, as Markdown
-document  the page as one HTML file, with its figures
-parts     numbers of result files and presets
-sorting   chapter 3 of the thesis
-motion    chapter 4
-both      chapter 5
-recipes   trainings of all chapters
+document   The page as one HTML file, with its figures
+numbers    Numbers of result files, presets and settings as text
+page       The page: ``thesis.md`` with its numbers and their provenance
+thesis.md  Text, tables and figures, with a placeholder for each number
 """

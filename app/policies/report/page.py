@@ -1,31 +1,28 @@
-"""The page of the report: a section per table or figure, with the provenance of its numbers."""
+"""The page of the report: ``thesis.md`` with its numbers and their provenance.
+
+A placeholder stands for a number; parts in square brackets may be left out, and ``-`` is an
+empty part.
+
+===================================================  =========================================
+``{value FILE / ROW / KEY [/ UNIT]}``                number of a result file
+``{curve FILE / PRESET / KEY [/ UNIT [/ TASK]]}``    last point of learning curves
+``{preset PRESET / GROUP.FIELD [/ FACTOR]}``         field of a preset
+``{reach NAME}``                                     number of the reach scenario
+``{command TEXT}``                                   measures what a section lacks; own line
+===================================================  =========================================
+"""
 
 import json
+import re
 from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 from app.policies.evaluation.registry import PROTOCOLS, default_checkpoint
-from app.policies.report.both import BOTH_ITEMS
-from app.policies.report.motion import MOTION_ITEMS
-from app.policies.report.parts import Config, Item, StoredValue
-from app.policies.report.recipes import RECIPE_ITEMS
-from app.policies.report.sorting import SORTING_ITEMS
+from app.policies.report.numbers import curve_end, preset_value, reach_setting, stored_value
 
 MISSING = "not measured"
-ITEMS = (*SORTING_ITEMS, *MOTION_ITEMS, *BOTH_ITEMS, *RECIPE_ITEMS)
-"""Tables and figures, in the order of the thesis; then all trainings."""
-HEAD = """# The thesis beside Tandem
-
-Every table and figure of the results of the [thesis](../method.md), in its order: its numbers,
-those of its recipe on Tandem's simulator, and those of Tandem's best policy. `python -m app
-report` writes this page from the files in `docs/results` within seconds; it measures nothing.
-To measure again, run the commands that are named below a table with the files that they write.
-*Not measured* means that there is no such file. Intervals are 95 %; `±` is a standard
-deviation.
-
-"""
 MEASURED = """Numbers from a *job*, as named below a table, were measured for this report; all
 others are stored.
 
@@ -35,18 +32,26 @@ Find = Callable[[str], Json | None]
 """Returns the result of a file, by its name without ``.json``."""
 RESULTS = Path(__file__).resolve().parents[3] / "docs/results"
 """The stored results."""
+TEXT = Path(__file__).with_name("thesis.md").read_text(encoding="utf-8")
+"""The page with placeholders."""
 TASKS = ("-e0", "-e1")
 """Ends of the names of files that state the task of a sorting policy."""
+_PLACE = re.compile(r"\{(value|curve|preset|reach) ([^}]+)\}")
+_COMMAND = re.compile(r"^\{command (.+)\}$", re.MULTILINE)
+_OF_RESULT: dict[str, Callable[..., str | None]] = {"value": stored_value, "curve": curve_end}
+_OF_CODE: dict[str, Callable[..., str]] = {"preset": preset_value, "reach": reach_setting}
+
+
+def files_of(text: str) -> set[str]:
+    """Return the names of the result files of placeholders, without ``.json``."""
+    found = _PLACE.findall(text)
+    return {_parts(place)[0] for kind, place in found if kind in _OF_RESULT}
 
 
 def evaluations() -> dict[str, tuple[str, str]]:
     """Return the result files that evaluations write, with protocol and checkpoint of each."""
-    sources = [
-        one for item in ITEMS for line in item.measures for one in (line.recipe, line.best)
-    ]
-    files = {one.file for one in sources if isinstance(one, StoredValue)}
     found = {}
-    for file in sorted(files):
+    for file in sorted(files_of(TEXT)):
         protocol = next((file[:-3] for end in TASKS if file.endswith(end)), file)
         if protocol in PROTOCOLS:
             own = default_checkpoint(protocol)
@@ -62,38 +67,47 @@ def page(results: Path, measured: Mapping[str, Json] | None = None) -> tuple[str
         measured: Results in place of files, by the name of the file without ``.json``.
     """
     find = partial(_find, results, measured or {})
-    parts, missing = [HEAD, MEASURED if measured else ""], []
-    chapter = ""
-    for item in ITEMS:
-        if item.chapter != chapter:
-            chapter = item.chapter
-            parts.append(f"## {chapter}\n\n")
-        text, absent = section(item, find)
+    head, *sections = re.split(r"^(?=##)", TEXT, flags=re.MULTILINE)
+    parts, missing = [head, MEASURED if measured else ""], []
+    for one in sections:
+        text, absent = section(one, find)
         parts.append(text)
-        missing += [f"{item.title}: {name}" for name in absent]
+        missing += absent
     return "".join(parts).rstrip() + "\n", missing
 
 
-def section(item: Item, find: Find) -> tuple[str, list[str]]:
-    """Return the section of a table or figure, and the measures without a result file."""
-    lines, absent, used = [f"### {item.title}", ""], [], dict[str, Json]()
-    if item.measures:
-        lines += ["| | thesis | its recipe here | best here |", "| --- | --- | --- | --- |"]
-    for measure in item.measures:
-        cells = []
-        for source in (measure.recipe, measure.best):
-            text = _cell(source, find, used)
-            absent += [measure.name] if text == MISSING else []
-            cells.append(text)
-        lines.append(f"| {measure.name} | {measure.thesis} | {cells[0]} | {cells[1]} |")
-    lines += [""] if item.measures else []
-    lines += [f"![{text}](../img/{path})\n" for path, text in item.images]
-    lines += [f"*Agreement*: {item.agreement}", ""]
-    sources = [_origin(name, found) for name, found in used.items()]
-    if absent and item.command:
-        sources.append(f"{MISSING}: `{item.command}`")
-    lines += [f"<sub>{'; '.join(sources)}</sub>", ""] if sources else []
-    return "\n".join(lines) + "\n", absent
+def section(text: str, find: Find) -> tuple[str, list[str]]:
+    """Return a section with its numbers and their sources, and the measures without a file."""
+    title, absent, used = text.splitlines()[0].lstrip("# "), list[str](), dict[str, Json]()
+
+    def number(place: re.Match[str]) -> str:
+        kind, parts = place[1], _parts(place[2])
+        if kind in _OF_CODE:
+            return _OF_CODE[kind](*parts)
+        file, *where = parts
+        found = find(file)
+        value = None if found is None else _OF_RESULT[kind](found, *where)
+        if found is None or value is None:
+            line = text[text.rindex("\n", 0, place.start()) :]
+            absent.append(f"{title}: {line.split('|')[1].strip()}")
+            return MISSING
+        used[file] = found
+        return value
+
+    written = _PLACE.sub(number, text)
+    command = _COMMAND.search(written)
+    sources = [_origin(file, found) for file, found in used.items()]
+    if absent and command:
+        sources.append(f"{MISSING}: `{command[1]}`")
+    blocks = [_COMMAND.sub("", written).rstrip()]
+    if sources:
+        blocks.append(f"<sub>{'; '.join(sources)}</sub>")
+    return "\n\n".join([*blocks, ""]), absent
+
+
+def _parts(place: str) -> list[str]:
+    """Return the parts of a placeholder."""
+    return [part.strip("-") and part for part in place.split(" / ")]
 
 
 def _find(results: Path, measured: Mapping[str, Json], file: str) -> Json | None:
@@ -102,20 +116,6 @@ def _find(results: Path, measured: Mapping[str, Json], file: str) -> Json | None
         return measured.get(file)
     found: Json = json.loads(path.read_text(encoding="utf-8"))
     return found
-
-
-def _cell(source: StoredValue | Config | str, find: Find, used: dict[str, Json]) -> str:
-    """Return a value as text; remember the file that it is from."""
-    if isinstance(source, str):
-        return source
-    if isinstance(source, Config):
-        return f"{source.value():,.10g}"
-    found = find(source.file)
-    value = None if found is None else source.value(found)
-    if found is None or value is None:
-        return MISSING
-    used[source.file] = found
-    return value
 
 
 def _origin(name: str, found: Json) -> str:
