@@ -21,7 +21,6 @@ HEAD = '''"""Operations with the tag {tag}; written by ``make client``."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Literal
-from urllib.parse import quote
 
 {imports}
 
@@ -121,8 +120,8 @@ class Writer:
             if pairs:
                 parts.append(f"{word}={{{', '.join(pairs)}}}")
         for name in of_path:
-            path = path.replace(f"{{{name}}}", f"{{quote({name}, safe='')}}")
-        address = f'f"{path}"' if of_path else f'"{path}"'
+            path = path.replace(f"{{{name}}}", "{}")
+        address = ", ".join([f'"{path}"', *of_path])
         kind, ending = self._answer(operation, f'"{method.upper()}"', address, parts)
         return (
             f"    def {operation['operationId']}({', '.join(arguments)}) -> {kind}:\n"
@@ -153,7 +152,7 @@ class Writer:
         model = self._model(content["application/json"]["schema"])
         if model is None:
             return "dict[str, Any]", f"return dict({send}.json())"
-        return model, f"return self._parsed({model}, {send})"
+        return model, f"return self._parsed({', '.join([model, method, address, *parts])})"
 
     def _body(self, media: Node) -> str:
         """Return the type of a JSON body."""

@@ -1,9 +1,10 @@
 """Requests, problems and event streams over HTTP, for the operations of the client."""
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, Self, TypeVar, get_args, get_origin
+from typing import Any, Literal, Self, TypedDict, TypeVar, Unpack, get_args, get_origin
+from urllib.parse import quote
 
 import httpx
 from pydantic import BaseModel
@@ -41,6 +42,19 @@ class StreamEvent:
     """its content"""
 
 
+class RequestParts(TypedDict, total=False):
+    """Parts of a request beside its path."""
+
+    query: Json
+    """parameters; null ones are left out"""
+    headers: Json
+    """headers; null ones are left out"""
+    body: BaseModel | Json | None
+    """JSON body"""
+    content: bytes
+    """body as it is"""
+
+
 class Transport:
     """A connection to one server; close it, or use it in ``with``.
 
@@ -72,43 +86,54 @@ class Transport:
         self.close()
 
     def _send(
-        self,
-        method: str,
-        path: str,
-        *,
-        query: Json | None = None,
-        headers: Json | None = None,
-        body: BaseModel | Json | None = None,
-        content: bytes | None = None,
+        self, method: str, path: str, *names: str, **parts: Unpack[RequestParts]
     ) -> httpx.Response:
         """Return an answer.
+
+        Args:
+            method: HTTP method.
+            path: Path, with ``{}`` for each name.
+            names: Ids and names in the path, not encoded.
+            parts: The rest of the request.
 
         Raises:
             Refused: The server answered a problem.
         """
+        body = parts.get("body")
         answer = self._http.request(
             method,
-            path,
-            params=_given(query),
-            headers=_texts(headers),
+            _filled(path, names),
+            params=_given(parts.get("query")),
+            headers=_texts(parts.get("headers")),
             json=_json_of(body) if isinstance(body, BaseModel) else body,
-            content=content,
+            content=parts.get("content"),
         )
         _raise_problem(answer)
         return answer
 
-    def _parsed(self, model: type[M], answer: httpx.Response) -> M:
-        """Return the content of an answer as its schema."""
-        return model.model_validate_json(answer.content)
+    def _parsed(
+        self,
+        model: type[M],
+        method: str,
+        path: str,
+        *names: str,
+        **parts: Unpack[RequestParts],
+    ) -> M:
+        """Return an answer as its schema; arguments as of :meth:`_send`."""
+        return model.model_validate_json(self._send(method, path, *names, **parts).content)
 
-    def _events(self, path: str, *, headers: Json | None = None) -> Iterator[StreamEvent]:
-        """Yield the events of a stream until it ends.
+    def _events(
+        self, path: str, *names: str, headers: Json | None = None
+    ) -> Iterator[StreamEvent]:
+        """Yield the events of a stream until it ends; path and names as of :meth:`_send`.
 
         Raises:
             Refused: The server answered a problem.
         """
         pauses = httpx.Timeout(self._timeout_s, read=None)  # between events
-        with self._http.stream("GET", path, headers=_texts(headers), timeout=pauses) as answer:
+        with self._http.stream(
+            "GET", _filled(path, names), headers=_texts(headers), timeout=pauses
+        ) as answer:
             if answer.is_error:
                 answer.read()
                 _raise_problem(answer)
@@ -125,6 +150,10 @@ class Transport:
                         data=json.loads(fields["data"]),
                     )
                 fields = {}
+
+
+def _filled(path: str, names: Sequence[str]) -> str:
+    return path.format(*(quote(name, safe="") for name in names))
 
 
 def _raise_problem(answer: httpx.Response) -> None:

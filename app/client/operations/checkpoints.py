@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from typing import Any
-from urllib.parse import quote
 
 from app.api.schemas.checkpoints import (
     Alias,
@@ -24,11 +23,9 @@ class CheckpointsOperations(Transport):
         """List the checkpoints."""
         return self._parsed(
             CheckpointList,
-            self._send(
-                "GET",
-                "/v1/checkpoints",
-                query={"job_id": job_id, "cursor": cursor, "limit": limit},
-            ),
+            "GET",
+            "/v1/checkpoints",
+            query={"job_id": job_id, "cursor": cursor, "limit": limit},
         )
 
     def upload_checkpoint(
@@ -37,7 +34,10 @@ class CheckpointsOperations(Transport):
         """Upload a checkpoint."""
         return self._parsed(
             CheckpointPublic,
-            self._send("POST", "/v1/checkpoints", content=content, query={"sha256": sha256}),
+            "POST",
+            "/v1/checkpoints",
+            content=content,
+            query={"sha256": sha256},
         )
 
     def recalibrate_checkpoint(
@@ -45,42 +45,33 @@ class CheckpointsOperations(Transport):
     ) -> CheckpointPublic:
         """Recalibrate the outcome probabilities of a checkpoint."""
         return self._parsed(
-            CheckpointPublic,
-            self._send(
-                "POST", f"/v1/checkpoints/{quote(reference, safe='')}/recalibration", body=body
-            ),
+            CheckpointPublic, "POST", "/v1/checkpoints/{}/recalibration", reference, body=body
         )
 
     def get_checkpoint(self, reference: str) -> CheckpointPublic:
         """One checkpoint, by SHA-256 or alias."""
-        return self._parsed(
-            CheckpointPublic, self._send("GET", f"/v1/checkpoints/{quote(reference, safe='')}")
-        )
+        return self._parsed(CheckpointPublic, "GET", "/v1/checkpoints/{}", reference)
 
     def get_checkpoint_manifest(self, reference: str) -> dict[str, Any]:
         """A checkpoint's manifest."""
-        return dict(
-            self._send("GET", f"/v1/checkpoints/{quote(reference, safe='')}/manifest").json()
-        )
+        return dict(self._send("GET", "/v1/checkpoints/{}/manifest", reference).json())
 
     def get_checkpoint_tensors(self, reference: str) -> bytes:
         """Download a checkpoint's tensors."""
-        return self._send("GET", f"/v1/checkpoints/{quote(reference, safe='')}/tensors").content
+        return self._send("GET", "/v1/checkpoints/{}/tensors", reference).content
 
     def list_aliases(self) -> AliasList:
         """List the aliases."""
-        return self._parsed(AliasList, self._send("GET", "/v1/aliases"))
+        return self._parsed(AliasList, "GET", "/v1/aliases")
 
     def get_alias(self, name: str) -> Alias:
         """One alias."""
-        return self._parsed(Alias, self._send("GET", f"/v1/aliases/{quote(name, safe='')}"))
+        return self._parsed(Alias, "GET", "/v1/aliases/{}", name)
 
     def set_alias(self, name: str, body: AliasTarget | Mapping[str, Any]) -> Alias:
         """Point an alias to a checkpoint."""
-        return self._parsed(
-            Alias, self._send("PUT", f"/v1/aliases/{quote(name, safe='')}", body=body)
-        )
+        return self._parsed(Alias, "PUT", "/v1/aliases/{}", name, body=body)
 
     def remove_alias(self, name: str) -> None:
         """Remove an alias."""
-        self._send("DELETE", f"/v1/aliases/{quote(name, safe='')}")
+        self._send("DELETE", "/v1/aliases/{}", name)

@@ -9,11 +9,11 @@ class HealthOperations(Transport):
 
     def health(self) -> HealthPublic:
         """200 when the service can decide."""
-        return self._parsed(HealthPublic, self._send("GET", "/healthz"))
+        return self._parsed(HealthPublic, "GET", "/healthz")
 
     def ready(self) -> ReadinessPublic:
         """503 while the kernels are compiled."""
-        return self._parsed(ReadinessPublic, self._send("GET", "/readyz"))
+        return self._parsed(ReadinessPublic, "GET", "/readyz")
 
     def scrape(self) -> str:
         """Metrics for Prometheus."""

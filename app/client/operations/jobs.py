@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator, Mapping
 from typing import Any, Literal
-from urllib.parse import quote
 
 from app.api.schemas.jobs import JobList, JobPublic, MetricsPublic
 from app.api.schemas.presets import PresetList
@@ -23,9 +22,10 @@ class JobsOperations(Transport):
         """Post a job."""
         return self._parsed(
             JobPublic,
-            self._send(
-                "POST", "/v1/jobs", body=body, headers={"idempotency-key": idempotency_key}
-            ),
+            "POST",
+            "/v1/jobs",
+            body=body,
+            headers={"idempotency-key": idempotency_key},
         )
 
     def list_jobs(
@@ -40,26 +40,22 @@ class JobsOperations(Transport):
         """List the jobs."""
         return self._parsed(
             JobList,
-            self._send(
-                "GET",
-                "/v1/jobs",
-                query={"cursor": cursor, "limit": limit, "state": state, "part_of": part_of},
-            ),
+            "GET",
+            "/v1/jobs",
+            query={"cursor": cursor, "limit": limit, "state": state, "part_of": part_of},
         )
 
     def get_job(self, job_id: str) -> JobPublic:
         """One job."""
-        return self._parsed(JobPublic, self._send("GET", f"/v1/jobs/{quote(job_id, safe='')}"))
+        return self._parsed(JobPublic, "GET", "/v1/jobs/{}", job_id)
 
     def update_job(self, job_id: str, body: JobChanges | Mapping[str, Any]) -> JobPublic:
         """Change name, notes, priority or budgets of a job."""
-        return self._parsed(
-            JobPublic, self._send("PATCH", f"/v1/jobs/{quote(job_id, safe='')}", body=body)
-        )
+        return self._parsed(JobPublic, "PATCH", "/v1/jobs/{}", job_id, body=body)
 
     def delete_job(self, job_id: str) -> None:
         """Delete an ended job."""
-        self._send("DELETE", f"/v1/jobs/{quote(job_id, safe='')}")
+        self._send("DELETE", "/v1/jobs/{}", job_id)
 
     def get_job_metrics(
         self, job_id: str, *, after_step: int | None = None, limit: int | None = None
@@ -67,11 +63,10 @@ class JobsOperations(Transport):
         """A job's learning curve."""
         return self._parsed(
             MetricsPublic,
-            self._send(
-                "GET",
-                f"/v1/jobs/{quote(job_id, safe='')}/metrics",
-                query={"after_step": after_step, "limit": limit},
-            ),
+            "GET",
+            "/v1/jobs/{}/metrics",
+            job_id,
+            query={"after_step": after_step, "limit": limit},
         )
 
     def stream_job(
@@ -79,34 +74,27 @@ class JobsOperations(Transport):
     ) -> Iterator[StreamEvent]:
         """Follow a job as it runs."""
         return self._events(
-            f"/v1/jobs/{quote(job_id, safe='')}/events",
-            headers={"last-event-id": last_event_id},
+            "/v1/jobs/{}/events", job_id, headers={"last-event-id": last_event_id}
         )
 
     def cancel_job(self, job_id: str) -> JobPublic:
         """Cancel a job."""
-        return self._parsed(
-            JobPublic, self._send("POST", f"/v1/jobs/{quote(job_id, safe='')}/cancel")
-        )
+        return self._parsed(JobPublic, "POST", "/v1/jobs/{}/cancel", job_id)
 
     def resume_job(
         self, job_id: str, body: Budget | Mapping[str, Any] | None = None
     ) -> JobPublic:
         """Resume an ended job."""
-        return self._parsed(
-            JobPublic,
-            self._send("POST", f"/v1/jobs/{quote(job_id, safe='')}/resume", body=body),
-        )
+        return self._parsed(JobPublic, "POST", "/v1/jobs/{}/resume", job_id, body=body)
 
     def retry_job(self, job_id: str, *, idempotency_key: str | None = None) -> JobPublic:
         """Run a cancelled or failed job again."""
         return self._parsed(
             JobPublic,
-            self._send(
-                "POST",
-                f"/v1/jobs/{quote(job_id, safe='')}/retry",
-                headers={"idempotency-key": idempotency_key},
-            ),
+            "POST",
+            "/v1/jobs/{}/retry",
+            job_id,
+            headers={"idempotency-key": idempotency_key},
         )
 
     def clone_job(
@@ -115,18 +103,17 @@ class JobsOperations(Transport):
         """Start a job like another, with changes."""
         return self._parsed(
             JobPublic,
-            self._send(
-                "POST",
-                f"/v1/jobs/{quote(job_id, safe='')}/clone",
-                body=body,
-                headers={"idempotency-key": idempotency_key},
-            ),
+            "POST",
+            "/v1/jobs/{}/clone",
+            job_id,
+            body=body,
+            headers={"idempotency-key": idempotency_key},
         )
 
     def list_presets(self) -> PresetList:
         """List the presets."""
-        return self._parsed(PresetList, self._send("GET", "/v1/presets"))
+        return self._parsed(PresetList, "GET", "/v1/presets")
 
     def list_protocols(self) -> ProtocolList:
         """List the protocols."""
-        return self._parsed(ProtocolList, self._send("GET", "/v1/protocols"))
+        return self._parsed(ProtocolList, "GET", "/v1/protocols")

@@ -1,7 +1,6 @@
 """Operations with the tag recordings; written by ``make client``."""
 
 from collections.abc import Sequence
-from urllib.parse import quote
 
 from app.api.schemas.recordings import RecordingList, RecordingPublic
 from app.client.transport import Transport
@@ -12,7 +11,7 @@ class RecordingsOperations(Transport):
 
     def list_recordings(self) -> RecordingList:
         """List the recordings."""
-        return self._parsed(RecordingList, self._send("GET", "/v1/recordings"))
+        return self._parsed(RecordingList, "GET", "/v1/recordings")
 
     def create_recording(
         self,
@@ -28,27 +27,23 @@ class RecordingsOperations(Transport):
         """Import a recording."""
         return self._parsed(
             RecordingPublic,
-            self._send(
-                "POST",
-                "/v1/recordings",
-                content=content,
-                query={
-                    "file_name": file_name,
-                    "name": name,
-                    "unit": unit,
-                    "root_unit": root_unit,
-                    "up": up,
-                    "map": map,
-                },
-            ),
+            "POST",
+            "/v1/recordings",
+            content=content,
+            query={
+                "file_name": file_name,
+                "name": name,
+                "unit": unit,
+                "root_unit": root_unit,
+                "up": up,
+                "map": map,
+            },
         )
 
     def get_recording(self, name: str) -> RecordingPublic:
         """One recording."""
-        return self._parsed(
-            RecordingPublic, self._send("GET", f"/v1/recordings/{quote(name, safe='')}")
-        )
+        return self._parsed(RecordingPublic, "GET", "/v1/recordings/{}", name)
 
     def delete_recording(self, name: str) -> None:
         """Remove a recording."""
-        self._send("DELETE", f"/v1/recordings/{quote(name, safe='')}")
+        self._send("DELETE", "/v1/recordings/{}", name)

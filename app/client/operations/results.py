@@ -1,7 +1,6 @@
 """Operations with the tag results; written by ``make client``."""
 
 from collections.abc import Sequence
-from urllib.parse import quote
 
 from app.api.schemas.results import ComparisonPublic, EvaluationList, EvaluationPublic
 from app.api.schemas.sweeps import TrialList
@@ -16,8 +15,7 @@ class ResultsOperations(Transport):
     ) -> ComparisonPublic:
         """Compare jobs."""
         return self._parsed(
-            ComparisonPublic,
-            self._send("GET", "/v1/comparison", query={"job": job, "quantity": quantity}),
+            ComparisonPublic, "GET", "/v1/comparison", query={"job": job, "quantity": quantity}
         )
 
     def get_comparison_csv(self, *, job: Sequence[str]) -> str:
@@ -35,30 +33,24 @@ class ResultsOperations(Transport):
         """List the evaluations."""
         return self._parsed(
             EvaluationList,
-            self._send(
-                "GET",
-                "/v1/evaluations",
-                query={
-                    "protocol": protocol,
-                    "checkpoint": checkpoint,
-                    "cursor": cursor,
-                    "limit": limit,
-                },
-            ),
+            "GET",
+            "/v1/evaluations",
+            query={
+                "protocol": protocol,
+                "checkpoint": checkpoint,
+                "cursor": cursor,
+                "limit": limit,
+            },
         )
 
     def list_trials(self, job_id: str) -> TrialList:
         """The trials of a sweep."""
-        return self._parsed(
-            TrialList, self._send("GET", f"/v1/jobs/{quote(job_id, safe='')}/trials")
-        )
+        return self._parsed(TrialList, "GET", "/v1/jobs/{}/trials", job_id)
 
     def get_report(self, job_id: str) -> str:
         """The page of a report."""
-        return self._send("GET", f"/v1/jobs/{quote(job_id, safe='')}/report").text
+        return self._send("GET", "/v1/jobs/{}/report", job_id).text
 
     def get_evaluation(self, job_id: str) -> EvaluationPublic:
         """One evaluation."""
-        return self._parsed(
-            EvaluationPublic, self._send("GET", f"/v1/evaluations/{quote(job_id, safe='')}")
-        )
+        return self._parsed(EvaluationPublic, "GET", "/v1/evaluations/{}", job_id)

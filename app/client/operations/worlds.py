@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator, Mapping
 from typing import Any
-from urllib.parse import quote
 
 from app.api.schemas.worlds import (
     CommandAccepted,
@@ -21,43 +20,36 @@ class WorldsOperations(Transport):
 
     def list_worlds(self) -> WorldList:
         """List the live worlds."""
-        return self._parsed(WorldList, self._send("GET", "/v1/worlds"))
+        return self._parsed(WorldList, "GET", "/v1/worlds")
 
     def get_world(self, world_id: str) -> dict[str, Any]:
         """One live world, with the state a decision needs."""
-        return dict(self._send("GET", f"/v1/worlds/{quote(world_id, safe='')}").json())
+        return dict(self._send("GET", "/v1/worlds/{}", world_id).json())
 
     def command_world(
         self, world_id: str, body: LiveCommand | Mapping[str, Any]
     ) -> CommandAccepted:
         """Change a live world."""
         return self._parsed(
-            CommandAccepted,
-            self._send("POST", f"/v1/worlds/{quote(world_id, safe='')}/commands", body=body),
+            CommandAccepted, "POST", "/v1/worlds/{}/commands", world_id, body=body
         )
 
     def stream_world(self, world_id: str) -> Iterator[StreamEvent]:
         """Stream a live world, ten times a second."""
-        return self._events(f"/v1/worlds/{quote(world_id, safe='')}/events")
+        return self._events("/v1/worlds/{}/events", world_id)
 
     def set_world_cell(
         self, world_id: str, body: WorldCell | Mapping[str, Any]
     ) -> WorldSummary:
         """Start a live world again in another cell."""
-        return self._parsed(
-            WorldSummary,
-            self._send("PUT", f"/v1/worlds/{quote(world_id, safe='')}/cell", body=body),
-        )
+        return self._parsed(WorldSummary, "PUT", "/v1/worlds/{}/cell", world_id, body=body)
 
     def follow_training(
         self, world_id: str, body: FollowRequest | Mapping[str, Any]
     ) -> FollowPublic:
         """Let a live world follow a training."""
-        return self._parsed(
-            FollowPublic,
-            self._send("PUT", f"/v1/worlds/{quote(world_id, safe='')}/follow", body=body),
-        )
+        return self._parsed(FollowPublic, "PUT", "/v1/worlds/{}/follow", world_id, body=body)
 
     def stop_following(self, world_id: str) -> None:
         """Follow a training no longer."""
-        self._send("DELETE", f"/v1/worlds/{quote(world_id, safe='')}/follow")
+        self._send("DELETE", "/v1/worlds/{}/follow", world_id)
