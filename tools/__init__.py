@@ -1,6 +1,10 @@
 """Offline generators, run by hand.
 
+augmentation            Variation of the elbow along the same palm path, an augmentation of
+                        demonstrations
 check_vocabulary        Find words that the glossary replaces, and class names that occur twice
+demonstrations          Synthetic demonstrations: reaches of a person between two places of
+                        a cell
 distance_fields         Smooth surfaces from a handful of round cones: how the person is
                         modelled
 fit_capsules            Fit capsules that contain the UR10's collision meshes; run ``python -m

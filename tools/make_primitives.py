@@ -14,8 +14,12 @@ The result is committed as ``app/sim/primitives/data/task_primitives.npz``;
 """
 
 import argparse
+import json
 import logging
+from collections.abc import Sequence
 from functools import partial
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -24,8 +28,7 @@ from app.sim.core.arrays import Vec
 from app.sim.human import model as human
 from app.sim.human.anthropometry import percentile_body
 from app.sim.primitives import promp
-from app.sim.primitives.augmentation import draw_swivel, vary_elbow
-from app.sim.primitives.demonstrations import PHASES, STYLES, demonstrate
+from app.sim.primitives.keyframes import STYLES
 from app.sim.primitives.library_file import (
     FILE,
     HANDS,
@@ -33,8 +36,9 @@ from app.sim.primitives.library_file import (
     TaskSegment,
     place_of,
     segments_of,
-    write_primitives,
 )
+from tools.augmentation import draw_swivel, vary_elbow
+from tools.demonstrations import PHASES, demonstrate
 
 logger = logging.getLogger(__name__)
 
@@ -95,6 +99,34 @@ def draw_people(cell: Cell, n: int, rng: np.random.Generator) -> list[Vec]:
         size = percentile_body(float(stature), float(arms), float(shoulders), height)
         people.append(size.vector(cell.floor_z))
     return people
+
+
+def write_primitives(path: Path, made: Sequence[TaskPrimitive], about: dict[str, Any]) -> None:
+    """Write primitives to a file.
+
+    Args:
+        path: File to write.
+        made: Primitives with equal numbers of demonstrations.
+        about: Additional members of the header, as JSON data.
+    """
+    tasks = [
+        {
+            "cell": one.cell,
+            "kind": one.segment.kind,
+            "start": one.segment.start,
+            "end": one.segment.end,
+            "hand": one.segment.hand,
+        }
+        for one in made
+    ]
+    path.parent.mkdir(parents=True, exist_ok=True)
+    np.savez_compressed(
+        path,
+        header=np.array(json.dumps({**about, "tasks": tasks})),
+        weights=np.array([one.weights for one in made], dtype=np.float32),
+        durations=np.array([one.durations for one in made], dtype=np.float32),
+        residual=np.array([one.residual for one in made], dtype=np.float32),
+    )
 
 
 def main() -> None:

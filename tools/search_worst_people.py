@@ -25,15 +25,10 @@ from app.policies.checkpoints.trained_cell import cell_of
 from app.policies.evaluation.pick import selection_rules
 from app.policies.evaluation.pick.episodes import Evaluator, settings_for
 from app.policies.evaluation.pick.people import CANDIDATES
-from app.policies.evaluation.pick.worst_people import (
-    FILE,
-    N_NUMBERS,
-    HandMotion,
-    beside,
-    hand_motion,
-)
+from app.policies.evaluation.pick.worst_people import FILE, HandMotion, beside
 from app.policies.inference.task_selection import HYSTERESIS
 from app.policies.inference.value_networks import ValueNetworks, pick_preset_of
+from app.sim.core.arrays import Vec
 
 logger = logging.getLogger(__name__)
 
@@ -43,6 +38,29 @@ N_MOTIONS, N_GENERATIONS = 48, 12
 PER_MOTION, PER_MOTION_AGAIN = 24, 150
 """Episodes of each motion, on average."""
 N_KEPT = 10
+N_POINTS = 4
+"""Points of a path."""
+BOX = ((-0.65, 0.35, 0.08), (0.65, 0.8, 0.35))
+"""Least and greatest coordinates of the palm [m]."""
+SPEEDS = (0.2, 0.7)
+"""Least and greatest mean speed of a move [m/s]; the peak is 1.9 times as high."""
+PAUSES = (0.1, 2.0)
+"""Shortest and longest rest before a move [s]."""
+N_NUMBERS = 1 + 3 * N_POINTS + 2 * (N_POINTS - 1)
+"""Numbers that describe a motion."""
+
+
+def hand_motion(numbers: Vec) -> HandMotion:
+    """Return the motion of numbers in [0, 1], shape (N_NUMBERS,), inside the limits."""
+    points, speeds, pauses = np.split(numbers[1:], (3 * N_POINTS, 4 * N_POINTS - 1))
+    low, high = np.array(BOX)
+    palms = low + points.reshape(N_POINTS, 3) * (high - low)
+    return HandMotion(
+        hand="r" if numbers[0] < 0.5 else "l",
+        palms=tuple(tuple(round(float(x), 3) for x in palm) for palm in palms),
+        speeds=tuple(round(float(x), 3) for x in np.interp(speeds, (0, 1), SPEEDS)),
+        pauses=tuple(round(float(x), 3) for x in np.interp(pauses, (0, 1), PAUSES)),
+    )
 
 
 def success_beside(

@@ -12,6 +12,7 @@ pedestrians.
 
 import logging
 import math
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -48,7 +49,7 @@ from app.sim.prediction.kernels.networks import (
     Network,
     write_predictor_input,
 )
-from app.sim.prediction.weights import write_networks
+from app.sim.prediction.weights import FILE, KINDS
 from app.sim.scene.scene import pedestrian_settings
 
 logger = logging.getLogger(__name__)
@@ -241,6 +242,17 @@ def constant_motion_errors(moments: Moments) -> tuple[Floats, Floats]:
     )
     radius = np.sqrt(((grown / scale - moments.radius) ** 2).mean(axis=0))
     return np.asarray(radius), np.asarray(np.sqrt((moments.path**2).mean(axis=0)))
+
+
+def write_networks(radius: Network, path: Network, file: Path = FILE) -> None:
+    """Write networks as the shipped file."""
+    arrays = {
+        f"{kind}.{field}": getattr(network, field)
+        for kind, network in zip(KINDS, (radius, path), strict=True)
+        for field in Network._fields
+    }
+    file.parent.mkdir(parents=True, exist_ok=True)
+    np.savez(file, **arrays)
 
 
 def main() -> None:

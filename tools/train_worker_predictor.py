@@ -11,6 +11,7 @@ committed.
 
 import logging
 from dataclasses import replace
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -26,7 +27,7 @@ from app.sim.people.human_motion_config import HumanMotionConfig
 from app.sim.pick.batch import PickBatch, PickSettings
 from app.sim.prediction.kernels.networks import Floats, Network
 from app.sim.prediction.kernels.worker import N_JOINTS, TIMES, WorkerPredictor, predict_worker
-from app.sim.prediction.weights import worker_predictor, write_worker_predictor
+from app.sim.prediction.weights import WORKER_FILE, worker_predictor
 
 logger = logging.getLogger(__name__)
 
@@ -152,6 +153,13 @@ def other_people() -> dict[str, HumanMotionConfig]:
         "faster": replace(usual, pace=1.4),
         "off-task": replace(usual, off_task=1.0),
     }
+
+
+def write_worker_predictor(predictor: WorkerPredictor, file: Path = WORKER_FILE) -> None:
+    """Write a predictor as the shipped file."""
+    inputs = {"mean": predictor.mean, "scale": predictor.scale}
+    arrays = predictor.network._asdict() | inputs
+    np.savez(file, **{name: value.astype(np.float32) for name, value in arrays.items()})
 
 
 def main() -> None:

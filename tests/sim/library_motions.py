@@ -11,8 +11,8 @@ from app.sim.cells.cell import Cell
 from app.sim.core.arrays import Vec
 from app.sim.human import model as human
 from app.sim.primitives import promp
-from app.sim.primitives.demonstrations import height_over_table
-from app.sim.primitives.primitive_library import MotionLibrary, segment_weights
+from app.sim.primitives.keyframes import height_over_table
+from app.sim.primitives.primitive_library import MotionLibrary
 
 PHASES = np.linspace(0.0, 1.0, 41)
 LOW = ("elbow_r", "wrist_r", "elbow_l", "wrist_l")
@@ -103,3 +103,18 @@ def random_segment(
         keyframes=library.hands[keyframes],
         lowest=float(heights.min()),
     )
+
+
+def segment_weights(library: MotionLibrary, primitive: int, sample: int, ends: Vec) -> Vec:
+    """Return the conditioned weights of a segment between two keyframes, shape (18, 12).
+
+    Args:
+        library: Library.
+        primitive: Index of the primitive.
+        sample: Index of the sample.
+        ends: Joint positions at both ends [m, rad], shape (2, 18).
+    """
+    drawn = library.samples[sample]
+    phi = promp.basis(np.array([0.0, 1.0]), promp.N_BASIS, promp.usual_width(promp.N_BASIS))
+    missing = (ends - phi @ drawn.T).ravel()
+    return np.asarray(drawn + (library.gain[primitive] @ missing).reshape(drawn.shape))

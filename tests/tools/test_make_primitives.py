@@ -1,12 +1,21 @@
 """The script that makes the shipped primitives makes them again."""
 
+from pathlib import Path
+
 import numpy as np
 
 from app.sim.cells.cell import load_cell
 from app.sim.human import anthropometry as body_size
 from app.sim.human.kernels import kinematics as body
 from app.sim.primitives.library_file import load_primitives, read_header
-from tools.make_primitives import N_DEMONSTRATIONS, SEED, VERSION, draw_people, make_primitive
+from tools.make_primitives import (
+    N_DEMONSTRATIONS,
+    SEED,
+    VERSION,
+    draw_people,
+    make_primitive,
+    write_primitives,
+)
 
 
 def test_a_segment_made_again_is_the_shipped_one() -> None:
@@ -38,3 +47,13 @@ def test_elbow_spread_varies_the_working_arm_only() -> None:
     arm = slice(10, 14) if shipped.segment.hand == "r" else slice(14, 18)
     changed = np.abs(varied.weights[0] - plain.weights[0]).max(axis=1) > 1e-6
     assert changed[arm].any() and not np.delete(changed, np.r_[arm]).any()
+
+
+def test_what_is_written_is_read_again(tmp_path: Path) -> None:
+    path, made = tmp_path / "some.npz", load_primitives()[:3]
+    write_primitives(path, made, {"seed": 1})
+    assert read_header(path)["seed"] == 1
+    for before, after in zip(made, load_primitives(path), strict=True):
+        assert before.segment == after.segment
+        np.testing.assert_array_equal(before.weights, after.weights)
+        np.testing.assert_array_equal(before.durations, after.durations)

@@ -3,8 +3,7 @@
 import numpy as np
 
 from app.policies.checkpoints import pretrained
-from app.policies.evaluation.pick.worst_people import N_NUMBERS, hand_motion
-from tools.search_worst_people import search, success_beside
+from tools.search_worst_people import N_NUMBERS, hand_motion, search, success_beside
 
 
 def test_a_search_returns_motions_from_the_worst_on() -> None:

@@ -8,11 +8,7 @@ import pytest
 from app.sim.core.arrays import Vec
 from app.sim.human.kernels import kinematics as body
 from app.sim.prediction.kernels.worker import N_JOINTS, TIMES, predict_worker
-from app.sim.prediction.weights import (
-    new_worker_predictor,
-    worker_predictor,
-    write_worker_predictor,
-)
+from app.sim.prediction.weights import new_worker_predictor, worker_predictor
 from tools.train_worker_predictor import (
     PostureMoments,
     fitted,
@@ -21,6 +17,7 @@ from tools.train_worker_predictor import (
     other_people,
     training_people,
     watched,
+    write_worker_predictor,
 )
 
 

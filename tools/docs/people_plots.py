@@ -22,10 +22,11 @@ from app.sim.cells.cell import Cell, load_cell
 from app.sim.core.arrays import Vec
 from app.sim.human import model as human
 from app.sim.human.anthropometry import percentile_body
-from app.sim.primitives.demonstrations import PHASES, STYLES, between, draw_keyframe
+from app.sim.primitives.keyframes import STYLES, draw_keyframe
 from app.sim.primitives.library_file import FILE, HANDS, load_primitives, read_header
 from app.sim.primitives.primitive_library import MotionLibrary, motion_library
 from tests.sim.library_motions import SegmentMotion, random_segment, random_segments
+from tools.demonstrations import PHASES, between
 from tools.docs.world.plots import BLUE, GREEN, GREY, LIGHT, ORANGE, panels, save
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -22,9 +22,10 @@ from app.provenance import describe
 from app.sim.sorting.batch import apply
 from app.sim.sorting.kernels.planner import new_work
 from app.sim.sorting.kernels.planner_batch import TaskBatch, plan_rows
-from app.sim.sorting.planner import attempts_of, solve
+from app.sim.sorting.planner import solve
 from app.sim.sorting.state import Move, SortingShape, SortingState
 from tests.sim.sorting.sorting_search import (
+    attempts_of,
     fewest_attempts,
     first_moves,
     moves_to_go,

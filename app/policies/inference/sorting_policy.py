@@ -12,7 +12,6 @@ from app.policies.checkpoints.checkpoint import (
     SORTING,
     Checkpoint,
     expect_layout,
-    purpose_of,
     require_purpose,
 )
 from app.policies.checkpoints.model_state import under
@@ -22,11 +21,6 @@ from app.policies.inference.trained_policy import TrainedPolicy
 from app.policies.networks.sorting_q import NETWORKS, layout_of
 from app.sim.sorting.batch import Obs, shape_of
 from app.sim.sorting.state import SortingShape
-
-
-def is_sorting(checkpoint: Checkpoint) -> bool:
-    """Return whether a checkpoint is a sorting policy."""
-    return purpose_of(checkpoint.manifest) == SORTING
 
 
 class SortingPolicy(TrainedPolicy):

@@ -8,7 +8,7 @@ clock). Equal seeds give equal disturbances.
 Source: docs/method.md 2.8 (30 Hz). Noise and loss rates are ours.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
 
 import numpy as np
@@ -16,7 +16,6 @@ import numpy as np
 from app.errors import InvalidInput
 from app.sim.core.arrays import Vec
 from app.sim.perception.keypoints import GROUPS, N_KEYPOINTS, keypoints_of, swap_sides
-from app.sim.perception.person_estimator import PersonEstimate, PersonEstimator
 
 Motion = Callable[[float], Vec]
 """True joint positions [m, rad], shape (18,), at a time [s]."""
@@ -140,23 +139,3 @@ class KeypointSensorModel:
         if n <= 1.0 / (1.0 - share):
             return share, share
         return 1.0 - 1.0 / n, share / (1.0 - share) / n
-
-
-def follow(
-    motion: Motion,
-    times: Sequence[float],
-    tracker: KeypointSensorModel,
-    estimator: PersonEstimator,
-) -> Iterator[PersonEstimate]:
-    """Yield the estimate of a person at each time, from simulated frames.
-
-    Args:
-        motion: The true motion.
-        times: Times of the estimates [s], increasing.
-        tracker: Sensor model.
-        estimator: Estimator of the person.
-    """
-    for t in times:
-        for frame in tracker.frames(t, motion):
-            estimator.take(frame.t, frame.keypoints, frame.confidences)
-        yield estimator.at(t)

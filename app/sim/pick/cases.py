@@ -1,7 +1,7 @@
 """The four case studies of task selection (docs/method.md 3.6, thesis table 5.3).
 
-The layout of the cell was chosen so that the geometry of each case agrees with its text;
-:func:`geometry` measures it, and tests check it.
+The layout of the cell was chosen so that the geometry of each case agrees with its text; tests
+measure it.
 """
 
 from dataclasses import dataclass
@@ -11,16 +11,10 @@ import numpy as np
 from app.errors import NotFound
 from app.sim.cells.cell import Cell
 from app.sim.human.model import Hand
-from app.sim.people.kernels.people import people_clearance
 from app.sim.people.reach_script import ReachScript, reach_script
-from app.sim.robot.kernels import arm as arm_kernel
-from app.sim.robot.kernels import kinematics
-from app.sim.scene.scene import NO_CYLINDERS, arm_of, people_geometry_of, people_of
 
 CASES_CELL = "pick-and-place"
 """The cell whose layout the cases were chosen for."""
-BLOCKED_BELOW = 0.0
-"""Clearance below which a goal configuration is blocked [m]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -147,51 +141,3 @@ def script_of(cell: Cell, case: Case) -> ReachScript:
     places = [case.human_from, case.human_to or case.human_from]
     palms = [np.add(cell.station(place).position, case.palm_offset) for place in places]
     return reach_script(cell, case.hand, (palms[0], palms[1]), case.pelvis_x, case.delay_s)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class CaseGeometry:
-    """Geometry of a case study in a cell, by goal."""
-
-    joint_distance_rad: dict[str, float]
-    """Largest joint difference from the start to each goal configuration [rad]."""
-    distance_m: dict[str, float]
-    """Distance from the start to each goal [m]."""
-    blocked_s: dict[str, tuple[float, float] | None]
-    """First and last time at which each goal configuration is blocked [s]; None for never."""
-    clearance_m: dict[str, float]
-    """Least clearance of each goal configuration over the first 6 s [m]."""
-    start_clearance_m: float
-    """Clearance of the start configuration at t = 0 [m]."""
-
-
-def geometry(cell: Cell, case: Case) -> CaseGeometry:
-    """Measure a case study in a cell."""
-    arm = arm_of(cell)
-    names = (case.robot_start, *case.goals)
-    positions = np.array([cell.station(name).position for name in names])
-    configurations, _ = kinematics.ik_vertical_batch(arm.lengths, arm.limits, positions)
-    script = script_of(cell, case)
-    times = np.arange(0.0, 6.0, 0.05)
-    pose, people = arm_kernel.new_robot_pose(arm), people_of(cell)
-    clearance = np.empty((3, len(times)))
-    for k, t in enumerate(times):
-        human_q, _ = script.at(float(t))
-        crowd = people_geometry_of(people, human_q[None], NO_CYLINDERS)
-        for i, configuration in enumerate(configurations):
-            arm_kernel.place_robot(arm, configuration, pose)
-            clearance[i, k] = people_clearance(people, pose.columns, crowd)
-    blocked = {}
-    for i, name in enumerate(case.goals, start=1):
-        when = times[clearance[i] < BLOCKED_BELOW]
-        blocked[name] = (float(when[0]), float(when[-1])) if when.size else None
-    goals = list(enumerate(case.goals, start=1))
-    return CaseGeometry(
-        joint_distance_rad={
-            n: float(np.abs(configurations[i] - configurations[0]).max()) for i, n in goals
-        },
-        distance_m={n: float(np.linalg.norm(positions[i] - positions[0])) for i, n in goals},
-        blocked_s=blocked,
-        clearance_m={n: float(clearance[i].min()) for i, n in goals},
-        start_clearance_m=float(clearance[0, 0]),
-    )

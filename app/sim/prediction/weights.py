@@ -45,17 +45,6 @@ def new_motion_predictor() -> MotionPredictor:
     )
 
 
-def write_networks(radius: Network, path: Network, file: Path = FILE) -> None:
-    """Write networks as the shipped file."""
-    arrays = {
-        f"{kind}.{field}": getattr(network, field)
-        for kind, network in zip(KINDS, (radius, path), strict=True)
-        for field in Network._fields
-    }
-    file.parent.mkdir(parents=True, exist_ok=True)
-    np.savez(file, **arrays)
-
-
 def worker_predictor(network: Network, mean: Vec, scale: Vec) -> WorkerPredictor:
     """Return a predictor of a network with its own work space.
 
@@ -74,10 +63,3 @@ def new_worker_predictor() -> WorkerPredictor:
     network = Network(*(arrays[field] for field in Network._fields))
     mean, scale = (arrays[name].astype(np.float64) for name in ("mean", "scale"))
     return worker_predictor(network, mean, scale)
-
-
-def write_worker_predictor(predictor: WorkerPredictor, file: Path = WORKER_FILE) -> None:
-    """Write a predictor as the shipped file."""
-    inputs = {"mean": predictor.mean, "scale": predictor.scale}
-    arrays = predictor.network._asdict() | inputs
-    np.savez(file, **{name: value.astype(np.float32) for name, value in arrays.items()})

@@ -1,8 +1,6 @@
 """Probabilistic movement primitives of people.
 
-augmentation       Variation of the elbow along the same palm path, an augmentation of
-                   demonstrations
-demonstrations     Synthetic demonstrations: reaches of a person between two places of a cell
+keyframes          Keyframes: postures of a person with one palm at a place of a cell
 library_file       Shipped task primitives: one movement primitive per segment of a worker's
                    task
 phase              Minimum-jerk phase of a motion

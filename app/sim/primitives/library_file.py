@@ -10,7 +10,6 @@ Source: docs/method.md 3.4 (a library of primitives, one per task).
 """
 
 import json
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from importlib import resources
@@ -86,34 +85,6 @@ def segments_of(cell: Cell) -> tuple[TaskSegment, ...]:
 def place_of(cell: Cell, name: str) -> Vec | None:
     """Return the point of a place [m], shape (3,); None at home."""
     return None if name == HOME else np.array(cell.station(name).position)
-
-
-def write_primitives(path: Path, made: Sequence[TaskPrimitive], about: dict[str, Any]) -> None:
-    """Write primitives to a file.
-
-    Args:
-        path: File to write.
-        made: Primitives with equal numbers of demonstrations.
-        about: Additional members of the header, as JSON data.
-    """
-    tasks = [
-        {
-            "cell": one.cell,
-            "kind": one.segment.kind,
-            "start": one.segment.start,
-            "end": one.segment.end,
-            "hand": one.segment.hand,
-        }
-        for one in made
-    ]
-    path.parent.mkdir(parents=True, exist_ok=True)
-    np.savez_compressed(
-        path,
-        header=np.array(json.dumps({**about, "tasks": tasks})),
-        weights=np.array([one.weights for one in made], dtype=np.float32),
-        durations=np.array([one.durations for one in made], dtype=np.float32),
-        residual=np.array([one.residual for one in made], dtype=np.float32),
-    )
 
 
 @cache

@@ -32,7 +32,7 @@ from app.sim.core.arrays import Vec
 from app.sim.human import model as human
 from app.sim.human.anthropometry import BodySize, percentile_body
 from app.sim.primitives import promp
-from app.sim.primitives.demonstrations import draw_keyframe
+from app.sim.primitives.keyframes import draw_keyframe
 from app.sim.primitives.library_file import (
     HANDS,
     HOME,
@@ -219,18 +219,3 @@ def draw_samples(found: TaskPrimitive, n: int, rng: np.random.Generator) -> Vec:
             break
     kept.extend(found.weights[k % len(found.weights)] for k in range(len(kept), n))
     return np.array(kept[:n])
-
-
-def segment_weights(library: MotionLibrary, primitive: int, sample: int, ends: Vec) -> Vec:
-    """Return the conditioned weights of a segment between two keyframes, shape (18, 12).
-
-    Args:
-        library: Library.
-        primitive: Index of the primitive.
-        sample: Index of the sample.
-        ends: Joint positions at both ends [m, rad], shape (2, 18).
-    """
-    drawn = library.samples[sample]
-    phi = promp.basis(np.array([0.0, 1.0]), promp.N_BASIS, promp.usual_width(promp.N_BASIS))
-    missing = (ends - phi @ drawn.T).ravel()
-    return np.asarray(drawn + (library.gain[primitive] @ missing).reshape(drawn.shape))

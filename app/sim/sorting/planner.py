@@ -16,7 +16,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from app.errors import InvalidInput
-from app.sim.core.arrays import Vec
 from app.sim.sorting.kernels.planner import Objects, PlannerWork, Task, new_work, plan_state
 from app.sim.sorting.state import Move, SortingShape, SortingState, missing
 
@@ -87,14 +86,3 @@ def follow(state: SortingState, shape: SortingShape) -> list[Move]:
     """
     plan, work = _solve(state, shape)
     return [shape.move_of(action) for action in work.actions[: plan.moves].tolist()]
-
-
-def attempts_of(moves: list[Move], fail: Vec) -> float:
-    """Return the expected attempts of a plan.
-
-    Args:
-        moves: The plan.
-        fail: Failure probabilities of the clutter cells, shape (K,); other picks do not fail.
-    """
-    risks = [fail[move.pick] if move.pick < len(fail) else 0.0 for move in moves]
-    return float(sum(1.0 / (1.0 - risk) for risk in risks))

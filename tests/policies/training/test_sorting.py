@@ -5,7 +5,7 @@ import pytest
 
 from app.errors import CheckpointMismatch, InvalidInput
 from app.policies.configs import presets
-from app.policies.inference.sorting_policy import SortingPolicy, is_sorting
+from app.policies.inference.sorting_policy import SortingPolicy
 from app.policies.training.reporter import Callbacks
 from app.policies.training.sorting import SortingReporter, start
 from app.sim.cells.cell import load_cell
@@ -50,7 +50,6 @@ def test_a_policy_gives_the_values_of_the_trained_network(small_run):
     checkpoint = small_run.result.checkpoint
     policy, again = SortingPolicy(checkpoint), SortingPolicy(checkpoint)
     obs = batch_in(load_cell("sorting-e0"), 20, 7).reset()
-    assert is_sorting(checkpoint)
     assert np.array_equal(policy.values(obs), again.values(obs))
     assert (policy.cell, policy.shape.n_actions) == ("sorting-e0", 44)
     assert len(policy.checkpoint) == 64 and policy.title == "sorting-e0-dqn, 0.01 M steps"
@@ -59,7 +58,6 @@ def test_a_policy_gives_the_values_of_the_trained_network(small_run):
 
 
 def test_a_policy_that_moves_is_no_policy_that_sorts(tiny_run):
-    assert not is_sorting(tiny_run.result.checkpoint)
     with pytest.raises(CheckpointMismatch, match="purpose is .choosing tasks."):
         SortingPolicy(tiny_run.result.checkpoint)
 

@@ -1,21 +1,19 @@
 """The shipped primitives: complete, small, readable without pickle."""
 
-from pathlib import Path
-
 import numpy as np
 
 from app.sim.cells.cell import cell_names, load_cell
 from app.sim.human import model as human
 from app.sim.primitives import promp
-from app.sim.primitives.demonstrations import PHASES, STYLES
+from app.sim.primitives.keyframes import STYLES
 from app.sim.primitives.library_file import (
     FILE,
     load_primitives,
     primitive_for,
     read_header,
     segments_of,
-    write_primitives,
 )
+from tools.demonstrations import PHASES
 
 
 def test_every_segment_of_every_shipped_cell_has_its_primitive() -> None:
@@ -74,13 +72,3 @@ def test_shipped_cell_gets_its_own_primitives() -> None:
         found = primitive_for(cell, one.segment)
         assert found.segment == one.segment
         np.testing.assert_array_equal(found.weights, one.weights)
-
-
-def test_what_is_written_is_read_again(tmp_path: Path) -> None:
-    path, made = tmp_path / "some.npz", load_primitives()[:3]
-    write_primitives(path, made, {"seed": 1})
-    assert read_header(path)["seed"] == 1
-    for before, after in zip(made, load_primitives(path), strict=True):
-        assert before.segment == after.segment
-        np.testing.assert_array_equal(before.weights, after.weights)
-        np.testing.assert_array_equal(before.durations, after.durations)

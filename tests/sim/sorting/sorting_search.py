@@ -10,7 +10,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from app.sim.sorting.state import SortingShape, SortingState
+from app.sim.core.arrays import Vec
+from app.sim.sorting.state import Move, SortingShape, SortingState
 
 Key = tuple[tuple[int, ...], tuple[tuple[int, ...], ...]]
 """Objects in the cells, and on each tower without free levels."""
@@ -166,3 +167,14 @@ def random_task(
         goal=goal.astype(np.int8),
         fail=rng.uniform(0.0, 0.4, k),
     )
+
+
+def attempts_of(moves: list[Move], fail: Vec) -> float:
+    """Return the expected attempts of a plan.
+
+    Args:
+        moves: The plan.
+        fail: Failure probabilities of the clutter cells, shape (K,); other picks do not fail.
+    """
+    risks = [fail[move.pick] if move.pick < len(fail) else 0.0 for move in moves]
+    return float(sum(1.0 / (1.0 - risk) for risk in risks))

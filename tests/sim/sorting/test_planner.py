@@ -5,9 +5,10 @@ import pytest
 
 from app.errors import InvalidInput
 from app.sim.sorting.batch import apply
-from app.sim.sorting.planner import attempts_of, follow, solve
+from app.sim.sorting.planner import follow, solve
 from app.sim.sorting.state import Move, SortingShape, SortingState
 from tests.sim.sorting.sorting_search import (
+    attempts_of,
     fewest_attempts,
     first_moves,
     moves_to_go,

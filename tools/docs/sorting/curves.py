@@ -11,15 +11,18 @@ A curve has ``played``, the greedy evaluations during training, and ``pairs``, o
 stored policy.
 """
 
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 from app.policies.checkpoints.trained_cell import cell_of
 from app.policies.configs import presets
-from app.policies.evaluation.sorting.curve import curve_episodes, curve_point
+from app.policies.evaluation.sorting.episodes import Values, greedy, joined, run_episodes
+from app.policies.evaluation.sorting.pairs import SMALL, grid_batches
 from app.policies.inference.sorting_policy import SortingPolicy
+from app.sim.core.arrays import Vec
 from app.sim.sorting.batch import fail_of
+from app.sim.sorting.state import SortingShape
 from tools.docs.learning_curves import CurveStudy, collect, lines, policies
 
 RESULTS = Path(__file__).resolve().parents[3] / "docs/results/sorting-curves.json"
@@ -27,6 +30,48 @@ SEED = 77
 """Seed of the episodes; not used in training."""
 STOCK = "stock Stable-Baselines3 DQN"
 Json = dict[str, Any]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CurvePoint:
+    """Success and return of a policy over all pairs, with equal weights."""
+
+    success: float
+    """Success rate."""
+    mean_return: float
+    """Mean sum of rewards per episode, not discounted."""
+    return_sd: float
+    """Standard deviation of that sum over episodes."""
+
+
+def curve_episodes(shape: SortingShape) -> int:
+    """Return the source's number of episodes per pair for one point of its curves."""
+    return 500 if shape.n_cells <= SMALL else 100
+
+
+def curve_point(
+    values: Values,
+    shape: SortingShape,
+    fail: Vec,
+    episodes_per_pair: int,
+    seed: int,
+) -> CurvePoint:
+    """Evaluate a policy on every pair.
+
+    Args:
+        values: Q of every move, from observations.
+        shape: Size of the task.
+        fail: Failure probabilities of the clutter cells, shape (K,).
+        episodes_per_pair: Episodes of each pair; :func:`curve_episodes` gives the source's.
+        seed: Seed of the episodes.
+    """
+    batches = grid_batches(shape, fail, episodes_per_pair, seed, 0.0)
+    found = joined([run_episodes(batch, greedy(values)) for batch in batches])
+    return CurvePoint(
+        success=float(found.success.mean()),
+        mean_return=float(found.rewards.mean()),
+        return_sd=float(found.rewards.std()),
+    )
 
 
 def curve_of_run(folder: Path, episodes: int | None) -> Json:

@@ -17,7 +17,6 @@ from app.policies.checkpoints.checkpoint import Checkpoint
 from app.policies.evaluation.pick.people import ChoiceBench
 from app.policies.evaluation.rows import EvaluationRequest, Json
 from app.sim.cells.cell import Cell
-from app.sim.core.arrays import Vec
 from app.sim.human.model import Hand
 from app.sim.mocap.importer import Motion
 from app.sim.people.human_motion_config import HumanMotionConfig
@@ -25,16 +24,6 @@ from app.sim.people.reach_script import ReachScript, standing_reach
 from app.sim.pick.batch import PickSettings
 
 FILE = Path(__file__).with_suffix(".json")
-N_POINTS = 4
-"""Points of a path."""
-BOX = ((-0.65, 0.35, 0.08), (0.65, 0.8, 0.35))
-"""Least and greatest coordinates of the palm [m]."""
-SPEEDS = (0.2, 0.7)
-"""Least and greatest mean speed of a move [m/s]; the peak is 1.9 times as high."""
-PAUSES = (0.1, 2.0)
-"""Shortest and longest rest before a move [s]."""
-N_NUMBERS = 1 + 3 * N_POINTS + 2 * (N_POINTS - 1)
-"""Numbers that describe a motion."""
 SAMPLE_S = 0.02
 """Sampling step of a motion [s]."""
 
@@ -46,24 +35,11 @@ class HandMotion:
     hand: Hand
     """The hand; the other one rests at the edge of the table."""
     palms: tuple[tuple[float, ...], ...]
-    """Points of the palm [m], N_POINTS of shape (3,)."""
+    """Points of the palm [m], shape (3,) each."""
     speeds: tuple[float, ...]
     """Mean speed of each move [m/s]."""
     pauses: tuple[float, ...]
     """Rest before each move [s]."""
-
-
-def hand_motion(numbers: Vec) -> HandMotion:
-    """Return the motion of numbers in [0, 1], shape (N_NUMBERS,), inside the limits."""
-    points, speeds, pauses = np.split(numbers[1:], (3 * N_POINTS, 4 * N_POINTS - 1))
-    low, high = np.array(BOX)
-    palms = low + points.reshape(N_POINTS, 3) * (high - low)
-    return HandMotion(
-        hand="r" if numbers[0] < 0.5 else "l",
-        palms=tuple(tuple(round(float(x), 3) for x in palm) for palm in palms),
-        speeds=tuple(round(float(x), 3) for x in np.interp(speeds, (0, 1), SPEEDS)),
-        pauses=tuple(round(float(x), 3) for x in np.interp(pauses, (0, 1), PAUSES)),
-    )
 
 
 def motion_of(cell: Cell, motion: HandMotion, name: str) -> Motion:

@@ -2,7 +2,6 @@
 
 benchmark_tasks   Protocol ``sorting-tests``: many episodes of each benchmark task of the
                   thesis (3.4.3)
-curve             Learning curves by the source's protocol: every pair (K_E, K_G), greedy
 cycle_time        Protocol ``sorting-cycle-time``: parts per hour beside a working person
 episodes          Run sorting episodes to their ends and count moves, attempts and risks
 full_tasks        Results of full sorting tasks, and the throughput that they imply

@@ -4,19 +4,11 @@ import numpy as np
 import pytest
 
 from app.policies.checkpoints import pretrained
-from app.policies.evaluation.pick.worst_people import (
-    BOX,
-    N_NUMBERS,
-    N_POINTS,
-    PAUSES,
-    SPEEDS,
-    hand_motion,
-    motion_of,
-    stored_motions,
-)
+from app.policies.evaluation.pick.worst_people import motion_of, stored_motions
 from app.policies.evaluation.registry import evaluate
 from app.sim.cells.cell import load_cell
 from app.sim.human.kernels import kinematics as body
+from tools.search_worst_people import BOX, N_NUMBERS, N_POINTS, PAUSES, SPEEDS, hand_motion
 
 CELL = load_cell("pick-and-place")
 

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from app.policies.evaluation.rows import EvaluationRequest
-from app.policies.evaluation.sorting.curve import curve_point
 from app.policies.evaluation.sorting.episodes import SortingEpisodes, run_episodes
 from app.policies.evaluation.sorting.grid import grid, row_of, share
 from app.policies.evaluation.sorting.optimal_baseline import choose_by_planner
@@ -12,6 +11,7 @@ from app.policies.evaluation.sorting.pairs import CHUNK, grid_batches, pairs_of
 from app.policies.evaluation.statistics import mean_of
 from app.sim.sorting.state import NULL, SortingShape
 from tests.policies.evaluation.sorting_players import exactly, in_circles, values_of
+from tools.docs.sorting.curves import curve_point
 
 SHAPE = SortingShape(n_cells=4, n_colours=2)
 FAIL = np.array([0.0, 0.1, 0.2, 0.4])

@@ -8,8 +8,8 @@ import pytest
 from app.sim.cells.cell import load_cell
 from app.sim.core.arrays import Vec
 from app.sim.human import model as human
-from app.sim.primitives.augmentation import draw_swivel, vary_elbow
 from tests.sim.demonstrations import reaches
+from tools.augmentation import draw_swivel, vary_elbow
 
 POINTS = partial(human.joint_points, size=load_cell().body)
 

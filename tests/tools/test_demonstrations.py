@@ -8,16 +8,14 @@ from app.sim.cells.cell import Cell, load_cell
 from app.sim.core.arrays import Vec
 from app.sim.human import model as human
 from app.sim.human.anthropometry import percentile_body
-from app.sim.primitives.demonstrations import (
-    LARGEST_STEP,
+from app.sim.primitives.keyframes import (
     OVER_TABLE,
     STYLES,
     Style,
-    between,
-    demonstrate,
     draw_keyframe,
     height_over_table,
 )
+from tools.demonstrations import LARGEST_STEP, between, demonstrate
 
 CELL = load_cell()
 PEOPLE = {
@@ -86,22 +84,6 @@ def test_careful_people_are_slower_and_brisk_ones_faster() -> None:
         return float(np.median([one.duration_s for one in every]))
 
     assert median("brisk") < median("upright") < median("careful")
-
-
-def test_elbows_go_out_in_their_style() -> None:
-    rng, size = np.random.default_rng(8), PEOPLE[(50.0, 50.0, 50.0)]
-
-    def outward(name: str) -> float:
-        """Return how far the right elbow is to the right of the arm's ends on average [m]."""
-        found = []
-        for _ in range(12):
-            keyframe = draw_keyframe(CELL, size, station("cube2"), "r", rng, BY_NAME[name])
-            points = human.joint_points(keyframe.q, size)
-            middle = 0.5 * (points["shoulder_r"] + points["hand_r"])
-            found.append(middle[0] - points["elbow_r"][0])  # who faces the robot has -x there
-        return float(np.mean(found))
-
-    assert outward("elbow-out") > outward("upright") + 0.03
 
 
 def test_place_out_of_reach_is_reported() -> None:
