@@ -17,6 +17,7 @@ from app.api.schemas.trackers import (
     TrackerPublic,
 )
 from app.api.services import ServicesDep
+from app.api.tracker_sessions import IDLE_S
 
 router = APIRouter(prefix="/v1/trackers", tags=["trackers"])
 
@@ -36,14 +37,17 @@ async def create_tracker(
     size = cell.body if body.body is None else body.body.size(cell)
     session = services.trackers.open(cell.name, body.n_people, size, cell.floor_z)
     response.headers["Location"] = f"/v1/trackers/{session.id}"
-    return TrackerPublic.from_domain(session)
+    return TrackerPublic.from_object(session, idle_limit_s=IDLE_S)
 
 
 @router.get("", summary="List the trackers")
 async def list_trackers(services: ServicesDep) -> TrackerList:
     """Return every open tracker."""
     return TrackerList(
-        items=[TrackerPublic.from_domain(one) for one in services.trackers.all()]
+        items=[
+            TrackerPublic.from_object(one, idle_limit_s=IDLE_S)
+            for one in services.trackers.all()
+        ]
     )
 
 

@@ -55,27 +55,17 @@ class CellPublic(Answer):
     @classmethod
     def from_domain(cls, cell: Cell) -> Self:
         """Return the schema of a cell."""
-        cases = [
-            CasePublic(
-                id=case.id,
-                title=case.title,
-                text=case.text,
-                goals=list(case.goals),
-                expected=case.expected,
-            )
-            for case in cases_of(cell)
+        tests = [
+            {"id": one.name, "title": one.title, "text": one.text} for one in tests_of(cell)
         ]
-        return cls(
+        return cls.from_object(
+            cell,
             **{"goal_region": None, **cell.definition()},
             shipped=cell.name in cell_names(),
-            sha256=cell.sha256,
             lacks_for_pick=lacks_for_pick(cell),
             lacks_for_live=lacks_for_live(cell),
-            cases=cases,
-            sorting_tests=[
-                SortingTestPublic(id=one.name, title=one.title, text=one.text)
-                for one in tests_of(cell)
-            ],
+            cases=cases_of(cell),
+            sorting_tests=tests,
         )
 
 

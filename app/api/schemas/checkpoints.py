@@ -37,18 +37,11 @@ class CheckpointPublic(Answer):
     def from_domain(cls, record: CheckpointRecord) -> Self:
         """Return the schema of a record."""
         preset = record.manifest.get("preset", {})
-        return cls(
-            sha256=record.sha256,
-            number=record.number,
-            aliases=list(record.aliases),
-            job_id=record.job_id,
-            step=record.step,
+        return cls.from_object(
+            record,
             preset=preset.get("name") if isinstance(preset, dict) else None,
             purpose=purpose_of(record.manifest) if record.manifest else "unreadable",
-            size=record.size,
-            created_at=record.created_at,
             tensors=f"/v1/checkpoints/{record.sha256}/tensors",
-            manifest=dict(record.manifest),
         )
 
 

@@ -74,14 +74,13 @@ class JobPublic(Answer):
         cls, job: JobRecord, latest: MetricRow | None = None, resume_step: int | None = None
     ) -> Self:
         """Return the schema of a record."""
-        more: dict[str, Any] = {
-            "latest": dict(latest.values) if latest else None,
-            "resume_step": resume_step,
-            "progress": _progress(job),
-            "time_left_s": _time_left(job, latest),
-        }
-        names = cls.model_fields.keys() - more.keys()
-        return cls(**{name: getattr(job, name) for name in names}, **more)
+        return cls.from_object(
+            job,
+            latest=dict(latest.values) if latest else None,
+            resume_step=resume_step,
+            progress=_progress(job),
+            time_left_s=_time_left(job, latest),
+        )
 
 
 def _last_step(job: JobRecord) -> int | None:

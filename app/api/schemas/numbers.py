@@ -1,14 +1,30 @@
 """Base classes and number types of the schemas."""
 
-from typing import Annotated
+from collections.abc import Iterable
+from math import isfinite
+from typing import Annotated, Any, Self
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Time = Annotated[float, Field(ge=-1e10, le=1e10)]
 Vector3 = Annotated[list[Finite], Field(min_length=3, max_length=3)]
 Vector6 = Annotated[list[Finite], Field(min_length=6, max_length=6)]
 Vector18 = Annotated[list[Finite], Field(min_length=18, max_length=18)]
+
+
+def _listed(values: Iterable[float | None]) -> list[float | None]:
+    """Return the numbers of an array or list, None in place of NaN and infinity."""
+    known = (None if value is None else float(value) for value in values)
+    return [value if value is not None and isfinite(value) else None for value in known]
+
+
+Listed = Annotated[list[float], BeforeValidator(_listed)]
+"""Numbers of an array."""
+Counts = Annotated[list[int], BeforeValidator(_listed)]
+"""Whole numbers of an array."""
+Sparse = Annotated[list[float | None], BeforeValidator(_listed)]
+"""Numbers of an array that are null where they are not finite."""
 
 
 class Body(BaseModel):
@@ -24,4 +40,11 @@ class Body(BaseModel):
 class Answer(BaseModel):
     """Base of answers."""
 
-    model_config = ConfigDict(frozen=True)
+    model_config = ConfigDict(frozen=True, from_attributes=True)
+
+    @classmethod
+    def from_object(cls, source: object, **more: Any) -> Self:
+        """Return the answer whose fields are ``more`` and the attributes of an object."""
+        names = [name for name in cls.model_fields if name not in more]
+        known = {name: getattr(source, name) for name in names if hasattr(source, name)}
+        return cls.model_validate({**known, **more})

@@ -103,7 +103,7 @@ class RecordingItem(Answer):
     @classmethod
     def from_domain(cls, record: StoredRecording) -> Self:
         """Return the schema of a record."""
-        return cls(**_members(record))
+        return cls.from_object(record, **_members(record))
 
 
 class RecordingPublic(RecordingItem):
@@ -116,11 +116,8 @@ class RecordingPublic(RecordingItem):
     def from_domain(cls, record: StoredRecording) -> Self:
         """Return the schema of a record with its detail."""
         assert record.detail is not None
-        return cls(
-            **_members(record),
-            clean_runs=record.detail["clean_runs"],
-            artifacts=record.detail["artifacts"],
-        )
+        parts = {name: record.detail[name] for name in ("clean_runs", "artifacts")}
+        return cls.from_object(record, **_members(record), **parts)
 
 
 class RecordingList(Answer):
@@ -132,11 +129,6 @@ class RecordingList(Answer):
 def _members(record: StoredRecording) -> dict[str, Any]:
     return {
         **record.summary,
-        "name": record.name,
-        "file_name": record.file_name,
-        "sha256": record.sha256,
-        "created_at": record.created_at,
         "frames": record.n_frames,
         "duration_s": record.duration,
-        "n_runs": record.n_runs,
     }

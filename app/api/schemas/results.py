@@ -3,13 +3,11 @@
 from datetime import datetime
 from typing import Any, Self
 
-import numpy as np
 from pydantic import Field
 
-from app.api.schemas.numbers import Answer
-from app.sim.core.arrays import Vec
+from app.api.schemas.numbers import Answer, Counts, Sparse
 from app.store.records import JobRecord, Page
-from jobs.comparison import Group, JobComparison
+from jobs.comparison import JobComparison
 
 _OWN = ("protocol", "checkpoint", "seed", "episodes", "results", "cpu_seconds")
 
@@ -37,8 +35,7 @@ class EvaluationPublic(Answer):
         """Return the schema of a succeeded evaluation."""
         result = dict(job.result or {})
         own = {name: result.pop(name, None) for name in _OWN}
-        about = {name: getattr(job, name) for name in ("id", "number", "name", "finished_at")}
-        return cls(**about, **own, conditions=result)
+        return cls.from_object(job, **own, conditions=result)
 
 
 class EvaluationList(Answer):
@@ -79,22 +76,10 @@ class CurveGroup(Answer):
 
     label: str = Field(description="values of the fields that differ; the preset if none does")
     jobs: list[str] = Field(description="their ids")
-    mean: list[float | None] = Field(description="mean over the jobs at each of `steps`")
-    low: list[float | None] = Field(description="least value of a job")
-    high: list[float | None] = Field(description="greatest value of a job")
-    n: list[int] = Field(description="number of jobs that have reached the step")
-
-    @classmethod
-    def from_domain(cls, group: Group) -> Self:
-        """Return the schema of a group."""
-        return cls(
-            label=group.label,
-            jobs=list(group.jobs),
-            mean=_finite(group.mean),
-            low=_finite(group.low),
-            high=_finite(group.high),
-            n=[int(k) for k in group.n],
-        )
+    mean: Sparse = Field(description="mean over the jobs at each of `steps`")
+    low: Sparse = Field(description="least value of a job")
+    high: Sparse = Field(description="greatest value of a job")
+    n: Counts = Field(description="number of jobs that have reached the step")
 
 
 class ComparisonPublic(Answer):
@@ -110,19 +95,7 @@ class ComparisonPublic(Answer):
     @classmethod
     def from_domain(cls, found: JobComparison) -> Self:
         """Return the schema of a comparison."""
-        names = ComparedJob.model_fields
-        return cls(
-            jobs=[ComparedJob(**{n: getattr(job, n) for n in names}) for job in found.jobs],
-            differences=[
-                Difference(field=field, values=list(values))
-                for field, values in found.differences.items()
-            ],
-            quantities=list(found.quantities),
-            quantity=found.quantity,
-            steps=list(found.steps),
-            groups=[CurveGroup.from_domain(group) for group in found.groups],
-        )
-
-
-def _finite(values: Vec) -> list[float | None]:
-    return [float(value) if np.isfinite(value) else None for value in values]
+        differences = [
+            {"field": field, "values": values} for field, values in found.differences.items()
+        ]
+        return cls.from_object(found, differences=differences)

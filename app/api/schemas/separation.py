@@ -11,7 +11,6 @@ from pydantic import Field
 from app.api.schemas.numbers import Answer, Body
 from app.sim.human.model import CAPSULE_NAMES
 from app.sim.reach.motion_types import MotionDecision
-from app.sim.safety.decision import SeparationTerms
 from app.sim.safety.layer import SafetySettings
 
 Metres = Annotated[float, Field(ge=0.0, le=5.0)]
@@ -79,25 +78,6 @@ class Terms(Answer):
     robot_uncertainty: float = Field(description="Z_r [m]")
     protective_distance: float = Field(description="additional distance [m]")
 
-    @classmethod
-    def from_domain(cls, person: int, terms: SeparationTerms) -> Self:
-        """Return the schema of the simulator's terms."""
-        return cls(
-            person=person,
-            link=terms.link,
-            separation=terms.separation,
-            required=terms.required,
-            human_speed=terms.human_speed,
-            robot_speed=terms.robot_speed,
-            reaction_time=terms.reaction_time,
-            stop_time=terms.stop_time,
-            braking=terms.braking,
-            intrusion=terms.intrusion,
-            person_uncertainty=terms.person_uncertainty,
-            robot_uncertainty=terms.robot_uncertainty,
-            protective_distance=terms.protective_distance,
-        )
-
 
 class Override(Answer):
     """Speed override by monitoring, and its cause."""
@@ -121,12 +101,11 @@ class Override(Answer):
         safe, whose, terms = decision.safe, decision.terms_of, decision.terms
         if safe is None:
             return None
-        public = None if whose is None or terms is None else Terms.from_domain(whose, terms)
-        return cls(
-            override=safe.override,
+        return cls.from_object(
+            safe,
             set_by=None if safe.person is None else whose,
             part=None if safe.part is None else CAPSULE_NAMES[safe.part],
-            lacking=safe.lacking,
-            stop_distance=safe.stop_distance,
-            terms=public,
+            terms=None
+            if whose is None or terms is None
+            else Terms.from_object(terms, person=whose),
         )

@@ -1,6 +1,7 @@
 """``POST /v1/sorting``: objects and goal in, next move out."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from typing import Annotated, Self
 
 import numpy as np
@@ -62,9 +63,7 @@ class SortingObject(Body):
 
     def to_domain(self) -> NamedObject:
         """Return the simulator's data."""
-        return NamedObject(
-            colour=self.colour, size=self.size, at=self.at, level=self.level, id=self.id
-        )
+        return NamedObject(**dict(self))
 
 
 class GoalObject(Body):
@@ -106,16 +105,7 @@ class SortingRecord(Body):
     @classmethod
     def from_domain(cls, monitor: ProgressMonitor) -> Self:
         """Return the schema of the simulator's data."""
-        return cls(
-            checkpoint=monitor.checkpoint,
-            last=monitor.last,
-            expected=monitor.expected,
-            can_fail=monitor.can_fail,
-            seen=list(monitor.seen),
-            attempts=monitor.attempts,
-            budget=monitor.budget,
-            planner_fallback=monitor.planner_fallback,
-        )
+        return cls(**{**asdict(monitor), "seen": list(monitor.seen)})
 
 
 class SortingFields(Body):
@@ -273,19 +263,13 @@ class SortingAnswer(Answer):
         ids = request.ids
         moves = [_valued(one, state, names, ids) for one in decision.ranked]
         monitor = decision.monitor
-        return cls(
-            solved=decision.solved,
+        return cls.from_object(
+            decision,
             move=move_of(decision.move, state, names, ids) if decision.move else None,
-            by=decision.by,
-            why=decision.why,
             because=REASONS[decision.why],
             moves=moves,
-            fewest_moves=decision.fewest_moves,
-            expected_attempts=decision.expected_attempts,
-            outside=list(outside),
+            outside=outside,
             monitor=None if monitor is None else SortingRecord.from_domain(monitor),
-            checkpoint=decision.checkpoint,
-            elapsed_ms=decision.elapsed_ms,
             stamp=request.stamp,
         )
 

@@ -52,13 +52,10 @@ class TrialList(Answer):
 
 def _public(trial: SweepTrial, best: bool) -> TrialPublic:
     training, evaluation = trial.training, trial.evaluation
-    return TrialPublic(
+    return TrialPublic.from_object(
+        trial,
         trial=trial.number,
-        parameters=dict(trial.parameters),
-        state=trial.state,
-        value=None if trial.value is None else dict(trial.value),
         best=best,
-        error=trial.error,
         step=training.step,
         total_steps=training.total_steps,
         job=training.id,

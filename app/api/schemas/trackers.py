@@ -1,16 +1,14 @@
 """Trackers of key-points: frames in, estimates of people out."""
 
-from dataclasses import asdict
 from typing import Annotated, Literal, Self
 
 import numpy as np
 from pydantic import Field
 
 from app.api.schemas.examples import FRAME, TRACKER, shows
-from app.api.schemas.numbers import Answer, Body, Time
+from app.api.schemas.numbers import Answer, Body, Listed, Time
 from app.api.schemas.people import IMPLAUSIBLE, UNUSABLE, BodyPercentiles, KeypointsSeen
-from app.api.tracker_sessions import IDLE_S, TrackedPeople, TrackerSession
-from app.sim.perception.bounding_cylinder import SafetyCylinder
+from app.api.tracker_sessions import TrackedPeople
 from app.sim.perception.multi_person_tracker import MAX_SKELETONS
 from app.sim.perception.person_estimator import PersonEstimate
 
@@ -39,18 +37,6 @@ class TrackerPublic(Answer):
     t: float | None = Field(description="time of its newest frame [s]")
     idle_limit_s: float = Field(description="time until an unused tracker is deleted [s]")
 
-    @classmethod
-    def from_domain(cls, session: TrackerSession) -> Self:
-        """Return the schema of a session."""
-        return cls(
-            id=session.id,
-            cell=session.cell,
-            n_people=session.n_people,
-            n_frames=session.n_frames,
-            t=session.t,
-            idle_limit_s=IDLE_S,
-        )
-
 
 class TrackerList(Answer):
     """All open trackers."""
@@ -74,32 +60,21 @@ class FrameCreate(Body):
 class CylinderPublic(Answer):
     """Safety cylinder of a person (docs/method.md 2.8)."""
 
-    center: list[float] = Field(description="x, y of the axis [m]")
+    center: Listed = Field(description="x, y of the axis [m]")
     radius: float = Field(description="radius with factor and flesh margin [m]")
     bottom: float = Field(description="lowest observed point [m]")
     top: float = Field(description="highest observed point plus flesh margin [m]")
-    velocity: list[float] = Field(description="velocity of the axis [m/s]")
-
-    @classmethod
-    def from_domain(cls, cylinder: SafetyCylinder) -> Self:
-        """Return the schema of a cylinder."""
-        return cls(
-            center=cylinder.center.tolist(),
-            radius=cylinder.radius,
-            bottom=cylinder.bottom,
-            top=cylinder.top,
-            velocity=cylinder.velocity.tolist(),
-        )
+    velocity: Listed = Field(description="velocity of the axis [m/s]")
 
 
 class EstimatePublic(Answer):
     """Estimate of one person."""
 
     person: int = Field(description="index of the track")
-    q: list[float] | None = Field(
+    q: Listed | None = Field(
         description="joint positions [m, rad]; null: unknown yet, or the model does not fit"
     )
-    qd: list[float] | None = Field(description="joint speeds [m/s, rad/s]")
+    qd: Listed | None = Field(description="joint speeds [m/s, rad/s]")
     cylinder: CylinderPublic | None = Field(description="null before the first observation")
     age_s: float | None = Field(
         description="time since the newest credible key-point [s]; null where there was none"
@@ -118,21 +93,17 @@ class EstimatePublic(Answer):
     @classmethod
     def from_domain(cls, index: int, estimate: PersonEstimate) -> Self:
         """Return the schema of an estimate."""
-        person, cylinder = estimate.person, estimate.cylinder
-        return cls(
+        person = estimate.person
+        age, misfit = (
+            one if np.isfinite(one) else None for one in (estimate.age_s, estimate.misfit_m)
+        )
+        return cls.from_object(
+            estimate,
             person=index,
-            q=None if person is None else person.q.tolist(),
-            qd=None if person is None else person.qd.tolist(),
-            cylinder=None if cylinder is None else CylinderPublic.from_domain(cylinder),
-            age_s=estimate.age_s if np.isfinite(estimate.age_s) else None,
-            stale=estimate.stale,
-            flags=list(estimate.flags),
-            held=list(estimate.held),
-            missing=list(estimate.missing),
-            strays=list(estimate.strays),
-            unusable=list(estimate.unusable),
-            implausible=estimate.implausible,
-            misfit_m=estimate.misfit_m if np.isfinite(estimate.misfit_m) else None,
+            q=None if person is None else person.q,
+            qd=None if person is None else person.qd,
+            age_s=age,
+            misfit_m=misfit,
         )
 
 
@@ -168,5 +139,4 @@ class EstimatesPublic(Answer):
     def from_domain(cls, tracker: str, known: TrackedPeople) -> Self:
         """Return the schema of a tracker's people."""
         people = [EstimatePublic.from_domain(i, one) for i, one in enumerate(known.estimates)]
-        rest = [UnfollowedPublic(**asdict(one)) for one in known.unfollowed]
-        return cls(tracker=tracker, t=known.t, people=people, unfollowed=rest)
+        return cls.from_object(known, tracker=tracker, people=people)

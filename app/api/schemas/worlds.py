@@ -88,13 +88,7 @@ class WorldSummary(Answer):
     @classmethod
     def from_domain(cls, snapshot: WorldSnapshot, follow: FollowPublic | None = None) -> Self:
         """Make it from a snapshot."""
-        return cls(
-            id=snapshot.id,
-            cell=snapshot.cell,
-            viewer=f"/viewer/{snapshot.id}/",
-            checkpoint=snapshot.checkpoint,
-            follow=follow,
-        )
+        return cls.from_object(snapshot, viewer=f"/viewer/{snapshot.id}/", follow=follow)
 
 
 class WorldCell(Body):
