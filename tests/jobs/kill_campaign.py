@@ -16,7 +16,6 @@ import subprocess
 import sys
 import time
 from collections import Counter
-from collections.abc import Sequence
 from contextlib import ExitStack, nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -30,7 +29,7 @@ from app.store.engine import Store
 from app.store.records import FINAL_STATES, JobRecord
 from jobs.executor import PROJECT_ROOT
 from tests.jobs.counting_worker import CHECKPOINT_EVERY, FACTOR, GRID, MODULUS
-from tests.jobs.machinery import WAIT_S, worker_pids
+from tests.jobs.machinery import ENDED, WAIT_S, process_state, worker_pids
 from tests.support.postgresql_server import PostgresqlServer, postgresql_server
 
 SERIES = 25
@@ -134,21 +133,14 @@ def kill(series: Series, how: str, chance: random.Random) -> bool:
     if then == "SIGCONT" or (target == "worker" and not then):
         return True
     series.collect()
-    if not _end(workers, NATURAL_END_S):
+    deadline = time.monotonic() + NATURAL_END_S
+    if target == "worker" and process_state(workers[0]) == "T":
         # Stopped before it asked to end with its server: it ends as soon as it goes on.
-        assert how.startswith("SIGSTOP worker"), "a worker outlives its server"
         _send(workers[0], "SIGCONT")
-        assert _end(workers, WAIT_S), "a worker goes on after the end of its server"
         series.continued += 1
-    return True
-
-
-def _end(workers: Sequence[int], within_s: float) -> bool:
-    """Return whether processes end within a time [s]."""
-    deadline = time.monotonic() + within_s
-    while any(Path(f"/proc/{pid}").exists() for pid in workers):
-        if time.monotonic() >= deadline:
-            return False
+        deadline = time.monotonic() + WAIT_S
+    while any(process_state(pid) not in ENDED for pid in workers):
+        assert time.monotonic() < deadline, "a worker outlives its server"
         time.sleep(0.01)
     return True
 

@@ -73,18 +73,38 @@ def assert_counted_once(store: Store, job_id: str, *, steps: int, seed: int = 0)
     assert jobs.get_job(store, job_id).result == {"value": value}
 
 
+ENDED = ("", "Z", "X")
+"""States of a process that has ended; its parent may take seconds to read its exit status."""
+
+
+def process_state(pid: int) -> str:
+    """Return the state of a process by /proc, such as T for stopped; empty: there is none."""
+    return _stat(pid)[0]
+
+
+def _stat(pid: int) -> list[str]:
+    """Return the fields of a process that follow its name in /proc: state, parent, others."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    except OSError:
+        return ["", "0"]
+
+
 def worker_pids(parent: int) -> list[int]:
     """The workers that are children of a process, by /proc."""
     found = []
-    for stat in Path("/proc").glob("[0-9]*/stat"):
-        try:
-            fields = stat.read_text().rpartition(")")[2].split()
-            command = stat.with_name("cmdline").read_bytes()
-        except OSError:
-            continue
-        if int(fields[1]) == parent and fields[0] != "Z" and b"--job" in command:
-            found.append(int(stat.parent.name))
+    for folder in Path("/proc").glob("[0-9]*"):
+        state, its_parent, *_ = _stat(int(folder.name))
+        if state not in ENDED and int(its_parent) == parent and _is_worker(folder):
+            found.append(int(folder.name))
     return found
+
+
+def _is_worker(folder: Path) -> bool:
+    try:
+        return b"--job" in (folder / "cmdline").read_bytes()
+    except OSError:
+        return False
 
 
 @contextmanager

@@ -14,8 +14,10 @@ from app.store.engine import Store
 from jobs.executor import LocalProcess
 from jobs.supervisor import Supervisor
 from tests.jobs.machinery import (
+    ENDED,
     PATIENCE,
     assert_counted_once,
+    process_state,
     queue,
     supervisor_process,
     wait_for,
@@ -25,13 +27,6 @@ from tests.jobs.machinery import (
 from tests.jobs.supervisor_process import COUNTING
 from tests.support.databases import POSTGRESQL_ONLY, wait_until_lease_expires
 from tests.support.postgresql_server import PostgresqlServer
-
-
-def is_running(pid: int) -> bool:
-    try:
-        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
-    except OSError:
-        return False
 
 
 def test_job_runs_to_its_end(store: Store, supervisor: Supervisor) -> None:
@@ -163,7 +158,7 @@ def test_killed_server_takes_its_worker_along_and_the_next_one_finishes_the_job(
         job = wait_until_final(store, job_id)
     assert (job.state, job.attempt, job.failures) == ("succeeded", 3, 0)
     assert_counted_once(store, job_id, steps=100, seed=9)
-    assert len(pids) == 2 and not any(map(is_running, pids))
+    assert len(pids) == 2 and all(process_state(pid) in ENDED for pid in pids)
 
 
 @POSTGRESQL_ONLY
@@ -198,7 +193,7 @@ def test_server_paused_beyond_its_lease_stops_its_worker_and_waits(
         start_patiently(second)
         wait_for(store, job_id, lambda job: job.step == 65)
         paused.send_signal(signal.SIGCONT)
-        while is_running(pid):
+        while process_state(pid) not in ENDED:
             time.sleep(0.02)
         job = jobs.get_job(store, job_id)
         assert (job.state, job.attempt, job.failures) == ("running", 2, 0)
