@@ -29,7 +29,7 @@ from app.store.engine import Store
 from app.store.records import FINAL_STATES, JobRecord
 from jobs.executor import PROJECT_ROOT
 from tests.jobs.counting_worker import CHECKPOINT_EVERY, FACTOR, GRID, MODULUS
-from tests.jobs.machinery import ENDED, WAIT_S, process_state, worker_pids
+from tests.jobs.machinery import WAIT_S, is_running, process_state, worker_pids
 from tests.support.postgresql_server import PostgresqlServer, postgresql_server
 
 SERIES = 25
@@ -139,7 +139,7 @@ def kill(series: Series, how: str, chance: random.Random) -> bool:
         _send(workers[0], "SIGCONT")
         series.continued += 1
         deadline = time.monotonic() + WAIT_S
-    while any(process_state(pid) not in ENDED for pid in workers):
+    while any(map(is_running, workers)):
         assert time.monotonic() < deadline, "a worker outlives its server"
         time.sleep(0.01)
     return True

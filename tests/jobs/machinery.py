@@ -73,8 +73,9 @@ def assert_counted_once(store: Store, job_id: str, *, steps: int, seed: int = 0)
     assert jobs.get_job(store, job_id).result == {"value": value}
 
 
-ENDED = ("", "Z", "X")
-"""States of a process that has ended; its parent may take seconds to read its exit status."""
+def is_running(pid: int) -> bool:
+    """Whether a process has not ended; its parent may take seconds to read its exit status."""
+    return process_state(pid) not in ("", "Z", "X")
 
 
 def process_state(pid: int) -> str:
@@ -94,9 +95,9 @@ def worker_pids(parent: int) -> list[int]:
     """The workers that are children of a process, by /proc."""
     found = []
     for folder in Path("/proc").glob("[0-9]*"):
-        state, its_parent, *_ = _stat(int(folder.name))
-        if state not in ENDED and int(its_parent) == parent and _is_worker(folder):
-            found.append(int(folder.name))
+        pid = int(folder.name)
+        if int(_stat(pid)[1]) == parent and is_running(pid) and _is_worker(folder):
+            found.append(pid)
     return found
 
 

@@ -5,8 +5,7 @@ import time
 import pytest
 
 from jobs.executor import PROJECT_ROOT
-from tests.jobs.machinery import WAIT_S
-from tests.jobs.test_supervisor import is_running
+from tests.jobs.machinery import WAIT_S, is_running
 
 SERVER = """
 import subprocess, sys, time

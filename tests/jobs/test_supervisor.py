@@ -14,10 +14,9 @@ from app.store.engine import Store
 from jobs.executor import LocalProcess
 from jobs.supervisor import Supervisor
 from tests.jobs.machinery import (
-    ENDED,
     PATIENCE,
     assert_counted_once,
-    process_state,
+    is_running,
     queue,
     supervisor_process,
     wait_for,
@@ -158,7 +157,7 @@ def test_killed_server_takes_its_worker_along_and_the_next_one_finishes_the_job(
         job = wait_until_final(store, job_id)
     assert (job.state, job.attempt, job.failures) == ("succeeded", 3, 0)
     assert_counted_once(store, job_id, steps=100, seed=9)
-    assert len(pids) == 2 and all(process_state(pid) in ENDED for pid in pids)
+    assert len(pids) == 2 and not any(map(is_running, pids))
 
 
 @POSTGRESQL_ONLY
@@ -193,7 +192,7 @@ def test_server_paused_beyond_its_lease_stops_its_worker_and_waits(
         start_patiently(second)
         wait_for(store, job_id, lambda job: job.step == 65)
         paused.send_signal(signal.SIGCONT)
-        while process_state(pid) not in ENDED:
+        while is_running(pid):
             time.sleep(0.02)
         job = jobs.get_job(store, job_id)
         assert (job.state, job.attempt, job.failures) == ("running", 2, 0)
