@@ -19,7 +19,7 @@ from matplotlib.ticker import FuncFormatter, NullFormatter, PercentFormatter
 from numpy.typing import NDArray
 
 from app.policies.configs import presets
-from tools.docs.world.plots import BLUE, GREY, ORANGE, RED, panels, save
+from tools.docs.world.plots import BLUE, GREEN, GREY, ORANGE, RED, panels, save
 
 ROOT = Path(__file__).resolve().parents[2]
 RESULTS, IMAGE = ROOT / "docs/results", ROOT / "docs/img/recipes.png"
@@ -61,6 +61,7 @@ ROWS = (
         "reach",
         (
             ("thesis-reach", "reach-ddpg-authors", ORANGE),
+            ("thesis-reach", "reach-ddpg-authors, exchanged learning rates", GREEN),
             ("thesis-reach", "reach-ddpg-thesis", RED),
             ("reach-curves", "reach-td3", BLUE),
         ),
@@ -76,7 +77,7 @@ ROWS = (
 
 def updates_at(name: str, step: int) -> int:
     """Return the updates of a preset until an environment step."""
-    learning = presets.get(name).learning
+    learning = presets.get(name.partition(",")[0]).learning
     each = getattr(learning, "gradient_steps", 1) / getattr(learning, "update_every", 1)
     return round(max(0, step - learning.learning_starts) / learning.n_envs * each)
 

@@ -1,13 +1,15 @@
 """Write the curves of trainings as they were recorded to a result file of the report.
 
-    python -m tools.docs.thesis_curves thesis-reach RUN ...
+    python -m tools.docs.thesis_curves thesis-reach RUN ... [--variant TEXT]
 
 A RUN is a folder with a ``curve.jsonl``, as written by ``training_curves.py`` or
 ``python -m app train``. Its points are greedy episodes during the training: in the reach
 recipes 20 for each of 54 targets by default, in the pick recipe 200, in ``pick-td3`` those of
 the environments without exploration. The curves of recipes also have the return of standing
 still in these episodes.
-A curve of the same preset and seed replaces the one in the file.
+A curve of the same preset and seed replaces the one in the file. Runs with other fields are
+a variant: a text behind the name of the preset, such as "exchanged learning rates". Its
+fields are listed in the file.
 """
 
 import argparse
@@ -18,7 +20,7 @@ from typing import Any
 import torch
 
 from app.policies.configs import presets
-from app.policies.configs.fields import read_config
+from app.policies.configs.fields import FieldGroup, read_config
 from app.policies.configs.pick import PickPreset
 from app.policies.configs.reach import ReachPreset
 from app.policies.configs.sorting import SortingPreset
@@ -53,8 +55,13 @@ class Still(torch.nn.Module):
         return torch.zeros(len(obs), self._n_act)
 
 
-def curve_of(folder: Path) -> Json:
-    """Return the recorded curve of a training."""
+def curve_of(folder: Path, variant: str | None = None) -> Json:
+    """Return the recorded curve of a training.
+
+    Args:
+        folder: Folder of the training.
+        variant: What distinguishes it from its preset, for its name.
+    """
     stored = folder / "policy.json"
     last = stored if stored.exists() else sorted(folder.glob("step-*.json"))[-1]
     manifest = read(last.with_suffix("")).manifest
@@ -65,8 +72,17 @@ def curve_of(folder: Path) -> Json:
         "commits": manifest["commits"],
         "played": [{key: one[key] for key in KEYS} for one in points],
     }
-    kind = type(presets.get(curve["name"]))
-    preset = read_config(kind, manifest["preset"], "manifest.preset")
+    usual = presets.get(curve["name"])
+    preset = read_config(type(usual), manifest["preset"], "manifest.preset")
+    if variant is not None:
+        curve["name"] += f", {variant}"
+        curve["fields"] = {
+            f"{group}.{name}": value
+            for group, fields in preset
+            if isinstance(fields, FieldGroup)
+            for name, value in fields
+            if value != getattr(getattr(usual, group), name)
+        }
     if not isinstance(preset, SortingPreset):
         if preset.learning.progress_episodes > 0:
             curve["standing_still"] = standing_still(preset)
@@ -89,13 +105,14 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("file", help="name of the result file, without .json")
     parser.add_argument("runs", nargs="+", type=Path, metavar="RUN")
+    parser.add_argument("--variant", help="what distinguishes the runs from their preset")
     options = parser.parse_args()
     path = RESULTS / f"{options.file}.json"
     found = json.loads(path.read_text(encoding="utf-8"))["curves"] if path.exists() else []
     result = {
         "command": f"python -m tools.docs.thesis_curves {options.file} RUN ...",
         "seed": CURVE_SEED,
-        "curves": merged(found, [curve_of(folder) for folder in options.runs]),
+        "curves": merged(found, [curve_of(run, options.variant) for run in options.runs]),
         "machine": describe(),
     }
     path.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")

@@ -48,5 +48,9 @@ def test_folder_of_a_training_is_a_curve(tmp_path: Path) -> None:
     for kind in ("json", "safetensors"):  # as the command line names the last policy
         (run / f"step-000001024.{kind}").rename(run / f"policy.{kind}")
     assert curve_of(run) == curve
+    other = curve_of(run, "shorter")
+    assert other.pop("name") == "pick-td3, shorter"
+    assert other.pop("fields")["learning.total_steps"] == 1024
+    assert other == {key: value for key, value in curve.items() if key != "name"}
     (tmp_path / "pick-curves.json").write_text(json.dumps({"curves": [curve]}))
     assert curves_of(tmp_path, "pick-curves", "pick-td3") == [curve]
