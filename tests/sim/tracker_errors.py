@@ -1,5 +1,6 @@
 """How far estimates are from people at work who are seen through a tracker."""
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 
@@ -11,7 +12,7 @@ from app.sim.perception.bounding_cylinder import SafetyCylinder, safety_cylinder
 from app.sim.perception.keypoint_sensor_model import (
     KeypointSensorModel,
     KeypointSensorSettings,
-    follow,
+    Motion,
 )
 from app.sim.perception.keypoints import keypoints_of
 from app.sim.perception.person_estimator import PersonEstimate, PersonEstimator
@@ -37,6 +38,19 @@ class Errors:
     """Error of the axis's velocity [m/s]."""
     qd: list[np.ndarray] = field(default_factory=list)
     """Error of the joint speeds [m/s, rad/s]."""
+
+
+def follow(
+    motion: Motion,
+    times: Sequence[float],
+    tracker: KeypointSensorModel,
+    estimator: PersonEstimator,
+) -> Iterator[PersonEstimate]:
+    """Yield the estimate of a person at each time [s], from simulated frames."""
+    for t in times:
+        for frame in tracker.frames(t, motion):
+            estimator.take(frame.t, frame.keypoints, frame.confidences)
+        yield estimator.at(t)
 
 
 @lru_cache(maxsize=16)

@@ -1,7 +1,5 @@
 """The model of a tracker: late, noisy, incomplete as asked for, and the same for a seed."""
 
-from collections.abc import Iterator, Sequence
-
 import numpy as np
 import pytest
 
@@ -10,25 +8,12 @@ from app.sim.perception.keypoint_sensor_model import (
     Frame,
     KeypointSensorModel,
     KeypointSensorSettings,
-    Motion,
 )
-from app.sim.perception.person_estimator import PersonEstimate, PersonEstimator
+from app.sim.perception.person_estimator import PersonEstimator
 from tests.sim.tracked_person import CELL, motion, seen
+from tests.sim.tracker_errors import follow
 
 EXACT = KeypointSensorSettings(noise=0.0, missing=0.0, latency_s=0.0)
-
-
-def follow(
-    motion: Motion,
-    times: Sequence[float],
-    tracker: KeypointSensorModel,
-    estimator: PersonEstimator,
-) -> Iterator[PersonEstimate]:
-    """Yield the estimate of a person at each time [s], from simulated frames."""
-    for t in times:
-        for frame in tracker.frames(t, motion):
-            estimator.take(frame.t, frame.keypoints, frame.confidences)
-        yield estimator.at(t)
 
 
 def frames(
