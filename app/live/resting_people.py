@@ -49,9 +49,7 @@ class RestingPeopleControl:
         candidates: tuple[Candidate, ...],
         begun: str | None = None,
     ) -> tuple[Candidate, ...]:
-        """Return the candidates without those that people at rest block.
-
-        All of them where none is free or nobody has been at rest.
+        """Return the candidates that people at rest do not block; all where nobody is at rest.
 
         Args:
             people: The people in the cell.
@@ -63,10 +61,11 @@ class RestingPeopleControl:
             return candidates
         points = np.array([one.position for one in candidates])
         over, low, _ = target_configurations(self._robot.arm, policy.grasp, points)
+        names = [one.id for one in candidates]
+        place = names.index(begun) if begun in names else None
         shapes = self._robot.shapes(people)
-        free = self._planner.free(shapes, policy.grasp, over, low)
-        left = [free[k] or one.id == begun for k, one in enumerate(candidates)]
-        return tuple(one for k, one in enumerate(candidates) if left[k] or not any(left))
+        left = self._planner.offered(shapes, policy.grasp, over, low, place)
+        return tuple(one for one, is_left in zip(candidates, left, strict=True) if is_left)
 
     def update(
         self,

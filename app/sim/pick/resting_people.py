@@ -61,6 +61,9 @@ class RestingPeoplePlanner:
     _t: float = 0.0
     _goal: Vec = field(default_factory=lambda: np.full(6, np.nan))
     _executor: ReplanningExecutor | None = None
+    _people: tuple[bytes, bytes] = (b"", b"")
+    _free: dict[bytes, bool] = field(default_factory=dict)
+    """Answers of :meth:`free` beside these people."""
 
     def note(self, speed: float) -> bool:
         """Note one control cycle; return whether people have been at rest for ``REST_S``.
@@ -84,9 +87,36 @@ class RestingPeoplePlanner:
             q_over: Joint positions over the objects [rad], shape (n, 6).
             q_grasp: Joint positions at the objects [rad], shape (n, 6).
         """
-        checker = Checker(self.arm, people, grasp.start_clearance)
-        pairs = zip(q_over, q_grasp, strict=True)
-        return np.array([all(checker.is_free(at) for at in pair) for pair in pairs])
+        here = people.columns.tobytes(), people.cylinders.tobytes()
+        if here != self._people:
+            self._people, self._free = here, {}
+        found = np.empty(len(q_over), dtype=np.bool_)
+        for k, pair in enumerate(zip(q_over, q_grasp, strict=True)):
+            key = b"".join(at.tobytes() for at in pair)
+            if key not in self._free:
+                checker = Checker(self.arm, people, grasp.start_clearance)
+                self._free[key] = all(checker.is_free(at) for at in pair)
+            found[k] = self._free[key]
+        return found
+
+    def offered(
+        self, people: Shapes, grasp: GraspRules, q_over: Vec, q_grasp: Vec, begun: int | None
+    ) -> Flags:
+        """Return which targets a policy may choose, shape (n,).
+
+        Those that are free, and the one whose pick has begun; all where none is left.
+
+        Args:
+            people: People at this moment.
+            grasp: Rules of the grasp.
+            q_over: Joint positions over the objects [rad], shape (n, 6).
+            q_grasp: Joint positions at the objects [rad], shape (n, 6).
+            begun: Index of the target whose pick has begun; None: of no target.
+        """
+        left = self.free(people, grasp, q_over, q_grasp)
+        if begun is not None:
+            left[begun] = True
+        return left if left.any() else np.ones_like(left)
 
     def act(
         self, q: Vec, qd: Vec, people: Shapes, target: PickTarget, grasp: GraspRules

@@ -99,3 +99,26 @@ def test_policy_acts_when_a_person_enters_the_path() -> None:
         planner.note(0.0)
         acts.append(planner.act(START, np.zeros(6), BLOCKING, GOAL, GRASP))
     assert any(act is None for act in acts)
+
+
+def test_blocked_targets_are_not_offered_but_the_begun_one_and_all_where_none_is_free() -> None:
+    names = ("cube2", "cube4")
+    x, y, z = station("cube4")
+    near, planner = reaching_to((x, y + 0.05, z + 0.05)), rested()
+    over, low, _ = target_configurations(ARM, GRASP, np.stack([station(one) for one in names]))
+
+    def offered(first: int, begun: int | None = None) -> list[bool]:
+        left = planner.offered(near, GRASP, over[first:], low[first:], begun)
+        return [bool(one) for one in left]
+
+    assert offered(0) == [True, False]
+    assert offered(0, begun=1) == [True, True]
+    assert offered(1) == [True]
+
+
+def test_people_who_moved_are_checked_again() -> None:
+    x, y, z = station("cube4")
+    near, planner = reaching_to((x, y + 0.05, z + 0.05)), rested()
+    ends = GOAL.q_over[None], GOAL.q_grasp[None]
+    answers = [planner.free(people, GRASP, *ends)[0] for people in (near, no_people(), near)]
+    assert answers == [False, True, False]

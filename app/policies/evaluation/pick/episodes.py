@@ -264,10 +264,11 @@ class Evaluator:
             e, here = view.rows[k], np.flatnonzero(np.isfinite(values[k]))
             at = self.batch.state.candidates[e, here]
             grasp, targets = self.batch.settings.grasp, (self._station_q[at], self._grasp_q[at])
-            free = planners[e].free(people, grasp, *targets)
-            free |= (here == view.chosen[k]) & (self.batch.state.phase[e] != APPROACH)
-            if free.any():
-                values[k, here[~free]], distances[k, here[~free]] = -np.inf, np.inf
+            begun = None
+            if self.batch.state.phase[e] != APPROACH:
+                begun = int(np.flatnonzero(here == view.chosen[k])[0])
+            out = here[~planners[e].offered(people, grasp, *targets, begun)]
+            values[k, out], distances[k, out] = -np.inf, np.inf
         return replace(view, values=values, distances=distances)
 
     def _plan(
