@@ -282,7 +282,6 @@ class Damaged(ServiceError):
         what: Kind of object, such as ``"checkpoint"``.
         name: Its name or id.
         remedy: What to do.
-        sha256: The stored checksum.
     """
 
     def __init__(self, what: str, name: str, remedy: str, sha256: str = "") -> None:
@@ -310,7 +309,6 @@ class MissingPackage(ServiceError):
     """An optional library is not installed.
 
     Args:
-        package: Its name.
         what: The feature, such as ``"planning"``.
         remedy: What to do.
     """

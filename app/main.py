@@ -268,7 +268,6 @@ def assemble(
     Args:
         supervisor: Runs the jobs.
         retention: Removes ended jobs of the database.
-        recordings: Recordings of the database.
         data: The data folder.
         worlds: Live worlds by id.
         metrics: Metrics of the application.

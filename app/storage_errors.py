@@ -4,12 +4,7 @@ from app.errors import Conflict, ServiceError
 
 
 class StaleAttempt(Conflict):
-    """The refused write of a worker that no longer holds its job.
-
-    Args:
-        job_id: The job.
-        attempt: The attempt of the worker.
-    """
+    """The refused write of a worker that no longer holds its job."""
 
     def __init__(self, job_id: str, attempt: int) -> None:
         super().__init__(
@@ -29,7 +24,6 @@ class LeaseLost(Conflict):
     Args:
         database: URL of the database without password.
         owner: The server that holds the lease now.
-        epoch: Epoch of its lease.
     """
 
     def __init__(self, database: str, owner: str, epoch: int) -> None:

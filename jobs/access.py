@@ -66,8 +66,6 @@ class JobAccess(Protocol):
         """End the attempt.
 
         Args:
-            state: Its end.
-            result: Result of the job.
             error: Cause of a failure.
             ended_by: The budget that ended it.
             run_s: Run time of all attempts; None leaves it [s].
@@ -78,9 +76,7 @@ class StoreAccess:
     """Access by the database.
 
     Args:
-        store: The database.
         data_dir: The data folder, with the files of the job's replay memory.
-        claim: The attempt.
     """
 
     def __init__(self, store: Store, data_dir: Path, claim: Claim) -> None:

@@ -29,11 +29,7 @@ def lacks_for_training(preset: Preset, cell: Cell) -> str | None:
 
 
 class CellCatalog:
-    """Finds cells by name; safe to use from any thread.
-
-    Args:
-        store: The database.
-    """
+    """Finds cells by name; safe to use from any thread."""
 
     def __init__(self, store: Store) -> None:
         self._store = store

@@ -66,7 +66,6 @@ def compare(store: Store, job_ids: Sequence[str], quantity: str | None = None) -
     """Compare jobs.
 
     Args:
-        store: The database.
         job_ids: The jobs, 1 to 20, each once.
         quantity: Name of the curves to compare; success by default, where it is recorded.
 

@@ -61,7 +61,6 @@ class ImportProcess:
         """Import a file; waits for the result.
 
         Args:
-            content: The file.
             file_name: Its name; the suffix gives the format.
             name: Name of the recording.
             sha256: Of the file.

@@ -50,13 +50,7 @@ class JobInputs(Protocol):
 
 
 class StoreInputs:
-    """Inputs from the database and the data folder.
-
-    Args:
-        store: The database.
-        data_dir: The data folder.
-        job_id: The job.
-    """
+    """Inputs from the database and the data folder."""
 
     def __init__(self, store: Store, data_dir: Path, job_id: str) -> None:
         self._store = store

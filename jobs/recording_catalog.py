@@ -33,7 +33,6 @@ class RecordingCatalog:
     """Finds recordings by name; safe to use from any thread.
 
     Args:
-        store: The database.
         importer: Imports files.
     """
 
@@ -122,7 +121,6 @@ class RecordingCatalog:
         """Import a file and store its recording.
 
         Args:
-            content: The file.
             file_name: Its name; the suffix gives the format.
             name: Name of the recording; made from the file's name if None.
             options: How the file is read.

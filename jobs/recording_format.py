@@ -71,9 +71,7 @@ def packed(
     """Return the stored form of an import.
 
     Args:
-        found: The import.
         name: Name of the recording.
-        file_name: Name of its file.
         sha256: Of its file.
         options: Options with which the file was read.
     """

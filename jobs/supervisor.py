@@ -87,11 +87,9 @@ class Supervisor:
     """Runs queued jobs, at most ``max_running`` at a time.
 
     Args:
-        store: The database.
         data_dir: The data folder: holds the server's lock and the logs of the jobs.
         max_running: Largest number of running jobs.
         executor: Runs the attempts; local processes by default.
-        timeouts: Timeouts.
         min_free_bytes: Free space of the disk below which no job starts [bytes].
         retention: Removes old jobs whenever one has ended.
         tracer: Makes a span of each attempt.

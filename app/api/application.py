@@ -64,8 +64,6 @@ def build_app(
         lifespan: Starts and stops the parts of the service.
         static: Folder of the page.
         token: The token required of every request; None on loopback.
-        version: Version of the service.
-        counts: Metrics of the application.
         traces: Receives a span of each request; None: none is made.
     """
     app = FastAPI(

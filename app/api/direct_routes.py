@@ -88,7 +88,6 @@ async def _answer(
 
     Args:
         found: The route.
-        scope: Scope of the request.
         receive: Receives its messages.
         messages: Filled with the messages of the body.
     """

@@ -26,7 +26,6 @@ def page_of_jobs(services: Services, query: PageQuery, waiting: str | None) -> b
 
     Args:
         services: Parts of the service.
-        query: The page.
         waiting: Reason for which no job runs.
 
     Raises:

@@ -129,8 +129,6 @@ def people_for_policy(
     """Return the people of a request that a policy may observe.
 
     Args:
-        entries: People of the request.
-        cell: The work cell.
         trackers: Open trackers.
         q: The robot's joint positions [rad], shape (6,).
 
@@ -148,7 +146,6 @@ def nearest_places(people: Mapping[int, Person], cell: Cell, q: Vec) -> list[int
 
     Args:
         people: People by their index in the request.
-        cell: The work cell.
         q: The robot's joint positions [rad], shape (6,).
 
     Raises:

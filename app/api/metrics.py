@@ -82,7 +82,6 @@ class Metrics:
         Args:
             method: HTTP method, or ``MESSAGE`` for a message on a socket.
             endpoint: Path of the route, with its parameters' names.
-            status: Status of the answer.
             seconds: Time to the answer [s].
         """
         key = method, endpoint, status

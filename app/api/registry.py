@@ -42,11 +42,7 @@ Build = Callable[[Mapping[str, Any], bytes], P]
 
 
 class CheckpointNames:
-    """The aliases of stored checkpoints, in memory; safe to use from any thread.
-
-    Args:
-        store: The database.
-    """
+    """The aliases of stored checkpoints, in memory; safe to use from any thread."""
 
     def __init__(self, store: Store) -> None:
         self.store = store

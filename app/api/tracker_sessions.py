@@ -173,7 +173,6 @@ class TrackerSessions:
         """Return a new session.
 
         Args:
-            cell: Name of the work cell.
             n_people: Largest number of tracks.
             size: Body lengths [m], shape (12,).
             floor_z: Height of the cell's floor [m].

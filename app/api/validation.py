@@ -168,7 +168,6 @@ class BodyFault(RequestValidationError):
 
     Args:
         errors: Pydantic's errors.
-        model: The model.
     """
 
     def __init__(self, errors: Sequence[Mapping[str, Any]], model: type[BaseModel]) -> None:

@@ -119,7 +119,6 @@ def clean_runs(
     """Return the clean runs of files, named by file (and folder, where two names are alike).
 
     Args:
-        paths: The files.
         options: How all of them are read; found from each file by default.
 
     Raises:

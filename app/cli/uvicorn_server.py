@@ -51,7 +51,6 @@ def new_server(
     """Return the server that runs an application.
 
     Args:
-        app: The application.
         on_tick: Called once a second.
         root_path: Path under which a reverse proxy shows the service and which it removes.
     """

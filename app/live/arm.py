@@ -55,7 +55,6 @@ class LiveArm:
     """State of the robot: joint positions, speeds and accelerations.
 
     Args:
-        cell: Work cell.
         action: Interpretation of the actions of its policy.
     """
 

@@ -62,10 +62,7 @@ class BaseWorld(ABC, Generic[P]):
     """Clock, people and robot of one live cell; scenarios fill in the hooks.
 
     Args:
-        cell: Work cell.
         policy: Selects and executes tasks; None: the robot is idle.
-        id: Name of the world in URLs.
-        people: The people in it.
     """
 
     def __init__(self, cell: Cell, policy: TaskPolicy | None, id: str, people: P) -> None:

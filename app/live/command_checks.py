@@ -70,7 +70,6 @@ def check(command: Command, cell: Cell, people: Sequence[int]) -> None:
     """Compare a command with a work cell.
 
     Args:
-        command: The command.
         cell: Work cell of the world.
         people: Ids of the people in the cell.
 
@@ -191,7 +190,6 @@ def people_after(command: Command, people: tuple[int, ...]) -> tuple[int, ...]:
     """Return the ids of the people in a cell after a valid command, in order.
 
     Args:
-        command: The command.
         people: Ids before it.
     """
     match command:

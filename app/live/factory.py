@@ -28,7 +28,6 @@ def new_world(
         cell: Work cell that :func:`lacks_for_live` accepts.
         policy: Moves the robot of a pick or sorting cell; None: the robot is idle.
         seed: Seed of people and tasks.
-        id: Name of the world in URLs.
         sorting_policy: Policy of a sorting cell; None: the planner selects every move.
         reach_policy: Policy of a reach cell; None: straight motion to the goals.
     """

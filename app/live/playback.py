@@ -45,7 +45,6 @@ class PlayedMotion:
     """Playback of one run of a recording.
 
     Args:
-        recording: The run.
         place: Cell with the home position of the person.
         worker: Person with the walking area.
     """

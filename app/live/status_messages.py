@@ -38,7 +38,6 @@ def resting(status: Status, goal: str | None, label: Label) -> str:
     """Return why the robot does not move.
 
     Args:
-        status: Status of the robot.
         goal: Station the robot is at, if any.
         label: Names of stations.
     """

@@ -15,7 +15,6 @@ class WorldHandle:
     """Commands in, immutable snapshots out; for use from any thread.
 
     Args:
-        id: Name of the world in URLs.
         cell: Work cell, against which commands are checked.
         first: Initial snapshot.
     """

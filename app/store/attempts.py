@@ -82,8 +82,6 @@ def heartbeat(
     """Record a heartbeat and return the job, with ``cancel_requested``.
 
     Args:
-        store: The database.
-        claim: The attempt that writes.
         waiting: Reason for which its worker cannot write.
         run_s: Run time of all attempts; None leaves it [s].
 
@@ -109,8 +107,6 @@ def record_progress(
     """Add a point to the job's curve.
 
     Args:
-        store: The database.
-        claim: The attempt that writes.
         step: Steps done, above every recorded step.
         values: Named finite numbers; None where not defined.
         total_steps: Steps to do, where known.
@@ -148,10 +144,7 @@ def record_checkpoint(
     """Store the policy of a step and, in the same transaction, the state to resume from.
 
     Args:
-        store: The database.
-        claim: The attempt that writes.
         step: Steps done; a checkpoint of the same step is replaced.
-        policy: The policy.
         resume: Stored beside the job's last one; earlier ones are deleted.
 
     Raises:
@@ -183,8 +176,6 @@ def load_resume(
     """Return the newest undamaged resume state of a job; None where there is none.
 
     Args:
-        store: The database.
-        job_id: The job.
         usable: Whether what a state refers to is there, such as its files.
     """
     with store.reading() as connection:
@@ -204,8 +195,6 @@ def resume_earlier(store: Store, claim: Claim, step: int | None) -> None:
     The job's points and checkpoints beyond that state are deleted.
 
     Args:
-        store: The database.
-        claim: The attempt.
         step: Step of the state; None: the attempt starts without one.
 
     Raises:

@@ -27,8 +27,6 @@ def put_cell(store: Store, name: str, definition: Mapping[str, Any]) -> bool:
     """Store a cell; the same one again has no effect.
 
     Args:
-        store: The database.
-        name: Name of the cell.
         definition: Its content, JSON data.
 
     Returns:

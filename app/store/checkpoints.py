@@ -99,7 +99,6 @@ def list_checkpoints(
     """Return one page of the checkpoints, newest first.
 
     Args:
-        store: The database.
         job_id: Only checkpoints of this job.
         cursor: ``next_cursor`` of the page before; None for the first.
         limit: Length of the page, 1 to 200.

@@ -34,10 +34,7 @@ def finish(
     """End a job as succeeded or cancelled.
 
     Args:
-        store: The database.
-        claim: The attempt that writes.
         state: Its state; a cancelled job keeps its state to resume from.
-        result: Its result.
         ended_by: The budget that ended it; it keeps its state to resume from.
         run_s: Run time of all attempts; None leaves it [s].
 
@@ -81,7 +78,6 @@ def crash(store: Store, claim: Claim, error: str, *, max_failures: int) -> JobRe
     """Record the crash of an attempt; queue the job again up to a number of crashes.
 
     Args:
-        store: The database.
         claim: The crashed attempt.
         error: The cause, as far as known.
         max_failures: The job fails with this number of crashes.

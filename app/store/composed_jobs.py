@@ -45,8 +45,6 @@ def record(store: Store, job_id: str, done: int, values: Mapping[str, float | No
     """Add a point to the curve of a job, where more of its parts have ended than before.
 
     Args:
-        store: The database.
-        job_id: The job.
         done: Number of ended trials or evaluations.
         values: Named numbers; None where not defined.
     """

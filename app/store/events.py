@@ -22,8 +22,6 @@ def list_events(
     """Return the events of a job with an id above ``after``, oldest first.
 
     Args:
-        store: The database.
-        job_id: The job.
         after: Last known id (``Last-Event-ID``), 0 for all.
         limit: Largest number of events.
     """

@@ -35,7 +35,6 @@ def resume_job(
     Crashes before count no longer.
 
     Args:
-        store: The database.
         job_id: A job that is cancelled, has failed, or was ended by a budget.
         budget: Changed budgets by name; None removes one.
 

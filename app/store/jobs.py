@@ -37,8 +37,6 @@ def create_job(store: Store, new: NewJob, *, idempotency_key: str | None = None)
     """Queue a job; the same key with the same spec returns the existing job.
 
     Args:
-        store: The database.
-        new: The job.
         idempotency_key: Identifies this submission.
 
     Raises:
@@ -93,7 +91,6 @@ def list_jobs(
     """Return one page of the jobs, newest first.
 
     Args:
-        store: The database.
         cursor: ``next_cursor`` of the page before; None for the first.
         limit: Length of the page, 1 to 200.
         state: Only jobs in this state.
@@ -119,7 +116,6 @@ def list_evaluations(
     """Return one page of the succeeded evaluations, newest first.
 
     Args:
-        store: The database.
         protocol: Only of this protocol.
         checkpoint: Only of the checkpoint with this SHA-256.
         cursor: ``next_cursor`` of the page before; None for the first.

@@ -15,8 +15,6 @@ def list_metrics(
     """Return the points of a job's curve beyond ``after_step``, in order of steps.
 
     Args:
-        store: The database.
-        job_id: The job.
         after_step: Last known step; -1 for all.
         limit: Largest number of points.
 

@@ -63,8 +63,6 @@ def find_same(store: Store, name: str, sha256: str) -> StoredRecording | None:
     """Return the recording of a file under a name; None where it could be stored now.
 
     Args:
-        store: The database.
-        name: Name of the recording.
         sha256: Of the file.
 
     Raises:

@@ -24,7 +24,6 @@ def delete_job(store: Store, job_id: str, acting: Mapping[str, str]) -> tuple[st
     Checkpoints with an alias, imported ones and those of other jobs stay.
 
     Args:
-        store: The database.
         job_id: The job.
         acting: SHA-256 of each checkpoint that acts, with its place: ``"world main"``.
 
@@ -61,8 +60,6 @@ def prune(
     A job with a checkpoint in use stays.
 
     Args:
-        store: The database.
-        keep_jobs: Number of ended jobs to keep.
         keep_states: Number of ended jobs whose states are kept.
         acting: As for :func:`delete_job`.
 

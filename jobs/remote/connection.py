@@ -33,7 +33,6 @@ class ServiceConnection:
     Args:
         address: Address of the service, with the path of a reverse proxy.
         token: Its token; None where it has none.
-        claim: The attempt.
     """
 
     def __init__(self, address: str, token: str | None, claim: Claim) -> None:

@@ -46,7 +46,6 @@ class RayDriver:
 
     Args:
         settings: Settings of the server.
-        claim: The attempt.
     """
 
     def __init__(self, settings: Settings, claim: Claim) -> None:

@@ -21,7 +21,6 @@ class NodeWorker:
     """Starts, polls and stops one process; methods are called one after another.
 
     Args:
-        claim: The attempt.
         settings: Settings of the process, by variable: address and token of the service.
     """
 

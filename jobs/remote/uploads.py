@@ -78,12 +78,7 @@ def require_sha256(name: str, content: bytes) -> None:
 
 
 class WorkerUploads:
-    """Checks and stores what workers on other machines send; safe to use from any thread.
-
-    Args:
-        store: The database.
-        data_dir: The data folder.
-    """
+    """Checks and stores what workers on other machines send; safe to use from any thread."""
 
     def __init__(self, store: Store, data_dir: Path) -> None:
         self._store, self._data_dir = store, data_dir
@@ -95,7 +90,6 @@ class WorkerUploads:
         Args:
             claim: The attempt that sends.
             step: Steps done.
-            content: The file.
             policy_bytes: Length of the policy's part.
 
         Raises:

@@ -49,10 +49,8 @@ class LiveCell:
     """A live work cell with its viewer.
 
     Args:
-        cell: Work cell.
         policy: Initial policy for task selection; None: the robot is idle.
         seed: Seed of the human motion.
-        id: Name of the world in URLs.
         sorting_policy: Policy of a sorting cell; None: the planner selects every move.
         reach_policy: Policy of a reach cell; None: straight motion to the goals.
     """

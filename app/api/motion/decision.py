@@ -59,7 +59,6 @@ def decide(
 
     Args:
         request: State, people and goal.
-        cell: Its work cell.
         decider: The policy, trained in that cell.
         trackers: The open trackers.
 

@@ -89,7 +89,6 @@ class MotionLoad:
         """Count a decision of a socket.
 
         Args:
-            socket: The socket.
             seconds: Time of the decision on the clock [s].
             whole: Whether no part of it was left out; only such decisions enter the mean.
         """

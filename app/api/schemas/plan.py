@@ -205,8 +205,6 @@ class PlanAnswer(Answer):
 
         Args:
             plan: The plan; its decision counts people as the request does.
-            query: The query.
-            request: The request.
             names: Names of the task.
             people: Use of each person.
         """

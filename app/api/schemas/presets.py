@@ -56,7 +56,6 @@ class PresetPublic(Answer):
         """Describe a preset by its name.
 
         Args:
-            name: Name of the preset.
             cells: Work cells that it can be trained in; a field where there are several.
         """
         own = PRESETS[name].cell

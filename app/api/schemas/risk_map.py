@@ -118,9 +118,7 @@ class RiskMapAnswer(Answer):
         """Return the answer of a map.
 
         Args:
-            found: The map.
             reached: Whether the hand reaches each position, shape (m,).
-            request: The request.
             people: Use of each person.
             checkpoint: SHA-256 of the checkpoint.
         """

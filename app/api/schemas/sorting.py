@@ -288,10 +288,7 @@ def outside_of(
     """Return the inputs outside the training range; none without a policy.
 
     Args:
-        decision: The decision.
-        state: Its state.
         names: Names of the task.
-        policy: Its policy.
         own: The cell's failure probabilities, shape (K,).
     """
     if policy is None:

@@ -23,7 +23,6 @@ class DraggedPerson:
     """Joint positions and speeds of one person that follows targets.
 
     Args:
-        cell: Work cell.
         q: Initial posture [m, rad], shape (18,).
     """
 

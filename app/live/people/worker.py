@@ -41,10 +41,7 @@ class LiveWorker:
     """Posture, speed, size and motion source of one person.
 
     Args:
-        cell: Work cell.
         place: The cell restricted to this person: home, stations and walking area.
-        id: Number of the person.
-        seed: Seed of the work.
         q: Initial posture [m, rad], shape (18,); None: already at work.
     """
 

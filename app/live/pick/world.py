@@ -32,10 +32,8 @@ class LivePickWorld(BaseWorld[LiveWorkers]):
     """One live pick-and-place cell.
 
     Args:
-        cell: Work cell.
         policy: Selects and executes tasks; None: the robot is idle.
         seed: Seed of the human motion.
-        id: Name of the world in URLs.
     """
 
     def __init__(

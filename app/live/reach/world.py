@@ -49,7 +49,6 @@ class LiveReachWorld(BaseWorld[LivePedestrians]):
         cell: Cell with a goal region, see ``reach_commands.lacks_for_reaching``.
         policy: Moves the robot; None: straight motion in joint space.
         seed: Seed of goals and walks.
-        id: Name of the world in URLs.
     """
 
     def __init__(

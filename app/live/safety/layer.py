@@ -35,7 +35,6 @@ class LiveSafety:
     """Safety layer of a live world.
 
     Args:
-        robot: Robot of the world.
         cell: Work cell with the settings at the start.
     """
 
@@ -84,7 +83,6 @@ class LiveSafety:
 
         Args:
             wanted: Motion without the layer.
-            people: The people at present.
         """
         robot, layer = self._robot, self._layer
         decided = layer.decide(robot.q, robot.qd, wanted.c, wanted.d, people)

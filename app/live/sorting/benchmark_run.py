@@ -96,7 +96,6 @@ class SortingTestRun:
 
         Args:
             state: Present state, without a held block.
-            moves: Number of moves in this test.
             idle_s: Time for which the robot has been idle [s].
         """
         if not self._waiting:

@@ -55,7 +55,6 @@ class LiveSortingWorld(BaseWorld[LiveWorkers]):
         cell: Sorting cell, see ``layout.lacks_for_sorting``.
         policy: Moves the robot and selects among equal moves; None: the robot is idle.
         seed: Seed of tasks, grasps and human motion.
-        id: Name of the world in URLs.
         sorting_policy: Sorting policy; None: the planner selects every move.
     """
 

@@ -76,9 +76,6 @@ class SortingDQN(DQN, Stateful):
     """Double, dueling, prioritised, masked DQN with optional expert labels.
 
     Args:
-        preset: Hyper-parameters.
-        env: The environments.
-        tasks: Their batch.
         seed: Seed of networks, replay and exploration.
         expert: Marks optimal moves; needed where the preset uses labels.
     """

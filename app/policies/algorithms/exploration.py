@@ -54,7 +54,6 @@ class PerEnvAR1Noise(Stateful):
         shape: Environments and numbers of an action, (n_envs, n_act).
         dt: Control cycle [s].
         config: Largest scale, correlation time and greedy share.
-        rng: Random numbers.
     """
 
     STATE = ("_noise", "_rng")
@@ -91,7 +90,6 @@ class OUNoise(Stateful):
         shape: Environments and numbers of an action, (n_envs, n_act).
         config: Rate ``ou_theta``, scale ``ou_sigma`` and time step ``ou_dt``.
         started: Returns which environments are at the start of an episode, shape (n_envs,).
-        rng: Random numbers.
     """
 
     STATE = ("_noise", "_rng")
@@ -121,11 +119,8 @@ class OptionExploration(Stateful):
     """AR(1) noise, and temporally extended options in every second noisy environment.
 
     Args:
-        noise: The noise.
-        batch: The environments.
         configurations: Goals of options besides home [rad], shape (n, 6).
         rate: Probability per control cycle that an option starts.
-        rng: Random numbers.
     """
 
     STATE = ("_noise", "_rng", "_left", "_goal")

@@ -30,10 +30,8 @@ class ParameterNoise(Stateful):
     """Perturbed copies of an actor, one per environment.
 
     Args:
-        batch: The environments.
         sigma: Standard deviation of the weights at first, and ``delta``, the wanted distance of
             the actions.
-        rng: Random numbers.
     """
 
     STATE = ("sigma", "_copies", "_rng")

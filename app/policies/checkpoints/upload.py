@@ -51,7 +51,6 @@ def split(content: bytes, max_manifest: int) -> tuple[object, bytes]:
     """Return the manifest and the tensors of a file; the tensors are not read.
 
     Args:
-        content: The file.
         max_manifest: Longest manifest [bytes].
 
     Raises:

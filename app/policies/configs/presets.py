@@ -39,7 +39,6 @@ def resolve(name: str, overrides: Mapping[str, object]) -> Preset:
     """Return a preset with overrides applied.
 
     Args:
-        name: Name of the preset.
         overrides: Fields by group, and the name of the work cell as ``cell``.
 
     Raises:

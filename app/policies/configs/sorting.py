@@ -187,7 +187,6 @@ def _printed(name: str, cell: str, n_t: int, kind: str) -> SortingPreset:
 
     Args:
         name: Name of the preset.
-        cell: Work cell.
         n_t: Steps N_t over which exploration and curriculum fade.
         kind: Kind of the network.
     """

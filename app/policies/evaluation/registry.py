@@ -92,7 +92,6 @@ def evaluate(
     """Run a protocol and return its result, ready for JSON.
 
     Args:
-        name: Name of the protocol.
         checkpoint: Policy; None only for protocols without one.
         episodes: Number of episodes; by default that of the protocol.
         seed: Seed of the episodes.
@@ -173,7 +172,6 @@ def check_motions(
     """Check that recorded motion is given to protocols that use it, and to no others.
 
     Args:
-        name: Name of the protocol.
         given: Names of the recordings.
         field: Name of the field in the caller's input.
         how: Hint for the message: how recordings are given.

@@ -21,7 +21,6 @@ class ReportedRows(list[Json]):
     """Rows of a result; each is reported when it is appended.
 
     Args:
-        total: Number of rows of the result.
         on_row: Callback.
     """
 

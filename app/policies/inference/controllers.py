@@ -85,7 +85,6 @@ class PolicyQuery(Protocol):
         """Return actions, shape (k, 6).
 
         Args:
-            batch: All environments.
             rows: Numbers of the queried ones, shape (k,).
             who: Number of the only person; None for all people.
         """
@@ -198,7 +197,6 @@ def controller_of(actor: ReachActor, mode: str | None = None) -> Controller:
     """Return the controller of a policy in an inference mode.
 
     Args:
-        actor: The policy.
         mode: The mode; None interpolates where the policy has training targets.
 
     Raises:

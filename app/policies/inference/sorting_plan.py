@@ -133,7 +133,6 @@ class SortingPlanner:
 
     Args:
         policy: Pick policy that is valid in the cell.
-        cell: Sorting cell.
     """
 
     def __init__(self, policy: TaskPolicy, cell: Cell) -> None:

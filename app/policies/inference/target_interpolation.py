@@ -64,7 +64,6 @@ class Interpolation:
 
         Args:
             obs: Observations of each target, shape (n, K, obs_size).
-            mix: Their weights.
         """
         used = mix.weights > 0.0
         act = np.zeros((*used.shape, 6))

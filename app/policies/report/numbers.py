@@ -40,7 +40,6 @@ def curve_end(found: Json, preset: str, key: str, unit: str = "", task: str = ""
 
     Args:
         found: Content of the result file.
-        preset: Name of the preset.
         key: Key of the point; ``standing_still`` is the return of a robot that does not move.
         unit: Unit of a quantity; empty for a rate.
         task: Task of the curve; empty where the file has one task.
@@ -67,7 +66,6 @@ def preset_value(preset: str, path: str, factor: str = "1") -> str:
     """Return a field of a preset.
 
     Args:
-        preset: Name of the preset.
         path: Group and field: ``"learning.gamma"``.
         factor: Factor on a number.
     """

@@ -48,7 +48,6 @@ class MemoryFiles:
         """Write the rows since the last call; return the files with all present rows.
 
         Args:
-            memory: Replay buffer.
             n_rows: Rows added since the start of the training.
             following: Present observations, (n_envs, obs_size).
 

@@ -50,9 +50,6 @@ def collect(
     """Return labelled observations of episodes under a greedy policy.
 
     Args:
-        batch: Environments.
-        actor: The policy.
-        critic: Its critics.
         n_steps: Steps of all environments.
         seed: Seed of the steps that are kept.
     """

@@ -180,10 +180,8 @@ def fit_outcomes(
     """Return the outcome probabilities of a trained policy.
 
     Args:
-        preset: Training configuration.
         seed: Seed of the training.
         cell: Work cell of the training.
-        policy: The trained policy.
 
     Returns:
         The ensemble; None where too few episodes ended to fit one.

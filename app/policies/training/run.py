@@ -74,7 +74,6 @@ class TrainingRun:
     """One attempt at a training.
 
     Args:
-        preset: All hyper-parameters.
         seed: Seed of everything random.
         cell: Work cell trained in.
         model: Stable-Baselines3's algorithm.

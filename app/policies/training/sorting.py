@@ -35,7 +35,6 @@ def start(preset: SortingPreset, seed: int, cell: Cell) -> tuple[TrainingRun, So
     """Return a run of the preset and its model.
 
     Args:
-        preset: All hyper-parameters.
         seed: Seed of everything random.
         cell: Work cell trained in.
 

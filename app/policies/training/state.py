@@ -109,12 +109,7 @@ def _leaves(tree: Mapping[str, Any], path: str = "") -> Iterator[tuple[str, Any]
 
 
 class NetworkState:
-    """Networks and optimisers as a part of a state.
-
-    Args:
-        modules: Networks by name.
-        optimizers: Optimisers by name.
-    """
+    """Networks and optimisers as a part of a state."""
 
     def __init__(
         self,
@@ -133,11 +128,7 @@ class NetworkState:
 
 
 class Priorities:
-    """Priorities and random generator of a replay memory as a part of a state.
-
-    Args:
-        memory: The replay memory.
-    """
+    """Priorities and random generator of a replay memory as a part of a state."""
 
     def __init__(self, memory: PrioritisedReplay) -> None:
         self._memory = memory

@@ -87,9 +87,6 @@ def start_td3(
     """Return a training and its monitor.
 
     Args:
-        preset: All hyper-parameters.
-        seed: Seed of all random numbers.
-        cell: Work cell of the training.
         scenario: Environments, exploration and networks.
     """
     env = BatchVecEnv(scenario.task)
@@ -137,7 +134,6 @@ def play(
 
     Args:
         actor: Returns actions of observations.
-        batch: The environments.
         gamma: Discount factor of the returns per step.
 
     Returns:

@@ -77,7 +77,6 @@ def train(
     """Train a preset, from the start or from where an attempt was interrupted.
 
     Args:
-        preset: All hyper-parameters.
         seed: Seed of everything random.
         on_progress: Called every ``progress_steps``.
         on_checkpoint: Called every ``checkpoint_steps`` and at the end or stop with the step,
@@ -118,7 +117,6 @@ def start(
     """Return a training that has not started yet, with all parts of its state, and its reports.
 
     Args:
-        preset: All hyper-parameters.
         seed: Seed of everything random.
         cell: Work cell trained in.
         calls: Receivers of the reports.

@@ -40,7 +40,6 @@ def check_cell(cell: Cell, known: Sequence[Fault] = ()) -> list[Fault]:
     """Return all faults of a cell.
 
     Args:
-        cell: Work cell.
         known: Faults found before, in reading; nothing is built on the values they name.
     """
     faults = [*_counts(cell, known), *_ids(cell), *numbers(cell)]

@@ -139,7 +139,6 @@ def require_cell(cell: Cell, name: str, sha256: str) -> None:
 
     Args:
         cell: Work cell in which the policy acts.
-        name: Name of the cell it was trained in.
         sha256: Identity of that cell's content.
 
     Raises:

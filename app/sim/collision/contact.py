@@ -64,8 +64,6 @@ def clearance(
     """Return the distances of the robot at ``q``.
 
     Args:
-        arm: Robot in its cell.
-        people: Shared data of the people.
         q: Joint positions [rad], shape (6,).
         human_q: The workers' joints [m, rad], shape (W, 18).
         cylinders: The walkers' x, y and radius [m], shape (C, 3).
@@ -89,8 +87,6 @@ def contact(
     """Check one control period for contact, including between its ends.
 
     Args:
-        arm: Robot in its cell.
-        people: Shared data of the people.
         path: The robot's path in the period.
         human_q: The workers' joints at start and end [m, rad], shape (W, 18) each.
         cylinders: The walkers' x, y, radius at start and end [m], shape (C, 3) each.
@@ -143,7 +139,6 @@ def worker_distances(arm: Arm, people: People, q: Vec, human_q: Vec, sizes: Vec)
     """Return the distance of the robot at ``q`` to each worker [m], shape (W,).
 
     Args:
-        arm: Robot in its cell.
         people: Shared data of W workers.
         q: Joint positions [rad], shape (6,).
         human_q: The workers' joints [m, rad], shape (W, 18).
@@ -164,7 +159,6 @@ def pedestrian_distances(arm: Arm, people: People, q: Vec, cylinders: Vec) -> Ve
     """Return the distance of the robot at ``q`` to each walking cylinder [m], shape (C,).
 
     Args:
-        arm: Robot in its cell.
         people: Shared data with the height of cylinders.
         q: Joint positions [rad], shape (6,).
         cylinders: x, y and radius of each [m], shape (C, 3).

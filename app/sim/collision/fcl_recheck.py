@@ -107,7 +107,6 @@ def robot_ends(robot: Robot, capsules: RobotCapsules, q: Vec) -> tuple[Vec, Vec]
 
     Args:
         robot: Its kinematics.
-        capsules: Its n capsules.
         q: Joint positions [rad], shape (n_steps, 6).
     """
     poses = np.stack([robot.link_poses(row) for row in q])[:, capsules.link]

@@ -157,7 +157,6 @@ class CollisionReference:
     """Robot, person and cell as fcl bodies; keeps the last pose, so one per thread.
 
     Args:
-        cell: The work cell.
         mesh: ``raw`` triangles for verdicts, ``hull`` for distances and solid bodies.
     """
 

@@ -86,7 +86,6 @@ def picture(cell: Cell, robot_q: Vec, people: Sequence[Solid], task: Sequence[So
     """Return an image of a cell, uint8, shape (HEIGHT, WIDTH, 3).
 
     Args:
-        cell: Work cell.
         robot_q: The robot's joints [rad], shape (6,).
         people: From :func:`people_solids`.
         task: Targets or blocks.
@@ -167,7 +166,6 @@ def worker_solids(cell: Cell, q: Vec, sizes: Vec | None = None) -> list[Solid]:
     """Return workers in their postures.
 
     Args:
-        cell: Work cell.
         q: Their joints [m, rad], shape (W, 18).
         sizes: Their sizes [m], shape (W, body.N_SIZE); None for the cell's person.
     """

@@ -19,7 +19,6 @@ class SingleEnv(gymnasium.Env[NDArray[Any], Any]):
     ``gymnasium.wrappers.RecordVideo`` records videos if moviepy is installed.
 
     Args:
-        task: The environment.
         render_mode: ``rgb_array``, or None.
         render_fps: Steps per second.
 

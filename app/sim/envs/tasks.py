@@ -118,7 +118,6 @@ class ArmTask:
     """A batch of robots with its spaces, for training.
 
     Args:
-        batch: The environments.
         sees_time: Whether the time left is observed. If so, a time-out terminates an episode,
             otherwise it truncates it.
     """
@@ -148,7 +147,6 @@ class RobotTask(ArmTask):
     """A batch of robots, people and targets.
 
     Args:
-        batch: The environments.
         sees_time: Whether the time left is observed; see :class:`ArmTask`.
     """
 

@@ -32,7 +32,6 @@ class BatchVectorEnv(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
     | | step |
 
     Args:
-        task: The environments.
         render_mode: ``rgb_array``, or None.
         render_fps: Steps per second.
         autoreset_mode: One of Gymnasium's modes, or its value.

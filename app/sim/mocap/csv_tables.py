@@ -64,7 +64,6 @@ def read_csv(text: str, names: Mapping[str, str] | None = None) -> AngleTrack:
     """Return the joint angles of a CSV file.
 
     Args:
-        text: Content of the file.
         names: Name map, theirs to ours.
 
     Raises:

@@ -44,7 +44,6 @@ def read_csv_text(text: str, known: Sequence[str]) -> CsvText:
     """Return the declarations and the table of a CSV file.
 
     Args:
-        text: Content of the file.
         known: Names of columns that identify the line of names and the separator.
 
     Raises:

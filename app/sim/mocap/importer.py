@@ -132,7 +132,6 @@ def read_motion(
     """Import a file of recorded motion.
 
     Args:
-        content: Content of the file.
         file_name: Name of the file; its extension selects the format.
         options: Stated properties of the file.
 

@@ -190,7 +190,6 @@ def require_one_unit(
             without legs.
         dt: Time between two frames [s].
         stature: Stature of the person.
-        unit: Unit of the skeleton.
 
     Returns:
         A note if the file's zero is not the floor, otherwise an empty text.

@@ -72,7 +72,6 @@ def read_opensim(text: str, names: Mapping[str, str] | None = None) -> AngleTrac
     """Return the joint angles of a ``.mot`` or ``.sto`` file.
 
     Args:
-        text: Content of the file.
         names: Name map, theirs to ours.
 
     Raises:

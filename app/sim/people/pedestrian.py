@@ -165,7 +165,6 @@ def walk(
     """Simulate one pedestrian without a robot or a constraint on its start.
 
     Args:
-        walker: Settings of the pedestrian.
         seed: Seed of the batch.
         seconds: Duration [s], rounded to whole periods.
         dt: Control period [s].

@@ -54,7 +54,6 @@ def build_reach_library(
     """Draw ``variants`` postures for each body, place and hand of a cell.
 
     Args:
-        cell: Work cell.
         seed: Seed of stances, elbows and grips.
         bodies: Body sizes; None for the cell's own.
         variants: Postures per body, place and hand.
@@ -155,7 +154,6 @@ def reach_script(
     """Return a single reach between two points with deterministic postures.
 
     Args:
-        cell: Work cell.
         hand: Working hand.
         palms: Initial and final palm position [m], shape (3,) each; equal for no motion.
         pelvis_x: Initial and final pelvis x [m]; None follows the palm.
@@ -174,7 +172,6 @@ def standing_reach(cell: Cell, palm: Vec, hand: Hand, pelvis_x: float | None) ->
     """Return a posture with one palm at a point and the other at the table's edge.
 
     Args:
-        cell: Work cell.
         palm: Position of the palm [m], shape (3,).
         hand: The hand.
         pelvis_x: Pelvis x [m]; None follows the palm.

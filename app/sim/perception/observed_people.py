@@ -272,7 +272,6 @@ def nearest_index(arm: Arm, shared: People, q: Vec, people: Sequence[Person]) ->
     """Return the index of the person nearest to the robot; None without people.
 
     Args:
-        arm: Robot in its cell.
         shared: From :func:`~app.sim.scene.scene.people_of`.
         q: The robot's joint positions [rad], shape (6,).
         people: People, any number.
@@ -300,7 +299,6 @@ def checked_vector(path: str, values: Vec, size: int, low: Vec, high: Vec, unit:
 
     Args:
         path: Name of the field in errors.
-        values: Values.
         size: Required number of values.
         low: Lower bounds, shape (size,).
         high: Upper bounds, shape (size,).

@@ -161,8 +161,6 @@ class PickBatch(EnvBatch):
     """Many independent pick environments, stepped together by one thread.
 
     Args:
-        cell: Work cell.
-        n_envs: Number of environments.
         seed: Seed; episode ``k`` of environment ``e`` is determined by (seed, e, k).
         settings: Settings of the scenario.
         first_env: Number of the first environment: environments of a batch that starts at ``k``

@@ -33,13 +33,10 @@ class MonitoredPickBatch(PickBatch):
     """Many independent pick environments under the safety layer.
 
     Args:
-        cell: Work cell.
-        n_envs: Number of environments.
         seed: Seed; see :class:`~app.sim.pick.batch.PickBatch`.
         settings: Settings of the scenario.
         safety: Assumptions of the safety layer.
         monitoring: Further settings.
-        first_env: Number of the first environment.
     """
 
     STATE = (*PickBatch.STATE, "_monitor")

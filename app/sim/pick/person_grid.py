@@ -35,7 +35,6 @@ class PersonGrid:
         """Return the posture at each position, and whether it is reached.
 
         Args:
-            person: The person.
             size: The person's body dimensions [m], shape (12,).
 
         Returns:

@@ -83,7 +83,6 @@ class RestingPeoplePlanner:
 
         Args:
             people: People at this moment.
-            grasp: Rules of the grasp.
             q_over: Joint positions over the objects [rad], shape (n, 6).
             q_grasp: Joint positions at the objects [rad], shape (n, 6).
         """
@@ -108,7 +107,6 @@ class RestingPeoplePlanner:
 
         Args:
             people: People at this moment.
-            grasp: Rules of the grasp.
             q_over: Joint positions over the objects [rad], shape (n, 6).
             q_grasp: Joint positions at the objects [rad], shape (n, 6).
             begun: Index of the target whose pick has begun; None: of no target.
@@ -131,7 +129,6 @@ class RestingPeoplePlanner:
             qd: Joint speeds [rad/s], shape (6,).
             people: People at this moment.
             target: Target and phase of the pick.
-            grasp: Rules of the grasp.
         """
         free = self.free(people, grasp, target.q_over[None], target.q_grasp[None])
         self.blocked = not free[0]

@@ -97,7 +97,6 @@ def time_path(
     Args:
         path: Postures joined by straight motions [rad], shape (n, 6), n >= 1. For a start in
             motion the first one is :func:`stopping_point`.
-        limits: Limits of the motion.
         qd0: Joint speeds at the start [rad/s], shape (6,), inside the limits; at rest if None.
         stops: Corners (places in ``path``) to stop at; 0 means to brake before anything else.
 
@@ -131,7 +130,6 @@ def time_free_path(
     Args:
         checker: People and margins.
         path: A free path; see :func:`time_path`.
-        limits: Limits of the motion.
         qd0: Joint speeds at the start [rad/s], shape (6,); at rest if None.
 
     Returns:

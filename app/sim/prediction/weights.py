@@ -49,7 +49,6 @@ def worker_predictor(network: Network, mean: Vec, scale: Vec) -> WorkerPredictor
     """Return a predictor of a network with its own work space.
 
     Args:
-        network: Network.
         mean: Mean of its inputs, shape (36,).
         scale: Their scales, shape (36,).
     """

@@ -93,7 +93,6 @@ def draw_keyframe(
         size: The person's size [m], shape (12,).
         target: Point of the station [m], shape (3,); None: at home.
         hand: The hand that works.
-        rng: Source of randomness.
         style: Style; None draws one.
 
     Returns:
@@ -156,7 +155,6 @@ def _held_palm(
         size: The person's size [m], shape (12,).
         pelvis: Pelvis x [m], y [m], yaw [rad].
         side: -1 for the right hand, 1 for the left.
-        rng: Source of randomness.
         ahead: Range of the distance in front of the pelvis [m], for the median person.
     """
     arm = 0 if side < 0 else 1
@@ -209,7 +207,6 @@ def height_over_table(cell: Cell, points: Vec) -> Vec:
     """Return the height of points over the table [m], infinite beside the table, shape (...).
 
     Args:
-        cell: Work cell.
         points: Points [m], shape (..., 3).
     """
     table = cell.table

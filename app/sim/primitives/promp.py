@@ -231,7 +231,6 @@ def moments(promp: ProMP, phase: Vec) -> tuple[Vec, Vec]:
     """Return mean and covariance of the joint positions at each phase.
 
     Args:
-        promp: Primitive.
         phase: Phases in [0, 1], shape (m,).
 
     Returns:
@@ -248,7 +247,6 @@ def gain(promp: ProMP, rows: Vec, noise: Vec) -> Vec:
     """Return ``K = Sigma A^T (A Sigma A^T + R)^-1``, shape (n_weights, m).
 
     Args:
-        promp: Primitive.
         rows: Observation matrix A of the weights, shape (m, n_weights).
         noise: Covariance R of the observation, shape (m, m); EXACT is added.
     """
@@ -261,7 +259,6 @@ def observe(promp: ProMP, rows: Vec, values: Vec, noise: Vec) -> ProMP:
     """Return the primitive after an observation ``y = A w + e``, ``e ~ N(0, R)``.
 
     Args:
-        promp: Primitive.
         rows: A, shape (m, n_weights), weights joint by joint.
         values: y, shape (m,).
         noise: R, shape (m, m); zero: exactly.
@@ -292,7 +289,6 @@ def draw_like(weights: Vec, n: int, rng: np.random.Generator, floor: float = FLO
     Args:
         weights: Weights of each demonstration, shape (m, n_joints, n_basis).
         n: Number of draws.
-        rng: Source of chance.
         floor: Standard deviation of the floor [m, rad].
     """
     mean = weights.mean(axis=0)

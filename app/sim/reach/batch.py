@@ -257,7 +257,6 @@ class ReachBatch(EnvBatch):
 
     Args:
         cell: Work cell with a goal region.
-        n_envs: Number of environments.
         seed: Seed; episode ``k`` of environment ``e`` is determined by (seed, e, k).
         settings: Settings of the scenario.
         first_env: Number of the first environment: environments of a batch that starts at ``k``

@@ -49,7 +49,6 @@ def halton_targets(region: GoalRegion, n: int = N_HALTON) -> Vec:
     """Return targets of low discrepancy in a box [m], shape (n, 3); its corners come first.
 
     Args:
-        region: Box of goals.
         n: Number of targets, including the 8 corners.
 
     Raises:

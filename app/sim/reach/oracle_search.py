@@ -104,7 +104,6 @@ class OracleSearch:
 
     Args:
         batch: Environments at the start of their episodes; not changed.
-        seed: Seed of the search.
         n_copies: Environments of the batch of resimulations.
     """
 
@@ -137,7 +136,6 @@ class OracleSearch:
         """Run scripted resimulations of some episodes.
 
         Args:
-            episodes: Numbers of the episodes.
             n_each: Resimulations of each.
             at_once: Whether all move to the goal immediately.
         """
@@ -152,7 +150,6 @@ class OracleSearch:
         """Run resimulations of some episodes with a policy.
 
         Args:
-            episodes: Numbers of the episodes.
             n_each: Resimulations of each.
             acts: The policy: actions of all environments of a batch.
         """

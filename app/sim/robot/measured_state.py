@@ -170,7 +170,6 @@ def returning(arm: Arm, q: Vec, act: Vec) -> tuple[Vec, JointLimits]:
     turns inward as fast as its acceleration (and jerk) limits allow.
 
     Args:
-        arm: Robot in its cell.
         q: Joint positions [rad], shape (6,).
         act: Action in [-1, 1], shape (6,).
 
@@ -194,7 +193,6 @@ def admitting(arm: Arm, q: Vec, qd: Vec) -> Arm:
     distance of people. Acceleration limits are kept: they determine the stop.
 
     Args:
-        arm: Robot in its cell.
         q: Joint positions as measured [rad], shape (6,).
         qd: Joint speeds as measured [rad/s], shape (6,).
     """

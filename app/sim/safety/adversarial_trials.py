@@ -131,9 +131,7 @@ def run_trial(
 
     Args:
         settings: Assumptions and true conditions.
-        n_episodes: Number of episodes.
         seed: Seed; episode ``k`` is fixed by (seed, k).
-        first: Number of the first episode.
 
     Raises:
         InvalidInput: The number of episodes or of people is 0.

@@ -143,7 +143,6 @@ def contact_speeds(settings: SafetySettings, n_columns: int, n_cylinders: int) -
     Args:
         settings: Assumptions; without power and force limiting nothing may be touched.
         n_columns: Capsules; every twelve are a worker, the rest fills up.
-        n_cylinders: Cylinders.
 
     Returns:
         Capsules first, then cylinders, shape (n_columns + n_cylinders,).
@@ -164,9 +163,7 @@ def separation_rule(
     """Return the settings for the kernels.
 
     Args:
-        settings: Assumptions.
         n_columns: Number of capsules; see :func:`contact_speeds`.
-        n_cylinders: Number of cylinders.
         known: Whether the velocities of cylinders are known.
     """
     speed = np.full(n_columns + n_cylinders, settings.human_speed)
@@ -185,7 +182,6 @@ class SafetyLayer:
 
     Args:
         arm: From :func:`~app.sim.scene.scene.arm_of`.
-        settings: Assumptions.
     """
 
     def __init__(self, arm: Arm, settings: SafetySettings) -> None:
@@ -353,7 +349,6 @@ class SafetyLayer:
 
         Args:
             column: Part of the people.
-            people: People as observed.
             separation: Distance of the part to the robot [m].
             seconds: Time over which the speed of approach is averaged [s].
         """

@@ -23,8 +23,6 @@ def required_distances(arm: Arm, settings: SafetySettings, qd: Vec) -> Vec:
     """Return S_p of each of the robot's capsules [m], shape (n,).
 
     Args:
-        arm: Robot in its cell.
-        settings: Assumptions.
         qd: Joint speeds [rad/s], shape (6,).
     """
     t_stop = float(override.stop_time(as_kernel_array(qd), arm.limits.qdd_max))
@@ -41,8 +39,6 @@ def separation_zone(arm: Arm, settings: SafetySettings, q: Vec, qd: Vec) -> Vec:
     The convex hull, in the horizontal plane, of all capsules, each grown by its own S_p.
 
     Args:
-        arm: Robot in its cell.
-        settings: Assumptions.
         q: Joint positions [rad], shape (6,).
         qd: Joint speeds [rad/s], shape (6,).
 

@@ -51,8 +51,6 @@ class EnvBatch(Stateful, ABC):
     Args:
         world: Data that all environments share.
         task: Rules, action type and reward coefficients.
-        people: State of the people.
-        n_envs: Number of environments.
         n_act: Length of an action.
         seed: Seed; episode ``k`` of environment ``e`` is determined by (seed, e, k).
         first_env: Number of the first environment in the random streams.

@@ -142,7 +142,6 @@ def monitored_episodes(
 
     Args:
         monitor: Accounts of the environments.
-        state: The environments.
         dt: Control cycle [s].
     """
     account = monitor.closed

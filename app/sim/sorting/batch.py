@@ -145,7 +145,6 @@ class SortingBatch(Stateful):
     Args:
         shape: Size of the tasks.
         fail: Failure probabilities of the clutter cells, shape (K,).
-        n_envs: Number of tasks.
         seed: Seed; episode ``k`` of row ``e`` is fixed by (seed, e, k).
         settings: Starts, disturbances, rewards and ends.
         first_env: Number of the first row in the random streams.

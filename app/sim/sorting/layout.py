@@ -117,7 +117,6 @@ def half_size(cell: Cell, size: int, n_sizes: int) -> Vec:
     Args:
         cell: Sorting cell.
         size: 0 the smallest.
-        n_sizes: Number of sizes.
     """
     share = size / (n_sizes - 1) if n_sizes > 1 else 0.5
     width = HALF_WIDTHS[0] + share * (HALF_WIDTHS[-1] - HALF_WIDTHS[0])

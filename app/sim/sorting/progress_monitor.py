@@ -96,7 +96,6 @@ def observe_transition(
 
     Args:
         monitor: Result of :func:`expect_state` at the last decision; None at the first.
-        key: Key of the present state.
         expected_attempts: Expected attempts of the exact planner from here.
         checkpoint: SHA-256 of the policy.
     """

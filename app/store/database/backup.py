@@ -69,7 +69,6 @@ def write_backup(store: Store, data_dir: Path, path: Path) -> BackupSummary:
 
     Args:
         store: A SQLite database.
-        data_dir: The data folder.
         path: The new file.
 
     Raises:
@@ -125,8 +124,6 @@ def restore_backup(
 
     Args:
         store: A SQLite database; it need not exist, or may be damaged.
-        data_dir: The data folder.
-        path: The backup.
 
     Returns:
         The content of the backup, and where the database that was there before is kept.

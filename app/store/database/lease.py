@@ -33,7 +33,6 @@ class Lease:
     """The lease of one server.
 
     Args:
-        store: The database.
         lock: The server's lock, held while the lease is. A lease of an earlier server with the
             same lock is taken at once, since that server has ended.
         duration_s: Time from a renewal until another server may take the lease [s].

@@ -16,12 +16,7 @@ _BOOT_ID = Path("/proc/sys/kernel/random/boot_id")
 
 
 class ServerLock:
-    """Exclusive use of a data folder and a SQLite file.
-
-    Args:
-        store: The database.
-        data_dir: The data folder.
-    """
+    """Exclusive use of a data folder and a SQLite file."""
 
     def __init__(self, store: Store, data_dir: Path) -> None:
         paths = [data_dir.absolute() / "server.lock"]

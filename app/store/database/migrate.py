@@ -19,7 +19,6 @@ def migrate(store: Store, lease: Lease | None = None) -> None:
     """Create or upgrade the tables, and take the lease in the same transaction.
 
     Args:
-        store: The database.
         lease: The lease of the server; its lock is held.
 
     Raises:

@@ -60,7 +60,6 @@ class CellScene:
         """Show a snapshot; sends only what changed.
 
         Args:
-            snapshot: What to show.
             dt: Time since the last call [s].
             shapes: Whether anybody looks at the capsules that the simulator sees.
             risk: Risk map of a pick cell.

@@ -75,7 +75,6 @@ def tower_plate(color: Rgb, height: float) -> bytes:
     """Return the plate under a tower: grey, with a top in the tower's colour, as glTF.
 
     Args:
-        color: Colour of the tower.
         height: Its top over the table [m].
     """
     side, top = PLATE_SIDE, 0.004

@@ -70,7 +70,6 @@ class ChoiceBench:
         """Return the result with one row per settings.
 
         Args:
-            rows: Settings by name.
             planners: Whether a planner acts beside people at rest, for the rows of one setting.
         """
         stated: Json = {"hysteresis": HYSTERESIS}

@@ -50,7 +50,6 @@ class Trace:
     """Record robot and people of the first environments several times per control period.
 
     Args:
-        batch: Environments.
         n_recorded: Number of recorded environments.
         parts: Recorded poses per control period.
     """

@@ -114,7 +114,6 @@ def row_of(name: str, runs: MonitoredEpisodes, bare: MonitoredEpisodes | None) -
     """Return the result row of a condition.
 
     Args:
-        name: Name of the row.
         runs: Episodes of the condition.
         bare: The same episodes without the layer; None for those themselves.
     """

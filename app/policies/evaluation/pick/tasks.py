@@ -106,7 +106,6 @@ class ChoiceRun:
 
     Args:
         evaluator: Episodes with 2 or 3 candidates.
-        seed: Seed of the random rule.
         name: Name of the setting, first in the names of the rows; may be empty.
     """
 

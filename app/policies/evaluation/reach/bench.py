@@ -87,7 +87,6 @@ class ReachBench:
     """Evaluate one checkpoint under several rules.
 
     Args:
-        checkpoint: Policy.
         seed: Seed of the episodes; use one that was not used for tuning.
         on_row: Callback for each finished row.
     """

@@ -161,11 +161,9 @@ def run_episodes(
     """Run one episode per goal.
 
     Args:
-        cell: Work cell.
         settings: Start, end and people; their rule for goals is not used.
         controller: Controller of the robots.
         goals: Goal of each episode [m], shape (n, 3).
-        seed: Seed of the episodes.
     """
     batch = new_reach_batch(cell, min(N_ENVS, len(goals)), seed, settings)
     return _Queue(batch, controller, goals).run()

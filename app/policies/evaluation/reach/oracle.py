@@ -61,10 +61,8 @@ def started(cell: Cell, settings: ReachSettings, goals: Vec, seed: int) -> Reach
     """Return a batch with the first states of the episodes of ``run_episodes``.
 
     Args:
-        cell: Work cell.
         settings: Rules.
         goals: Goal of each episode [m], shape (n, 3).
-        seed: Seed of the episodes.
     """
     found = ReachBatch(cell, len(goals), seed, settings)
     source = ReachBatch(cell, N_ENVS, seed, settings)
@@ -95,7 +93,6 @@ class StagedSearch:
 
     Args:
         batch: From :func:`started`.
-        seed: Seed of the search.
         rows: Receives a row of each stage.
     """
 

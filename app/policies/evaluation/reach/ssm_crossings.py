@@ -96,8 +96,6 @@ class Comparison:
     """Runs of policies, planners and the oracle over one set of crossings.
 
     Args:
-        cell: Work cell.
-        crossed: Crossings.
         reach: Action and observation of the policy; time limit and people are replaced.
         safety: Assumptions of the safety layer.
         seed: Seed of planners and oracle.
@@ -196,9 +194,7 @@ def best_resimulations(
     least-stopped one only has to arrive.
 
     Args:
-        comparison: Crossings.
         n_each: Resimulations of each crossing.
-        rng: Random numbers of the resimulations.
     """
     earliest, least_stopped = [], []
     for number, configurations in enumerate(comparison.configurations()):

@@ -15,7 +15,6 @@ def crossing_row(name: str, runs: MonitoredEpisodes, time_limit_s: float) -> Jso
     """Return the result row of crossings; `ssm.py` defines the measures.
 
     Args:
-        name: Name of the row.
         runs: Runs of all crossings.
         time_limit_s: Time of runs that do not arrive in ``time_capped_s`` [s].
     """

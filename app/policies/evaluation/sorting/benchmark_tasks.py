@@ -38,7 +38,6 @@ class ScriptedInterferences:
     """Interferences of a test's person in all environments of one run.
 
     Args:
-        test: Test.
         n: Number of environments.
         seed: Seed; the interferences of environment ``e`` are fixed by (seed, test, e).
     """

@@ -76,7 +76,6 @@ def row_of(name: str, episodes: SortingEpisodes, pairs: Index, least: float) -> 
     """Return a row of the result.
 
     Args:
-        name: Name of the row.
         episodes: Equal numbers of episodes of each pair, in the order of ``pairs``.
         pairs: All (K_E, K_G), shape (n_pairs, 2).
         least: Required success rate of each pair.

@@ -28,8 +28,6 @@ class TaskStates:
     """States, targets and counts of n sorting tasks.
 
     Args:
-        cell: Sorting cell.
-        n_tasks: Number of tasks.
         n_objects: Objects of each task, all of them in the goal.
         seed: Seed of the starts and of the grasps.
     """

@@ -42,14 +42,12 @@ class MonitoredReachBatch(ReachBatch):
 
     Args:
         cell: Work cell with a goal region.
-        n_envs: Number of environments.
         seed: Seed; see :class:`~app.sim.reach.batch.ReachBatch`.
         settings: Settings of the scenario; a collision ends the episode.
         safety: Assumptions of the safety layer.
         monitoring: Further settings.
         tracks: Cylinder of each environment's only person at the ends of control cycles: x, y,
             radius [m], shape (n_envs, n + 1, 3); None for people who walk by themselves.
-        first_env: Number of the first environment.
 
     Raises:
         InvalidInput: The tracks have another shape, or their person is not one cylinder.
@@ -128,7 +126,6 @@ class MonitoredReachBatch(ReachBatch):
         """Move one environment through one control cycle toward joint speeds, for planners.
 
         Args:
-            env: Number of the environment.
             wanted: Joint speeds after the cycle [rad/s], shape (6,).
         """
         require_shape("wanted", wanted, (6,))

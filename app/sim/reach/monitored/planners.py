@@ -49,7 +49,6 @@ def drive_planner(
         batch: Rows at the start of their episodes.
         postures: Postures each row's planner may choose among [rad], shape (k, 6) each.
         settings: Planner, role and margins.
-        seed: Seed of the planners.
         blind: Whether the planner ignores people.
 
     Returns:
