@@ -16,7 +16,7 @@ from tests.support import patient_http
 pytestmark = pytest.mark.browser
 WINDOWS = pytest.mark.xdist_group("scenes-in-windows")
 SERVERS = pytest.mark.xdist_group("scenes-and-servers")
-"""At most two processes draw the scene, which takes all cores; others have time to wait."""
+"""At most two processes draw the scene; others have time to wait."""
 
 REACH, SORT = "shared-workspace", "sorting-e0"
 UP = f'{VIEWER}[data-state="up"]'
