@@ -19,7 +19,7 @@ from app.sim.cells.cell import Cell
 from app.sim.core.arrays import Vec
 from app.sim.envs.tasks import ArmTask
 from app.sim.pick.batch import OUTCOMES
-from app.sim.scenario.batch import StepResult
+from app.sim.scenario.step_result import StepResult
 
 CURVE_SEED = 1_000_003
 """Seed of the episodes behind a point of the curve; no evaluation uses it."""

@@ -7,7 +7,7 @@ from gymnasium.vector import AutoresetMode
 
 from app.sim.cells.cell import Cell
 from app.sim.envs.single_env import SingleEnv
-from app.sim.envs.tasks import RobotTask, cell_of, frames_per_s, settings_with
+from app.sim.envs.tasks import RobotTask, cell_of, settings_with
 from app.sim.envs.vector_env import BatchVectorEnv
 from app.sim.pick.batch import WHOLE_PICK, PickBatch, PickSettings
 from app.sim.scene.scene import HumanKind
@@ -123,8 +123,7 @@ class PickEnv(SingleEnv):
     ) -> None:
         chosen = settings_with(settings or WHOLE_PICK, people)
         self.batch = PickBatch(cell_of(cell), 1, 0, chosen, first_env)
-        task = RobotTask(self.batch, sees_time=chosen.observation != "state")
-        super().__init__(task, render_mode, frames_per_s(self.batch.cell))
+        super().__init__(RobotTask(self.batch), render_mode)
 
 
 class PickVectorEnv(BatchVectorEnv):
@@ -147,6 +146,5 @@ class PickVectorEnv(BatchVectorEnv):
     ) -> None:
         chosen = settings_with(settings or WHOLE_PICK, people)
         self.batch = PickBatch(cell_of(cell), num_envs, 0, chosen, first_env)
-        task = RobotTask(self.batch, sees_time=chosen.observation != "state")
-        fps = frames_per_s(self.batch.cell)
-        super().__init__(task, render_mode, fps, autoreset_mode, max_episode_steps)
+        task = RobotTask(self.batch)
+        super().__init__(task, render_mode, autoreset_mode, max_episode_steps)

@@ -7,7 +7,7 @@ from gymnasium.vector import AutoresetMode
 
 from app.sim.cells.cell import Cell
 from app.sim.envs.single_env import SingleEnv
-from app.sim.envs.tasks import RobotTask, cell_of, frames_per_s, settings_with
+from app.sim.envs.tasks import RobotTask, cell_of, settings_with
 from app.sim.envs.vector_env import BatchVectorEnv
 from app.sim.reach.batch import ReachBatch, ReachSettings
 from app.sim.scene.scene import HumanKind
@@ -147,8 +147,7 @@ class ReachEnv(SingleEnv):
     ) -> None:
         chosen = settings_with(settings or ReachSettings(), people)
         self.batch = ReachBatch(cell_of(cell), 1, 0, chosen, first_env)
-        task = RobotTask(self.batch, sees_time=chosen.observation != "state")
-        super().__init__(task, render_mode, frames_per_s(self.batch.cell))
+        super().__init__(RobotTask(self.batch), render_mode)
 
 
 class ReachVectorEnv(BatchVectorEnv):
@@ -171,6 +170,5 @@ class ReachVectorEnv(BatchVectorEnv):
     ) -> None:
         chosen = settings_with(settings or ReachSettings(), people)
         self.batch = ReachBatch(cell_of(cell), num_envs, 0, chosen, first_env)
-        task = RobotTask(self.batch, sees_time=chosen.observation != "state")
-        fps = frames_per_s(self.batch.cell)
-        super().__init__(task, render_mode, fps, autoreset_mode, max_episode_steps)
+        task = RobotTask(self.batch)
+        super().__init__(task, render_mode, autoreset_mode, max_episode_steps)

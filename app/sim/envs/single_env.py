@@ -20,17 +20,16 @@ class SingleEnv(gymnasium.Env[NDArray[Any], Any]):
 
     Args:
         render_mode: ``rgb_array``, or None.
-        render_fps: Steps per second.
 
     Raises:
         InvalidInput: The render mode is unknown.
     """
 
-    def __init__(self, task: BatchTask, render_mode: str | None, render_fps: int) -> None:
+    def __init__(self, task: BatchTask, render_mode: str | None) -> None:
         self._task = task
         self.action_space, self.observation_space = task.action_space, task.observation_space
         self.render_mode = check_render_mode(render_mode)
-        self.metadata = {**self.metadata, "render_fps": render_fps}
+        self.metadata = {**self.metadata, "render_fps": task.render_fps}
         self._running, self._seeded = False, False
 
     def reset(

@@ -25,6 +25,8 @@ RENDER_FPS = 4
 class SortingTask:
     """Sorting tasks of a cell."""
 
+    render_fps = RENDER_FPS
+
     def __init__(self, cell: Cell, batch: SortingBatch) -> None:
         self._cell, self.batch = cell, batch
         n_actions = batch.shape.n_actions
@@ -156,7 +158,7 @@ class SortingEnv(SingleEnv):
     ) -> None:
         chosen = cell_of(cell)
         self.batch = batch_in(chosen, 1, 0, settings, first_env)
-        super().__init__(SortingTask(chosen, self.batch), render_mode, RENDER_FPS)
+        super().__init__(SortingTask(chosen, self.batch), render_mode)
 
     def action_masks(self) -> NDArray[np.bool_]:
         """Return whether each move changes the state, shape (n_actions,)."""
@@ -186,7 +188,7 @@ class SortingVectorEnv(BatchVectorEnv):
         chosen = cell_of(cell)
         self.batch = batch_in(chosen, num_envs, 0, settings, first_env)
         task = SortingTask(chosen, self.batch)
-        super().__init__(task, render_mode, RENDER_FPS, autoreset_mode, max_episode_steps)
+        super().__init__(task, render_mode, autoreset_mode, max_episode_steps)
 
     def action_masks(self) -> NDArray[np.bool_]:
         """Return whether each move changes the state, shape (num_envs, n_actions)."""

@@ -15,6 +15,7 @@ from app.sim.envs.rendering import people_solids, picture, target_solids
 from app.sim.pick.batch import OUTCOMES, PickBatch, PickSettings
 from app.sim.reach.batch import ReachBatch, ReachSettings
 from app.sim.reach.mixed_batch import ReachEnvironments
+from app.sim.scenario.step_result import StepResult
 from app.sim.scene.scene import HumanKind
 
 Rows = NDArray[np.int64]
@@ -29,26 +30,6 @@ NAMES = np.array(OUTCOMES, dtype=object)
 TIMEOUT = OUTCOMES.index("timeout")
 
 
-class Result(Protocol):
-    """Result of a batched step; the arrays are overwritten by the next one."""
-
-    @property
-    def obs(self) -> NDArray[Any]:
-        """Observations, shape (n_envs, obs_size); of the new episode if one ended."""
-
-    @property
-    def last_obs(self) -> NDArray[Any]:
-        """Final observations of the episodes that ended, shape (n_envs, obs_size)."""
-
-    @property
-    def rew(self) -> NDArray[np.float32]:
-        """Rewards, shape (n_envs,)."""
-
-    @property
-    def ended(self) -> Rows:
-        """Outcomes of the episodes that ended in this step, otherwise 0, shape (n_envs,)."""
-
-
 class SteppedBatch(Protocol):
     """Environments that are stepped together."""
 
@@ -57,7 +38,7 @@ class SteppedBatch(Protocol):
     def reset(self) -> NDArray[Any]:
         """Start episode 0 in every environment; return the observations."""
 
-    def step(self, act: Any, *, auto_reset: bool = True) -> Result:
+    def step(self, act: Any, *, auto_reset: bool = True) -> StepResult:
         """Step every environment whose episode has not ended."""
 
 
@@ -110,6 +91,10 @@ class BatchTask(SteppedTask, Protocol):
     def infos(self) -> Infos:
         """Return a new ``info``, an entry per row."""
 
+    @property
+    def render_fps(self) -> int:
+        """Images per second of a video: one per step."""
+
     def picture(self, row: int) -> Image:
         """Return an image of one row."""
 
@@ -144,14 +129,10 @@ class ArmTask:
 
 
 class RobotTask(ArmTask):
-    """A batch of robots, people and targets.
+    """A batch of robots, people and targets."""
 
-    Args:
-        sees_time: Whether the time left is observed; see :class:`ArmTask`.
-    """
-
-    def __init__(self, batch: PickBatch | ReachBatch, *, sees_time: bool) -> None:
-        super().__init__(batch, sees_time=sees_time)
+    def __init__(self, batch: PickBatch | ReachBatch) -> None:
+        super().__init__(batch, sees_time=batch.settings.observation != "state")
         self._cells = batch
 
     @property
@@ -168,6 +149,11 @@ class RobotTask(ArmTask):
             "clearance_m": state.clear[:, 0].copy(),
             "time_left_s": state.time_left.copy(),
         }
+
+    @property
+    def render_fps(self) -> int:
+        """Control rate of the cell [Hz]."""
+        return round(1.0 / self.batch.cell.robot.dt)
 
     def picture(self, row: int) -> Image:
         """Return an image of one environment."""
@@ -188,11 +174,6 @@ def cell_of(cell: str | Cell) -> Cell:
 def settings_with(settings: Settings, people: Sequence[HumanKind] | None) -> Settings:
     """Return settings with other people; unchanged if ``people`` is None."""
     return settings if people is None else replace(settings, people=tuple(people))
-
-
-def frames_per_s(cell: Cell) -> int:
-    """Return the control rate of a cell [Hz]."""
-    return round(1.0 / cell.robot.dt)
 
 
 def check_render_mode(mode: str | None) -> str | None:

@@ -33,7 +33,6 @@ class BatchVectorEnv(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
 
     Args:
         render_mode: ``rgb_array``, or None.
-        render_fps: Steps per second.
         autoreset_mode: One of Gymnasium's modes, or its value.
         max_episode_steps: Steps after which an episode is truncated, as
             ``gymnasium.wrappers.TimeLimit`` does it; None or -1 for no such limit.
@@ -51,7 +50,6 @@ class BatchVectorEnv(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
         self,
         task: BatchTask,
         render_mode: str | None,
-        render_fps: int,
         autoreset_mode: str | AutoresetMode,
         max_episode_steps: int | None,
     ) -> None:
@@ -65,7 +63,7 @@ class BatchVectorEnv(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
         self.metadata = {
             **self.metadata,
             "autoreset_mode": self._mode,
-            "render_fps": render_fps,
+            "render_fps": task.render_fps,
         }
         self._limit = _limit_of(max_episode_steps)
         self._steps = np.zeros(self.num_envs, dtype=np.int64)

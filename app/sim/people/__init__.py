@@ -4,7 +4,7 @@ human_motion_config  Configuration of the workers' motion, body sizes and yieldi
                      for the kernels
 off_task_motion      Off-task motion: people who stand about, look elsewhere, or reach over the
                      table
-pedestrian           Pedestrians as vertical cylinders: settings, and walks for tests and plots
+pedestrian           Settings of pedestrians, people as vertical cylinders that walk
 reach_script         Synthetic reaches by inverse kinematics: home, cube, dock and back
 kernels/             Compiled motion of people
 """

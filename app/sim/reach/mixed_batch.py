@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from app.errors import InvalidInput
 from app.sim.cells.cell import Cell
 from app.sim.reach.batch import N_ACT, ReachBatch, ReachSettings
-from app.sim.scenario.batch import StepResult
+from app.sim.scenario.step_result import StepResult
 from app.state_dict import Stateful
 
 

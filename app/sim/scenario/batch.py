@@ -7,7 +7,6 @@ for motion, observation and resets; a single kernel would be compiled once per c
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from dataclasses import dataclass
 from types import ModuleType
 from typing import Any, ClassVar
 
@@ -25,22 +24,9 @@ from app.sim.scenario.kernels.episode import (
     new_episode_state,
     new_step_workspace,
 )
+from app.sim.scenario.step_result import StepResult
 from app.sim.scene.scene import require_finite, require_shape
 from app.state_dict import Stateful
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class StepResult:
-    """Result of one batched step; the arrays are overwritten by the next step."""
-
-    obs: NDArray[np.float32]
-    """Observations after the step, of new episodes where one ended, (n_envs, obs_size)."""
-    last_obs: NDArray[np.float32]
-    """Final observations of the environments whose episode ended, (n_envs, obs_size)."""
-    rew: NDArray[np.float32]
-    """Rewards, (n_envs,)."""
-    ended: NDArray[np.int64]
-    """Index into OUTCOMES of episodes that ended now, 0 elsewhere, (n_envs,)."""
 
 
 class EnvBatch(Stateful, ABC):

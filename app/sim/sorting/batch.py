@@ -16,6 +16,7 @@ from app.errors import InvalidInput
 from app.sim.cells.cell import Cell
 from app.sim.core.arrays import Vec
 from app.sim.core.jit import direct
+from app.sim.scenario.step_result import StepResult
 from app.sim.scene.scene import require_shape
 from app.sim.sorting.kernels import episode as sorting_episode
 from app.sim.sorting.kernels import task as kernel
@@ -64,20 +65,6 @@ class SortingSettings:
     """Objects in the goal, K_G; 0 draws it."""
     weights: SortingWeights = field(default_factory=SortingWeights)
     """Reward coefficients."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SortingStep:
-    """Result of a step; the next step overwrites the arrays."""
-
-    obs: Obs
-    """Observations after the step, of new episodes where one ended, (n_envs, obs_size)."""
-    last_obs: Obs
-    """Final observation of the rows that ended, (n_envs, obs_size)."""
-    rew: NDArray[np.float32]
-    """Rewards, (n_envs,)."""
-    ended: NDArray[np.int64]
-    """Index into OUTCOMES of episodes that ended now, 0 elsewhere, (n_envs,)."""
 
 
 def shape_of(cell: Cell) -> SortingShape:
@@ -245,7 +232,7 @@ class SortingBatch(Stateful):
             sorting_episode.start_rows(one, self._rules(), self.seed, first, obs)
         return self._obs
 
-    def step(self, act: NDArray[np.int64], *, auto_reset: bool = True) -> SortingStep:
+    def step(self, act: NDArray[np.int64], *, auto_reset: bool = True) -> StepResult:
         """Make one attempt in every row.
 
         Args:
@@ -275,7 +262,7 @@ class SortingBatch(Stateful):
         if self._step is None:
             self._step = direct(sorting_episode.step_rows, arguments)
         self._step(*arguments)
-        return SortingStep(obs=self._obs, last_obs=self._last, rew=self._rew, ended=self._ended)
+        return StepResult(obs=self._obs, last_obs=self._last, rew=self._rew, ended=self._ended)
 
     def masks(self) -> NDArray[np.bool_]:
         """Return whether each move changes the state, shape (n_envs, n_actions); reused."""

@@ -7,7 +7,8 @@ import pytest
 
 from app.errors import InvalidInput
 from app.sim.people.kernels.pedestrian import STAYING, STILL, WALKING
-from app.sim.people.pedestrian import PedestrianSettings, Walk, walk
+from app.sim.people.pedestrian import PedestrianSettings
+from tools.docs.world.walks import Walk, walk
 
 DEFAULT = PedestrianSettings()
 RESTLESS = PedestrianSettings(p_still=0.0, p_stay=0.0)

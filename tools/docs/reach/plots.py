@@ -21,7 +21,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Rectangle
 
 from app.sim.people.kernels.pedestrian import WALKING
-from app.sim.people.pedestrian import PedestrianSettings, Walk, walk
+from app.sim.people.pedestrian import PedestrianSettings
 from tools.docs.reach.other_plots import curves, others, smoothness
 from tools.docs.reach.style import (
     BLUE,
@@ -39,6 +39,7 @@ from tools.docs.reach.style import (
     save,
 )
 from tools.docs.reach.tables import policy_of, siblings
+from tools.docs.world.walks import Walk, walk
 
 ROOT = Path(__file__).resolve().parents[3]
 

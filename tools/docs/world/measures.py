@@ -13,7 +13,7 @@ from app.sim.cells.cell import Cell, load_cell
 from app.sim.collision.fcl_recheck import robot_ends
 from app.sim.geometry.capsules import ends_of
 from app.sim.people.kernels.pedestrian import WALKING
-from app.sim.people.pedestrian import PedestrianSettings, Walk, walk
+from app.sim.people.pedestrian import PedestrianSettings
 from app.sim.pick.batch import step_robot
 from app.sim.robot.actions import ActionSettings
 from app.sim.robot.capsules import TOOL, load_robot_capsules
@@ -24,6 +24,7 @@ from app.sim.scene.scene import arm_of
 from tests.sim.configurations import CHUNK, N, configurations
 from tests.sim.fast_hands import HAND_SPEED, passes
 from tests.sim.mesh_gap import FARTHEST, Gap, gaps
+from tools.docs.world.walks import Walk, walk
 
 Json = dict[str, Any]
 POSTURES = 2000

@@ -13,11 +13,12 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, Rectangle
 
 from app.sim.cells.cell import Cell, load_cell
-from app.sim.people.pedestrian import PedestrianSettings, Walk
+from app.sim.people.pedestrian import PedestrianSettings
 from app.sim.robot.capsules import TOOL
 from app.sim.robot.kernels.arm import Arm
 from tests.sim.mesh_gap import Gap
 from tools.docs.world.measures import EXTENT, Episode, ReachMap
+from tools.docs.world.walks import Walk
 
 BLUE, ORANGE, GREEN, RED, GREY = "#2563a8", "#d97706", "#2a9d6f", "#b3261e", "#8a8f98"
 LIGHT = "#e6e8eb"

@@ -21,7 +21,6 @@ from app.sim.reach.monitored.kernels.state import Commands, StepResults
 from app.sim.robot.kernels import acceleration_bounds as polynomial
 from app.sim.robot.kernels.joints import JointState
 from app.sim.safety.layer import SafetySettings
-from app.sim.scenario.batch import StepResult
 from app.sim.scenario.kernels.episode import Indices
 from app.sim.scenario.kernels.monitored_motion import begin_rows
 from app.sim.scenario.monitoring import (
@@ -30,6 +29,7 @@ from app.sim.scenario.monitoring import (
     monitored_episodes,
     new_monitored_state,
 )
+from app.sim.scenario.step_result import StepResult
 from app.sim.scene.scene import require_finite, require_shape
 
 HORIZON_S = 5.0
