@@ -4,6 +4,7 @@
 """
 
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal, Protocol
 
@@ -13,8 +14,21 @@ from app.store.engine import Store
 from app.store.records import Claim, JobRecord, NewCheckpoint, ResumeState, Spent
 from jobs import resume_files
 
-EndState = Literal["succeeded", "cancelled", "failed", "interrupted"]
-"""Ends of an attempt; an interrupted one leaves its job to the next attempt."""
+
+@dataclass(frozen=True, slots=True)
+class EndOfAttempt:
+    """How an attempt ends."""
+
+    state: Literal["succeeded", "cancelled", "failed", "interrupted"]
+    """Its end; an interrupted attempt leaves its job to the next one."""
+    result: Mapping[str, Any] | None = None
+    """Result of the job."""
+    error: str | None = None
+    """Cause of a failure."""
+    ended_by: Spent | None = None
+    """The budget that ended it."""
+    run_s: float | None = None
+    """Run time of all attempts; None leaves it [s]."""
 
 
 class JobAccess(Protocol):
@@ -54,22 +68,8 @@ class JobAccess(Protocol):
     ) -> None:
         """Store a policy and the state to resume from, both or neither."""
 
-    def end(
-        self,
-        state: EndState,
-        *,
-        result: Mapping[str, Any] | None = None,
-        error: str | None = None,
-        ended_by: Spent | None = None,
-        run_s: float | None = None,
-    ) -> None:
-        """End the attempt.
-
-        Args:
-            error: Cause of a failure.
-            ended_by: The budget that ended it.
-            run_s: Run time of all attempts; None leaves it [s].
-        """
+    def end(self, end: EndOfAttempt) -> None:
+        """End the attempt."""
 
 
 class StoreAccess:
@@ -118,30 +118,22 @@ class StoreAccess:
         """Store a policy and the state to resume from."""
         attempts.record_checkpoint(self.store, self._claim, step, policy, resume)
 
-    def end(
-        self,
-        state: EndState,
-        *,
-        result: Mapping[str, Any] | None = None,
-        error: str | None = None,
-        ended_by: Spent | None = None,
-        run_s: float | None = None,
-    ) -> None:
+    def end(self, end: EndOfAttempt) -> None:
         """End the attempt; the files of a job that has succeeded are deleted."""
-        if state == "failed":
-            completion.fail(self.store, self._claim, error or "")
-        elif state == "interrupted":
+        if end.state == "failed":
+            completion.fail(self.store, self._claim, end.error or "")
+        elif end.state == "interrupted":
             completion.give_back(self.store, self._claim)
         else:
             completion.finish(
                 self.store,
                 self._claim,
-                state=state,
-                result=result,
-                ended_by=ended_by,
-                run_s=run_s,
+                state=end.state,
+                result=end.result,
+                ended_by=end.ended_by,
+                run_s=end.run_s,
             )
-        if state == "succeeded" and ended_by is None:
+        if end.state == "succeeded" and end.ended_by is None:
             resume_files.remove(self._files)
 
 

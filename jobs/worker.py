@@ -17,7 +17,7 @@ from typing import Any
 from app.errors import ServiceError
 from app.storage_errors import StaleAttempt, StorageDamaged, StorageFull, StorageUnavailable
 from app.store.records import JobRecord, NewCheckpoint, ResumeState, Spent
-from jobs.access import JobAccess
+from jobs.access import EndOfAttempt, JobAccess
 
 logger = logging.getLogger(__name__)
 
@@ -156,19 +156,20 @@ class JobWorker:
     def _record_end(self, result: Mapping[str, Any] | None) -> None:
         cancelled = self.access.job().cancel_requested
         if self._stop_seen and cancelled:
-            self.access.end("cancelled", result=result, run_s=self.run_s)
+            self.access.end(EndOfAttempt("cancelled", result, run_s=self.run_s))
             logger.info("cancelled")
         elif self._stop_seen:
-            self.access.end("interrupted")
+            self.access.end(EndOfAttempt("interrupted"))
             logger.info("interrupted: the job resumes with the next attempt")
         else:
             spent = self._spent
-            self.access.end("succeeded", result=result, ended_by=spent, run_s=self.run_s)
+            end = EndOfAttempt("succeeded", result, ended_by=spent, run_s=self.run_s)
+            self.access.end(end)
             logger.info("succeeded" if spent is None else f"ended by its {spent}")
 
     def _fail(self, message: str) -> int:
         try:
-            self.access.end("failed", error=message)
+            self.access.end(EndOfAttempt("failed", error=message))
         except StaleAttempt as error:
             logger.warning("%s", error)
         except (StorageFull, StorageUnavailable) as error:

@@ -2,13 +2,14 @@
 
 import json
 from collections.abc import Callable, Mapping
+from dataclasses import asdict
 from hashlib import sha256
 from typing import Any
 
 from pydantic import TypeAdapter
 
-from app.store.records import JobRecord, NewCheckpoint, ResumeState, Spent
-from jobs.access import EndState
+from app.store.records import JobRecord, NewCheckpoint, ResumeState
+from jobs.access import EndOfAttempt
 from jobs.remote.connection import ServiceConnection
 from jobs.remote.uploads import pack_upload, read_state
 
@@ -75,18 +76,9 @@ class ServiceAccess:
         path = f"{self._service.attempt}/checkpoints"
         self._service.send("POST", path, query=query, content=content)
 
-    def end(
-        self,
-        state: EndState,
-        *,
-        result: Mapping[str, Any] | None = None,
-        error: str | None = None,
-        ended_by: Spent | None = None,
-        run_s: float | None = None,
-    ) -> None:
+    def end(self, end: EndOfAttempt) -> None:
         """End the attempt."""
-        body = {"state": state, "result": result, "error": error}
-        self._send("end", {**body, "ended_by": ended_by, "run_s": run_s})
+        self._send("end", asdict(end))
 
     def _send(self, action: str, body: Mapping[str, Any]) -> bytes:
         path = f"{self._service.attempt}/{action}"

@@ -25,7 +25,7 @@ from app.policies.checkpoints.upload import join
 from app.policies.configs import presets
 from app.store.cursors import MAX_INTEGER
 from app.store.records import Claim
-from jobs.access import StoreAccess
+from jobs.access import EndOfAttempt, StoreAccess
 from jobs.remote.uploads import (
     MAX_MEMORY_FILE,
     MAX_UPLOAD,
@@ -106,13 +106,7 @@ def start_attempt(body: AttemptStart, access: AccessDep) -> None:
 @router.post("/end", status_code=204, summary="End an attempt", responses=WRITTEN)
 def end_attempt(body: AttemptEnd, access: AccessDep, services: ServicesDep) -> None:
     """Record the end of the attempt with its result or error."""
-    access.end(
-        body.state,
-        result=body.result,
-        error=body.error,
-        ended_by=body.ended_by,
-        run_s=body.run_s,
-    )
+    access.end(EndOfAttempt(**dict(body)))
     services.supervisor.wake()
 
 

@@ -15,6 +15,7 @@ from app.storage_errors import ServerUnreachable, StaleAttempt
 from app.store import attempts, checkpoints, completion, jobs, metrics
 from app.store.engine import Store
 from app.store.records import Claim, NewCheckpoint, ResumeState
+from jobs.access import EndOfAttempt
 from jobs.inputs import StoreInputs
 from jobs.recording_catalog import RecordingCatalog
 from jobs.remote.access import ServiceAccess
@@ -118,7 +119,7 @@ def test_files_that_no_state_lists_are_deleted_with_the_next_checkpoint(
     assert [one.name for one in folder.iterdir()] == [f"{ROWS_SHA256}.safetensors"]
     with pytest.raises(FileNotFoundError):
         files.read(sha256(other).hexdigest())
-    access.end("succeeded", result={"step": 10})
+    access.end(EndOfAttempt("succeeded", {"step": 10}))
     assert not folder.exists()
 
 
@@ -184,7 +185,7 @@ WRITES: dict[str, Callable[[ServiceConnection], object]] = {
     "checkpoint": lambda service: ServiceAccess(service).record_checkpoint(9, NEW, state(9)),
     "state": lambda service: ServiceAccess(service).load_resume(lambda _: True),
     "start": lambda service: ServiceAccess(service).resume_earlier(None),
-    "end": lambda service: ServiceAccess(service).end("succeeded"),
+    "end": lambda service: ServiceAccess(service).end(EndOfAttempt("succeeded")),
     "write file": lambda service: ServiceFiles(service).write(ROWS_SHA256, ROWS),
     "read file": lambda service: ServiceFiles(service).read(ROWS_SHA256),
 }
@@ -223,7 +224,7 @@ def test_end_of_an_attempt_is_recorded(
     store: Store, access: ServiceAccess, claim: Claim, state_of_end: str, expected: str
 ) -> None:
     error = "rewards were not finite" if state_of_end == "failed" else None
-    access.end(state_of_end, error=error)  # type: ignore[arg-type]
+    access.end(EndOfAttempt(state_of_end, error=error))  # type: ignore[arg-type]
     job = jobs.get_job(store, claim.job_id)
     assert (job.state, job.error) == (expected, error)
 
