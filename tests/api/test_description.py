@@ -28,6 +28,7 @@ def address(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
     app = create_app(Settings(data=tmp_path_factory.mktemp("described")))
     with running(app) as (_, found):
         wait_until_ready(found)
+        app.state.services.supervisor.stop()  # some requests post jobs, which need not run
         yield found
 
 

@@ -10,6 +10,8 @@ from app.main import create_app
 from app.settings import Settings
 
 ADDRESS = "http://127.0.0.1:8000"
+SMALL = {"learning": {"n_envs": 8, "batch_size": 16}, "networks": {"width": 16}}
+"""A training that begins and ends quickly; it is stopped long before its end."""
 
 
 def test_service_that_is_ready_says_so(client: TestClient) -> None:
@@ -53,7 +55,7 @@ def test_list_of_jobs_says_that_the_database_is_locked_and_the_start_waits(
     file = tmp_path / "tandem.db"
     settings = Settings(data=tmp_path, database_url=f"sqlite:///{file}?timeout=0.2")
     with TestClient(create_app(settings), base_url=ADDRESS) as cold:
-        body = {"kind": "train", "preset": "pick-td3"}
+        body = {"kind": "train", "preset": "pick-td3", "overrides": SMALL}
         posted = cold.post("/v1/jobs", json=body, headers={"Idempotency-Key": "first"}).json()
         other = sqlite3.connect(file, isolation_level=None, timeout=60.0)
         other.execute("BEGIN IMMEDIATE")

@@ -1,17 +1,19 @@
 """Distances of robot and person in 20,000 random configurations of the cell.
 
-All 144 pairs are compared with plain numpy. python-fcl checks all of them in the first 1000
+All 144 pairs are compared with plain numpy. python-fcl checks all of them in the first 300
 configurations and the nearest one in each; the slow test checks all of them everywhere. FCL's
 search for distances ends early on round bodies; ``fcl_capsules.py`` says what is asked instead
 there.
 """
+
+from itertools import islice
 
 import numpy as np
 import pytest
 
 from app.sim.collision.fcl_reference import make_capsule
 from app.sim.human import model as human
-from tests.sim.configurations import RADII, Case, N, chunk, configurations
+from tests.sim.configurations import RADII, Case, N, configurations
 from tests.sim.fcl_capsules import check_against_fcl
 
 EXACT = 1e-6
@@ -35,7 +37,7 @@ def test_all_pairs_are_as_far_apart_as_plain_numpy_says_and_the_least_is_reporte
 
 
 def test_all_pairs_of_the_first_configurations_are_as_fcl_says() -> None:
-    for case in chunk(0):
+    for case in islice(configurations(), 300):
         for i, j in np.ndindex(case.d.shape):
             ask_fcl(case, i, j)
 

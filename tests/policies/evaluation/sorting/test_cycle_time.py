@@ -5,6 +5,7 @@ import pytest
 
 from app.policies.checkpoints import pretrained
 from app.policies.evaluation.registry import default_checkpoint, evaluate
+from app.policies.evaluation.sorting import people
 from app.policies.evaluation.sorting.cycle_time import STRAIGHT
 from app.policies.evaluation.sorting.full_tasks import FullTasks
 from app.policies.evaluation.sorting.order_rules import nearest
@@ -49,7 +50,11 @@ def test_equal_tasks_have_an_interval_of_no_width() -> None:
     }
 
 
-def test_result_has_a_row_per_condition_and_paired_differences() -> None:
+def test_result_has_a_row_per_condition_and_paired_differences(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(people, "N_OBJECTS", 4)
+    monkeypatch.setattr(people, "LIMIT_S", 100.0)
     reported = []
     result = evaluate(
         "sorting-cycle-time",

@@ -23,6 +23,11 @@ pytestmark = pytest.mark.xdist_group("monitored-picks")
 CELL = load_cell("sorting-e0")
 
 
+@pytest.fixture(autouse=True)
+def few_objects(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(people, "N_OBJECTS", 4)
+
+
 def view(values: list[float], distances: list[float], chosen: int) -> OrderView:
     return OrderView(
         values=np.array([values], dtype=np.float32),
