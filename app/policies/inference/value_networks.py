@@ -23,12 +23,22 @@ from app.policies.networks.actor_critic import ResidualActor
 from app.policies.networks.candidate_values import (
     ActorCritic,
     add_base,
+    compare,
     evaluate_few,
     new_workspace,
 )
-from app.policies.networks.forward import FEW, Floats, Layers, forward_many, layers_of
+from app.policies.networks.forward import (
+    FEW,
+    MANY,
+    Floats,
+    Layers,
+    centred_layers_of,
+    forward_many,
+    new_columns,
+)
 from app.policies.networks.outcome import (
     CLIP,
+    N_OUT,
     OutcomeHead,
     OutcomePrediction,
     combine_members,
@@ -99,11 +109,12 @@ class ValueNetworks:
             base, fade = actor.base.start, actor.fade
         still = self._n - n  # a plain actor corrects a base motion of 0 behind its inputs
         self._networks = ActorCritic(
-            actor=_skipping(layers_of(actor.net), n, still),
+            actor=_skipping(centred_layers_of(actor.net), n, still),
             critics=tuple(
-                _skipping(layers_of(one.children()), n, still) for one in critics.children()
+                _skipping(centred_layers_of(one.children()), n, still)
+                for one in critics.children()
             ),
-            members=tuple(layers_of(member.children()) for member in outcome.members),
+            members=tuple(centred_layers_of(member.children()) for member in outcome.members),
             base=base,
             fade=np.array(fade or (), dtype=np.float32),
             mean=outcome.mean.numpy(),
@@ -133,9 +144,12 @@ class ValueNetworks:
         values, outcomes = np.empty(len(obs), dtype=np.float32), new_prediction(len(obs))
         predict = predict and self.predicts
         if len(obs) > FEW:
-            rows = self._act_and_value(obs, act, values)
-            if predict:
-                self._predict(rows, outcomes)
+            every = self._networks.actor, *self._networks.critics, *self._networks.members
+            work = new_columns(every)
+            for k in range(0, len(obs), MANY):
+                rows = slice(k, k + MANY)
+                part = OutcomePrediction(*(one[rows] for one in outcomes)) if predict else None
+                self._evaluate_many(obs[rows], act[rows], values[rows], part, work)
         else:
             arguments = self._networks, obs, self._work, act, values, outcomes
             if self._few is None:
@@ -143,24 +157,39 @@ class ValueNetworks:
             self._few(*arguments)
         return act, values, outcomes if predict else None
 
-    def _act_and_value(self, obs: Floats, act: Floats, values: Floats) -> Floats:
-        """Fill actions and values of many observations; return inputs for ``_predict``."""
+    def _evaluate_many(
+        self,
+        obs: Floats,
+        act: Floats,
+        values: Floats,
+        outcomes: OutcomePrediction | None,
+        work: Floats,
+    ) -> None:
+        """Fill actions, values and outcomes, where they are asked for, of many observations."""
         nets, n = self._networks, self._n
-        rows = np.empty((len(obs), n + CONTROLLED), dtype=np.float32)
-        varying = np.ones(n + CONTROLLED, dtype=np.bool_)
-        varying[:n] = (obs != obs[:1]).any(axis=0)
-        act[:] = forward_many(nets.actor, obs, varying[:n])
-        add_base(obs, nets, act)
-        rows[:, :n], rows[:, n:] = obs, act
-        found = [forward_many(critic, rows, varying)[:, 0] for critic in nets.critics]
-        np.minimum.reduce(found, out=values)
-        rows[:, n] = values
-        return rows[:, : n + 1]
-
-    def _predict(self, rows: Floats, outcomes: OutcomePrediction) -> None:
-        """Fill outcomes for observations with their values, shape (n, n_obs + 1)."""
-        nets = self._networks
-        inputs = ((rows - nets.mean) / nets.scale).clip(-CLIP, CLIP)
-        varying = (inputs != inputs[:1]).any(axis=0)
-        outputs = np.stack([forward_many(member, inputs, varying) for member in nets.members])
+        varying = np.empty(n + CONTROLLED, dtype=np.bool_)
+        compare(obs, varying[:n])
+        varying[n:] = True
+        one = np.zeros((1, n + CONTROLLED), dtype=np.float32)
+        one[0, :n] = obs[0]
+        (places,) = varying[:n].nonzero()
+        inputs = np.empty((len(places) + CONTROLLED, len(obs)), dtype=np.float32)
+        inputs[: len(places)] = obs[:, places].T
+        act[:] = forward_many(nets.actor, inputs[: len(places)], obs[:1], varying[:n], work).T
+        add_base(obs, nets.base, nets.fade, act)
+        inputs[len(places) :] = act.T
+        values[:] = np.inf
+        for critic in nets.critics:
+            np.minimum(values, forward_many(critic, inputs, one, varying, work)[0], out=values)
+        if outcomes is None:
+            return
+        inputs[len(places)] = values
+        places, seen = np.append(places, n), inputs[: len(places) + 1]
+        seen -= nets.mean[places, None]
+        seen /= nets.scale[places, None]
+        seen.clip(-CLIP, CLIP, out=seen)
+        one = ((one[:, : n + 1] - nets.mean) / nets.scale).clip(-CLIP, CLIP)
+        outputs = np.empty((len(nets.members), len(obs), N_OUT), dtype=np.float32)
+        for member, output in zip(nets.members, outputs, strict=True):
+            output[:] = forward_many(member, seen, one, varying[: n + 1], work).T
         combine_members(outputs, nets.widen, outcomes)

@@ -78,26 +78,29 @@ def new_workspace(networks: ActorCritic, n_obs: int, n_act: int) -> Workspace:
     )
 
 
-@kernel(inline="always")
-def _compare(rows: Floats, varying: Flags) -> None:
+@kernel()
+def compare(rows: Floats, varying: Flags) -> None:
     """Write which inputs differ between rows, shape (n, n_in)."""
     for k in range(rows.shape[1]):
         varying[k] = False
-        for i in range(1, rows.shape[0]):
+    for i in range(1, rows.shape[0]):
+        for k in range(rows.shape[1]):
             varying[k] |= rows[i, k] != rows[0, k]
 
 
 @kernel()
-def add_base(obs: Floats, networks: ActorCritic, act: Floats) -> None:
-    """Turn residuals into actions, shape (n, n_act); see ``ResidualActor``."""
-    share, fade, one = np.float32(1.0), networks.fade, np.float32(1.0)
+def add_base(obs: Floats, base_at: int, fade: Floats, act: Floats) -> None:
+    """Turn residuals into actions, shape (n, n_act); see ``ResidualActor``, ``ActorCritic``."""
+    share, one, most = np.float32(1.0), np.float32(1.0), np.float32(20.0)
     for i in range(act.shape[0]):
         if fade.shape[0] > 0:
             share = (fade[2] - obs[i, int(fade[0])]) / (fade[2] - fade[1])
             share = min(one, max(np.float32(0.0), share))
         for j in range(act.shape[1]):
-            base = min(one, max(-one, obs[i, networks.base + j]))
-            moved = math.tanh(act[i, j] + math.atanh(np.float32(BASE_WEIGHT) * base))
+            base = min(one, max(-one, obs[i, base_at + j]))
+            weighted, grown = np.float32(BASE_WEIGHT) * base, math.exp(2 * min(most, act[i, j]))
+            up, down = grown * (one + weighted), one - weighted
+            moved = (up - down) / (up + down)  # tanh(act + atanh(weighted))
             act[i, j] = base + share * (moved - base)
 
 
@@ -122,10 +125,10 @@ def evaluate_few(
     """
     n, n_obs, n_act = obs.shape[0], obs.shape[1], act.shape[1]
     varying, value = work.varying, work.value[:n]
-    _compare(obs, varying[:n_obs])
+    compare(obs, varying[:n_obs])
     forward_few(networks.actor, obs, varying[:n_obs], work.units, act)
     rows, inputs, clip = work.rows[:n], work.inputs[:n], np.float32(CLIP)
-    add_base(obs, networks, act)
+    add_base(obs, networks.base, networks.fade, act)
     for i in range(n):
         for k in range(n_obs):
             rows[i, k] = obs[i, k]
@@ -142,7 +145,7 @@ def evaluate_few(
             given = obs[i, k] if k < n_obs else values[i]
             standard = (given - networks.mean[k]) / networks.scale[k]
             inputs[i, k] = min(clip, max(-clip, standard))
-    _compare(inputs, varying[: n_obs + 1])
+    compare(inputs, varying[: n_obs + 1])
     m = 0
     for member in networks.members:
         forward_few(member, inputs, varying[: n_obs + 1], work.units, work.outputs[m, :n])

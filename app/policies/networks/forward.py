@@ -1,8 +1,8 @@
 """Forward passes of small networks for decisions, without torch.
 
-Inputs that are equal in all rows are multiplied once. Up to ``FEW`` rows are evaluated by a
-compiled function that skips units that are zero in all rows; more rows are multiplied by the
-matrix library of numpy.
+Inputs that are equal in all rows are multiplied once, and units that are zero in all rows are
+skipped. Up to ``FEW`` rows are evaluated by a compiled function; more rows are multiplied by
+the matrix library of numpy.
 """
 
 from collections.abc import Iterable
@@ -21,6 +21,8 @@ Units = NDArray[np.int64]
 
 FEW = 48
 """Number of rows up to which the compiled function is faster."""
+MANY = 1024
+"""Most rows of one product; its work space fits the second cache for most processors."""
 QUICK = {*FAST, "reassoc"}
 """Fast-math flags; the order of sums is free."""
 EPSILON = 1e-5
@@ -63,18 +65,18 @@ def new_units(networks: Iterable[Layers], n_rows: int) -> UnitsWorkspace:
 
 @kernel(inline="always")
 def _activate(layer: Layer, last: bool, row: Floats) -> None:
-    """Normalise and rectify the sums of a layer in place, shape (n_out,) or longer."""
+    """Normalise and rectify the sums of a layer in place, shape (n_out,) or longer.
+
+    The mean of sums to normalise is 0; see :func:`centred_layers_of`.
+    """
     n = layer.bias.shape[0]
     if layer.gain.shape[0] > 0:
-        mean, square = np.float32(0.0), np.float32(0.0)
+        square = np.float32(0.0)
         for j in range(n):
-            mean += row[j]
-        mean /= n
-        for j in range(n):
-            square += (row[j] - mean) ** 2
+            square += row[j] ** 2
         scale = np.float32(1.0 / np.sqrt(square / n + EPSILON))
         for j in range(n):
-            row[j] = (row[j] - mean) * scale * layer.gain[j] + layer.shift[j]
+            row[j] = row[j] * scale * layer.gain[j] + layer.shift[j]
     if not last:
         for j in range(n):
             row[j] = max(row[j], np.float32(0.0))
@@ -134,6 +136,21 @@ def _inputs_where(varying: Flags, differs: bool, units: Units) -> int:
     return n
 
 
+@kernel(nogil=True)
+def _add_constants(x: Floats, varying: Flags, units: Units, layer: Layer, sums: Floats) -> None:
+    """Write the biases of a layer plus what inputs add to them that are equal in all rows.
+
+    Args:
+        x: Inputs of a row, shape (1 or more, n_in).
+        varying: Whether an input differs between rows, shape (n_in,).
+        units: Work space, shape (n_in,) or longer.
+        layer: The first layer.
+        sums: Filled, shape (1 or more, n_out) or larger.
+    """
+    copy_values(layer.bias, sums[0])
+    _add(1, x, units, _inputs_where(varying, False, units), layer.weight, sums)
+
+
 @kernel(nogil=True, fastmath=QUICK)
 def forward_few(
     layers: Layers, x: Floats, varying: Flags, work: UnitsWorkspace, out: Floats
@@ -141,7 +158,7 @@ def forward_few(
     """Write the outputs of a network for a few rows.
 
     Args:
-        layers: The network.
+        layers: The network, from :func:`centred_layers_of`.
         x: Inputs, shape (n, n_in).
         varying: Whether an input differs between rows, shape (n_in,).
         work: Work space for n rows.
@@ -149,9 +166,7 @@ def forward_few(
     """
     first, n_layers, rows = layers[0], len(layers), x.shape[0]
     units, shared, now = work.units, work.rows[0], work.rows[1]
-    copy_values(first.bias, shared[0])
-    n = _inputs_where(varying, False, units)
-    _add(1, x, units, n, first.weight, shared)
+    _add_constants(x, varying, units, first, shared)
     n = _inputs_where(varying, True, units)
     for i in range(rows):
         copy_values(shared[0], now[i])
@@ -173,12 +188,46 @@ def forward_few(
 
 
 @kernel(nogil=True, fastmath=QUICK)
-def _activate_rows(layer: Layer, sums: Floats, last: bool, rows: Floats) -> None:
-    """Add ``sums``, shape (n_out,), to rows, shape (n, n_out); normalise and rectify them."""
-    for i in range(rows.shape[0]):
-        for j in range(sums.shape[0]):
-            rows[i, j] += sums[j]
-        _activate(layer, last, rows[i])
+def _activate_columns(
+    layer: Layer, sums: Floats, scale: Floats, columns: Floats, speaking: Units
+) -> int:
+    """Add sums to a layer's units, normalise and rectify them; leave out those that are silent.
+
+    The mean of units to normalise is 0; see :func:`centred_layers_of`.
+
+    Args:
+        layer: A layer that is not the last.
+        sums: Added to each unit, shape (n_out,).
+        scale: Work space, shape (n,).
+        columns: Units of n rows, shape (n_out, n); the first of them become those that are not
+            zero in all rows.
+        speaking: Filled with their indices, shape (n_out,) or longer.
+
+    Returns:
+        Their number.
+    """
+    kept, n_out, n = 0, sums.shape[0], scale.shape[0]
+    normed, zero, one = layer.gain.shape[0] > 0, np.float32(0.0), np.float32(1.0)
+    for i in range(n):
+        scale[i] = zero if normed else one
+    if normed:
+        for j in range(n_out):
+            for i in range(n):
+                scale[i] += (columns[j, i] + sums[j]) ** 2
+        for i in range(n):
+            scale[i] = one / np.sqrt(scale[i] / n_out + np.float32(EPSILON))
+    for j in range(n_out):
+        unit, added, total = columns[j], sums[j], zero
+        gain, shift = (layer.gain[j], layer.shift[j]) if normed else (one, zero)
+        for i in range(n):
+            unit[i] = max((unit[i] + added) * scale[i] * gain + shift, zero)
+            total += unit[i]
+        if total != zero:
+            if kept < j:
+                copy_values(unit, columns[kept])
+            speaking[kept] = j
+            kept += 1
+    return kept
 
 
 def layers_of(modules: Iterable[nn.Module]) -> Layers:
@@ -195,19 +244,54 @@ def layers_of(modules: Iterable[nn.Module]) -> Layers:
     return tuple(layers)
 
 
-def forward_many(layers: Layers, x: Floats, varying: Flags) -> Floats:
-    """Return the outputs of a network by the matrix library, shape (n, n_out).
+def centred_layers_of(modules: Iterable[nn.Module]) -> Layers:
+    """Return layers for a forward pass: the sums of normalised layers have a mean of 0."""
+
+    def centred(values: Floats) -> Floats:
+        without: Floats = np.subtract(values, values.mean(axis=-1, keepdims=True))
+        return without
+
+    return tuple(
+        layer._replace(weight=centred(layer.weight), bias=centred(layer.bias))
+        if len(layer.gain)
+        else layer
+        for layer in layers_of(modules)
+    )
+
+
+def new_columns(networks: Iterable[Layers]) -> Floats:
+    """Return work space of :func:`forward_many` for networks and up to ``MANY`` rows."""
+    widest = max(layer.bias.shape[0] for network in networks for layer in network)
+    return np.empty((2, widest * MANY), dtype=np.float32)
+
+
+def forward_many(
+    layers: Layers, x: Floats, constant: Floats, varying: Flags, work: Floats
+) -> Floats:
+    """Return the outputs of a network by the matrix library, shape (n_out, n).
+
+    Each input or unit is a row of n values, so that those to skip are left out at no cost.
 
     Args:
-        layers: The network.
-        x: Inputs, shape (n, n_in).
+        layers: The network, from :func:`centred_layers_of`.
+        x: The inputs that differ between rows, shape (n_varying, n), n at most ``MANY``.
+        constant: All inputs of one row, shape (1, n_in).
         varying: Whether an input differs between rows, shape (n_in,).
+        work: Work space; the outputs are a part of it.
     """
-    first, last = layers[0], layers[-1]
-    sums: Floats = np.add(first.bias, x[0, ~varying] @ first.weight[~varying])
-    rows: Floats = np.matmul(x[:, varying], first.weight[varying])
-    _activate_rows(first, sums, first is last, rows)
-    for layer in layers[1:]:
-        rows = np.matmul(rows, layer.weight)
-        _activate_rows(layer, layer.bias, layer is last, rows)
-    return rows
+    first, n, n_in = layers[0], x.shape[1], len(varying)
+    scale, units = np.empty(n, dtype=np.float32), np.empty(max(n_in, len(work[0]) // MANY), int)
+    sums = np.empty((1, len(first.bias)), dtype=np.float32)
+    _add_constants(constant, varying, units, first, sums)
+    weight, sums = first.weight[varying], sums[0]
+    for d, layer in enumerate(layers):
+        width = layer.bias.shape[0]
+        columns = work[d % 2, : width * n].reshape(width, n)
+        np.matmul(weight.T, x, out=columns)
+        if layer is layers[-1]:
+            break
+        kept = _activate_columns(layer, sums, scale, columns, units)
+        after = layers[d + 1]
+        x, weight, sums = columns[:kept], after.weight[units[:kept]], after.bias
+    columns += sums[:, None]
+    return columns

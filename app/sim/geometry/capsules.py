@@ -145,22 +145,23 @@ def capsule_clearances(a: Vec, b: Vec, out: Vec) -> None:
 
 
 @kernel(error_model="numpy", fastmath=FAST)
-def nearest_parts(a: Vec, b: Vec, first: int, last: int, out: Vec, part: Vec) -> None:
-    """Write, for every column of ``a``, the nearest of a range of columns of ``b``.
+def nearest_parts(a: Vec, n: int, b: Vec, first: int, last: int, out: Vec, part: Vec) -> None:
+    """Write, for the first n columns of ``a``, the nearest of a range of columns of ``b``.
 
     Args:
-        a: Capsules, shape (9, n); n best a multiple of WIDTH.
+        a: Capsules, shape (9, n) or larger.
+        n: Number of columns, best a multiple of half of WIDTH.
         b: Other capsules, shape (9, m).
         first: First column of ``b`` in the range.
         last: Last column of ``b`` in the range.
-        out: Filled with distances [m], shape (n,).
-        part: Filled with columns of ``b``, shape (n,).
+        out: Filled with distances [m], shape (n,) or longer.
+        part: Filled with columns of ``b``, shape (n,) or longer.
     """
-    for j in range(a.shape[1]):
+    for j in range(n):
         out[j], part[j] = FAR, first
     for i in range(first, last + 1):
         p, u, radius = start_of(b, i), span_of(b, i), b[RADIUS, i]
-        for j in range(a.shape[1]):
+        for j in range(n):
             axes = segment_distance(p, u, start_of(a, j), span_of(a, j))
             d = axes - radius - a[RADIUS, j]
             part[j] = i if d < out[j] else part[j]

@@ -90,7 +90,7 @@ def test_set_distances_are_the_least_of_all_pairs() -> None:
         out, part = np.empty(m), np.empty(m)
         columns.capsule_clearances(one, two, out)
         np.testing.assert_allclose(out, expected.min(axis=0), atol=1e-12)
-        columns.nearest_parts(two, one, 0, n - 1, out, part)
+        columns.nearest_parts(two, m, one, 0, n - 1, out, part)
         np.testing.assert_allclose(out, expected.min(axis=0), atol=1e-12)
         np.testing.assert_array_equal(part, expected.argmin(axis=0))
         assert columns.least(out)[1] == expected.min(axis=0).argmin()

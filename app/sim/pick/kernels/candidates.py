@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from app.sim.core.arrays import Vec
 from app.sim.core.jit import kernel
+from app.sim.geometry.capsules import copy_values
 from app.sim.pick.kernels.grasp import DESCEND, GraspRules
 from app.sim.pick.kernels.observation import observe_target
 from app.sim.pick.kernels.observation_workspace import PickObservationWorkspace, PickQuery
@@ -115,6 +116,7 @@ def observe_candidates(
                 phase,
                 closing,
             )
-            observe_target(
-                arm, floor_z, state, around.time_left, work.robot, work.sight, out[s * n + i]
-            )
+            row, left = out[s * n + i], around.time_left
+            if i > 0:
+                copy_values(out[s * n], row)
+            observe_target(arm, floor_z, state, left, work.robot, work.sight, row, i > 0)

@@ -34,10 +34,7 @@ from app.sim.pick.kernels.observation_layout import (
     N_WITH_BODY,
     N_WITH_PHASE,
     NEAREST,
-    PELVIS,
-    PRESENT_WITHIN,
     SCALARS,
-    SECOND_ARMS,
     SECOND_CLEARANCE,
     STILL_AHEAD,
     TIME_SCALE,
@@ -51,13 +48,16 @@ from app.sim.pick.kernels.observation_workspace import (
     COARSE_SPAN,
     FIRST_PART,
     LAST_PART,
+    MOVING_LANES,
     N_COARSE,
+    N_LANES,
     STILL,
     PickObservationWorkspace,
     PickQuery,
     predict_person,
     query_at,
 )
+from app.sim.pick.kernels.second_person import place_second, write_second
 from app.sim.robot.kernels import kinematics
 from app.sim.robot.kernels.arm import (
     CONTROLLED,
@@ -109,6 +109,12 @@ def _place_lanes(arm: Arm, q: Vec, first: int, work: PickObservationWorkspace) -
 
 
 @kernel(inline="always")
+def _find_nearest(work: PickObservationWorkspace, lanes: int, person: Vec) -> None:
+    """Find the part of a person, shape (9, 16), that is nearest to each of the first lanes."""
+    nearest_parts(work.lanes, lanes, person, FIRST_PART, LAST_PART, work.gap, work.part)
+
+
+@kernel(inline="always")
 def _lane_clearance(first: int, work: PickObservationWorkspace) -> float:
     """Return the clearance of one configuration's lanes, in units of the scale."""
     best = FARTHEST
@@ -135,10 +141,13 @@ def _write_joints(arm: Arm, state: PickQuery, out: Obs) -> None:
         out[38 + j] = 0.5 * state.human_qd[0, j]
     out[21] = human_q[1] - 1.25
     out[22] = (human_q[2] + 1.5 * math.pi) % (2.0 * math.pi) - math.pi
+    if out.shape[0] == N_WITH_BODY:
+        for i in range(body.N_SIZE):
+            out[N_FEATURES + i] = state.size[0, i]
 
 
 @kernel(inline="always")
-def _write_tool(qd: Vec, goal: Vec, robot: RobotPose, out: Obs) -> None:
+def _write_tool(qd: Vec, robot: RobotPose, out: Obs) -> None:
     jacobian, tcp = robot.jacobian, robot.tcp
     kinematics.tcp_jacobian(robot.rot, robot.pos, tcp, jacobian)
     for i in range(3):
@@ -146,18 +155,17 @@ def _write_tool(qd: Vec, goal: Vec, robot: RobotPose, out: Obs) -> None:
         for j in range(6):
             speed += jacobian[i, j] * qd[j]
         out[56 + i] = tcp[i]
-        out[59 + i] = 2.0 * (goal[i] - tcp[i])
         out[62 + i] = 2.0 * speed
         out[65 + i] = robot.rot[6, i, 1]
+    out[SCALARS + 1] = robot_tilt(robot)
 
 
 @kernel(inline="always")
-def _write_human_arms(person: PersonWorkspace, robot: RobotPose, goal: Vec, out: Obs) -> None:
+def _write_human_arms(person: PersonWorkspace, robot: RobotPose, out: Obs) -> None:
     k, now, later, pos, tcp = ARMS, person.points, person.points_later, robot.pos, robot.tcp
     for point in (body.HAND_R, body.HAND_L, body.ELBOW_R, body.ELBOW_L):
         for i in range(3):
             out[k + i] = now[point, i] - tcp[i]
-            out[k + 3 + i] = now[point, i] - goal[i]
             out[k + 6 + i] = now[point, i] - pos[3, i]
         k += 9
     for point in (body.HAND_R, body.HAND_L):
@@ -167,16 +175,26 @@ def _write_human_arms(person: PersonWorkspace, robot: RobotPose, goal: Vec, out:
 
 
 @kernel(inline="always")
-def _write_nearest(work: PickObservationWorkspace, k: int, out: Obs) -> float:
-    """Write distance and direction of the nearest human part per link group.
+def _write_target(goal: Vec, person: PersonWorkspace, tcp: Vec, out: Obs) -> None:
+    """Write the target relative to tool, hands and elbows."""
+    square, k = 0.0, ARMS + 3
+    for i in range(3):
+        out[59 + i] = 2.0 * (goal[i] - tcp[i])
+        square += (goal[i] - tcp[i]) ** 2
+    out[SCALARS] = 2.0 * math.sqrt(square)
+    for point in (body.HAND_R, body.HAND_L, body.ELBOW_R, body.ELBOW_L):
+        for i in range(3):
+            out[k + i] = person.points[point, i] - goal[i]
+        k += 9
 
-    Returns:
-        The least distance [m].
-    """
-    overall, gap, vector = FAR, work.gap, work.gap_vector
+
+@kernel(inline="always")
+def _write_nearest(work: PickObservationWorkspace, out: Obs) -> None:
+    """Write distance and direction of the nearest human part per link group."""
+    overall, gap, vector, k = FAR, work.gap, work.gap_vector, NEAREST
     for group in range(4):
-        lane = COARSE_FIRST[group]
-        for c in range(COARSE_FIRST[group] + 1, COARSE_FIRST[group + 1]):
+        lane = STILL + COARSE_FIRST[group]
+        for c in range(lane + 1, STILL + COARSE_FIRST[group + 1]):
             if gap[c] < gap[lane]:
                 lane = c
         part = int(work.part[lane])
@@ -185,66 +203,22 @@ def _write_nearest(work: PickObservationWorkspace, k: int, out: Obs) -> float:
         for i in range(3):
             out[k + 4 * group + 1 + i] = vector[i] / (length + 1e-9)
         overall = min(overall, gap[lane])
-    return overall
+    out[SCALARS + 2] = _scaled(overall)
+    if out.shape[0] == N_WITH_PHASE or out.shape[0] == N_PICK:
+        out[N_FEATURES + 4] = min(1.0, overall / CLOSE_SCALE)
 
 
 @kernel(inline="always")
-def _write_phase(state: PickQuery, clearance: float, out: Obs) -> None:
-    """Write the phase of the pick, the share of closing and the near clearance."""
+def _write_phase(state: PickQuery, out: Obs) -> None:
+    """Write the phase of the pick and the share of closing."""
     for phase in range(3):
         out[N_FEATURES + phase] = 1.0 if state.phase == phase else 0.0
     out[N_FEATURES + 3] = state.closing
-    out[N_FEATURES + 4] = min(1.0, clearance / CLOSE_SCALE)
-
-
-@kernel(inline="always")
-def _place_second(floor_z: float, state: PickQuery, work: PickObservationWorkspace) -> int:
-    """Place the second person; return the number of that person, 0 where there is none.
-
-    Of the people after the first it is the one with a hand or the pelvis nearest to the target.
-    """
-    second, goal, person = 0, state.goal, work.second
-    best, placed = PRESENT_WITHIN, 0
-    for w in range(1, state.human_q.shape[0]):
-        x, y = state.human_q[w, 0], state.human_q[w, 1]
-        if math.hypot(x, y) >= PRESENT_WITHIN:
-            continue
-        place_person(floor_z, state.human_q[w], state.human_qd[w], state.size[w], person)
-        placed = w
-        distance = math.hypot(x - goal[0], y - goal[1])
-        for point in (body.HAND_R, body.HAND_L):
-            dx = person.points[point, 0] - goal[0]
-            dy = person.points[point, 1] - goal[1]
-            distance = min(distance, math.hypot(dx, dy))
-        if second == 0 or distance < best:
-            best, second = distance, w
-    if second != placed:
-        q, qd = state.human_q[second], state.human_qd[second]
-        place_person(floor_z, q, qd, state.size[second], person)
-    return second
-
-
-@kernel(inline="always")
-def _write_second(q: Vec, goal: Vec, tcp: Vec, person: PersonWorkspace, out: Obs) -> None:
-    """Write position, arms and hand velocities of the second person."""
-    k = SECOND_ARMS
-    out[PELVIS], out[PELVIS + 1] = q[0], q[1] - 1.25
-    out[PELVIS + 2] = (q[2] + 1.5 * math.pi) % (2.0 * math.pi) - math.pi
-    for point in (body.HAND_R, body.HAND_L, body.ELBOW_R, body.ELBOW_L):
-        for i in range(3):
-            out[k + i] = person.points[point, i] - tcp[i]
-            out[k + 3 + i] = person.points[point, i] - goal[i]
-        k += 6
-    for point in (body.HAND_R, body.HAND_L):
-        for i in range(3):
-            out[k + i] = (person.points_later[point, i] - person.points[point, i]) / TICK
-        k += 3
 
 
 @kernel(inline="always")
 def _write_clearances(work: PickObservationWorkspace, place: int, i: int, out: Obs) -> None:
-    """Write the clearances of the three configurations at horizon ``i`` from ``place`` on."""
-    out[place + i] = _lane_clearance(STILL, work)
+    """Write the clearances ahead at horizon ``i``, whose group starts at ``place``."""
     out[place + 3 + i] = _lane_clearance(ALONG_BASE, work)
     out[place + 7 + i] = _lane_clearance(AT_GOAL, work)
 
@@ -257,8 +231,9 @@ def _write_look_ahead(
     second: int,
     work: PickObservationWorkspace,
     out: Obs,
+    lanes: int,
 ) -> None:
-    """Write the clearances to the observed people at all horizons."""
+    """Write the clearances to the observed people at all horizons, of the first ``lanes``."""
     q, q_goal, base = state.q, state.q_goal, work.base
     person = work.person
     work.q[5] = q[5]
@@ -277,12 +252,15 @@ def _write_look_ahead(
         if not predicts:
             extrapolate_capsules(person.now, person.later, HORIZONS[i], person.moved)
         moved = work.ahead[0, i] if predicts else person.moved
-        nearest_parts(work.lanes, moved, FIRST_PART, LAST_PART, work.gap, work.part)
+        _find_nearest(work, lanes, moved)
+        if lanes == N_LANES:
+            out[STILL_AHEAD + i] = _lane_clearance(STILL, work)
         _write_clearances(work, STILL_AHEAD, i, out)
         if second > 0:
-            moved = work.ahead[1, i]
-            nearest_parts(work.lanes, moved, FIRST_PART, LAST_PART, work.gap, work.part)
-            _write_clearances(work, SECOND_CLEARANCE + 1, i, out)
+            moved, k = work.ahead[1, i], SECOND_CLEARANCE + 1
+            _find_nearest(work, N_LANES, moved)
+            out[k + i] = _lane_clearance(STILL, work)
+            _write_clearances(work, k, i, out)
 
 
 @kernel(inline="always")
@@ -307,7 +285,7 @@ def observe(
         out: Filled, shape (N_FEATURES,), (N_WITH_BODY,), (N_WITH_PHASE,) or (N_PICK,).
     """
     place_person(floor_z, state.human_q[0], state.human_qd[0], state.size[0], work.person)
-    observe_target(arm, floor_z, state, time_left, robot, work, out)
+    observe_target(arm, floor_z, state, time_left, robot, work, out, False)
 
 
 @kernel(inline="always")
@@ -319,48 +297,48 @@ def observe_target(
     robot: RobotPose,
     work: PickObservationWorkspace,
     out: Obs,
+    again: bool,
 ) -> None:
-    """Apply :func:`observe` with the first person already placed in ``work.person``."""
-    n_obs, second = out.shape[0], 0
-    if n_obs == N_WITH_BODY:
-        for i in range(body.N_SIZE):
-            out[N_FEATURES + i] = state.size[0, i]
+    """Apply :func:`observe` with the first person already placed in ``work.person``.
+
+    With ``again`` only what depends on the target is written: work space and ``out`` have the
+    rest from another target in the same state.
+    """
+    n_obs, second, lanes = out.shape[0], 0, MOVING_LANES if again else N_LANES
     q, goal, q_goal, person = state.q, state.goal, state.q_goal, work.person
-    _write_joints(arm, state, out)
-    _write_tool(state.qd, goal, robot, out)
-    _write_human_arms(person, robot, goal, out)
     base, tcp = work.base, robot.tcp
+    if not again:
+        _write_joints(arm, state, out)
+        _write_tool(state.qd, robot, out)
+        _write_human_arms(person, robot, out)
+        out[SCALARS + 3] = time_left / TIME_SCALE
+        rot, pos = robot.rot, robot.pos
+        place_capsules(rot, pos, COARSE_LINK, COARSE_P0, COARSE_SPAN, STILL, work.lanes)
+    _write_target(goal, person, tcp, out)
     base_motion(arm, q, q_goal, base)
     for j in range(CONTROLLED):
         out[MOTION + j] = q_goal[j] - q[j]
         out[BASE_START + j] = base[j]
-    out[SCALARS] = 2.0 * math.sqrt(
-        (goal[0] - tcp[0]) ** 2 + (goal[1] - tcp[1]) ** 2 + (goal[2] - tcp[2]) ** 2
-    )
-    out[SCALARS + 1] = robot_tilt(robot)
-    out[SCALARS + 3] = time_left / TIME_SCALE
-    place_capsules(robot.rot, robot.pos, COARSE_LINK, COARSE_P0, COARSE_SPAN, STILL, work.lanes)
     _place_lanes(arm, state.q_grasp, AT_GOAL, work)
-    nearest_parts(work.lanes, person.now, FIRST_PART, LAST_PART, work.gap, work.part)
-    clearance = _write_nearest(work, NEAREST, out)
-    out[SCALARS + 2] = _scaled(clearance)
+    _find_nearest(work, lanes, person.now)
+    if not again:
+        _write_nearest(work, out)
     out[AT_GOAL_AHEAD] = _lane_clearance(AT_GOAL, work)
     if n_obs == N_WITH_PHASE or n_obs == N_PICK:
-        _write_phase(state, clearance, out)
+        _write_phase(state, out)
     if n_obs == N_PICK:
-        second = _place_second(floor_z, state, work)
+        second = place_second(floor_z, state, work)
         if second > 0:
-            _write_second(state.human_q[second], goal, tcp, work.second, out)
+            write_second(state.human_q[second], goal, tcp, work.second, out)
         else:
-            _write_second(work.far.q, goal, tcp, work.far, out)
+            write_second(work.far.q, goal, tcp, work.far, out)
         for k in range(SECOND_CLEARANCE, N_PICK):
             out[k] = FARTHEST / DISTANCE_SCALE
     if second > 0:
-        now = work.second.now
-        nearest_parts(work.lanes, now, FIRST_PART, LAST_PART, work.gap, work.part)
+        _find_nearest(work, N_LANES, work.second.now)
         out[SECOND_CLEARANCE] = _lane_clearance(STILL, work)
         out[SECOND_CLEARANCE + 7] = _lane_clearance(AT_GOAL, work)
-    _write_look_ahead(arm, floor_z, state, second, work, out)
+    _write_look_ahead(arm, floor_z, state, second, work, out, lanes)
 
 
 @kernel()
