@@ -13,6 +13,7 @@ the robot workspace and then averaging the action based on the distance between 
 robot", which leaves the weights open.
 """
 
+from abc import ABC, abstractmethod
 from enum import StrEnum
 from typing import Protocol
 
@@ -78,9 +79,22 @@ class Controller(Protocol):
         """Return actions in [-1, 1], shape (n_envs, 6); 0 where the episode has ended."""
 
 
-class PolicyQuery(Protocol):
-    """Actions of a policy beside all people, or beside one of them alone."""
+class PolicyQuery(ABC):
+    """A controller that asks a policy, beside all people or beside one of them alone."""
 
+    def acts(self, batch: ReachBatch) -> Actions:
+        """Return actions; see :class:`Controller`.
+
+        Raises:
+            GoalOutside: A goal lies outside the training targets interpolated between.
+        """
+        act = np.zeros((batch.n_envs, 6), dtype=np.float32)
+        rows = np.flatnonzero(batch.state.outcome == RUNNING)
+        if rows.size:
+            act[rows] = self.query(batch, rows, None)
+        return act
+
+    @abstractmethod
     def query(self, batch: ReachBatch, rows: Rows, who: int | None) -> Actions:
         """Return actions, shape (k, 6).
 
@@ -90,15 +104,11 @@ class PolicyQuery(Protocol):
         """
 
 
-class Direct:
+class Direct(PolicyQuery):
     """The policy for its own goal."""
 
     def __init__(self, actor: ReachActor) -> None:
         self._actor = actor
-
-    def acts(self, batch: ReachBatch) -> Actions:
-        """Return actions; see :class:`Controller`."""
-        return _for_running(self, batch)
 
     def query(self, batch: ReachBatch, rows: Rows, who: int | None) -> Actions:
         """Return actions; see :class:`PolicyQuery`."""
@@ -107,7 +117,7 @@ class Direct:
         return self._actor.acts(obs[:, 0])
 
 
-class Interpolated:
+class Interpolated(PolicyQuery):
     """The policy between its training targets.
 
     Args:
@@ -120,14 +130,6 @@ class Interpolated:
     def __init__(self, actor: ReachActor) -> None:
         self._between = Interpolation(actor)
 
-    def acts(self, batch: ReachBatch) -> Actions:
-        """Return actions; see :class:`Controller`.
-
-        Raises:
-            GoalOutside: A goal lies outside the targets.
-        """
-        return _for_running(self, batch)
-
     def query(self, batch: ReachBatch, rows: Rows, who: int | None) -> Actions:
         """Return actions; see :class:`PolicyQuery`."""
         _require_view(self._between.actor, batch)
@@ -135,7 +137,7 @@ class Interpolated:
         return self._between.acts(batch.observe_goals(rows, places, who), mix)
 
 
-class DistanceWeighted:
+class DistanceWeighted(PolicyQuery):
     """The distance-weighted mean over people of the actions beside each of them alone.
 
     With one person it is the query itself, exactly.
@@ -143,10 +145,6 @@ class DistanceWeighted:
 
     def __init__(self, query: PolicyQuery) -> None:
         self._query = query
-
-    def acts(self, batch: ReachBatch) -> Actions:
-        """Return actions; see :class:`Controller`."""
-        return _for_running(self, batch)
 
     def query(self, batch: ReachBatch, rows: Rows, who: int | None) -> Actions:
         """Return actions; see :class:`PolicyQuery`."""
@@ -220,15 +218,6 @@ def inference_modes_of(actor: ReachActor) -> tuple[InferenceMode, ...]:
         for mode in InferenceMode
         if (targets or not mode.interpolated) and (rollouts or not mode.rollout)
     )
-
-
-def _for_running(query: PolicyQuery, batch: ReachBatch) -> Actions:
-    """Return the actions of running environments, 0 elsewhere, shape (n_envs, 6)."""
-    act = np.zeros((batch.n_envs, 6), dtype=np.float32)
-    rows = np.flatnonzero(batch.state.outcome == RUNNING)
-    if rows.size:
-        act[rows] = query.query(batch, rows, None)
-    return act
 
 
 def _require_view(actor: ReachActor, batch: ReachBatch) -> None:
