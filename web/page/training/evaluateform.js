@@ -2,7 +2,7 @@
 import { html } from "../vendor/htm-preact-standalone.module.js";
 import { post } from "../api.js";
 import * as format from "../format.js";
-import { FormHead, Loading, OWN, parsed, useForm, useItems } from "./formfields.js";
+import { Loading, OWN, parsed, StartForm, useForm, useItems } from "./formfields.js";
 
 const SEED = { ...OWN[0], default: 11 };
 
@@ -30,9 +30,8 @@ export function EvaluateForm({ link, onStarted, onClose }) {
     name: typed.name || null,
     ...(protocol.recordings !== "none" && { recordings: chosen }),
   }, key);
-  return html`<form class="train" ref=${form.ref} onSubmit=${form.submit(send)} noValidate
-    aria-label="New evaluation">
-    <${FormHead} title="New evaluation" fault=${form.faults[""]} onClose=${onClose} />
+  return html`<${StartForm} form=${form} title="New evaluation" send=${send} start="Start evaluation"
+    note="Runs in its own process, beside the cell." onClose=${onClose}>
     ${form.row({ name: "protocol", choices: protocols.items.map(({ name }) => name),
       default: protocol.name, help: protocol.title }, { protocol: protocol.name })}
     ${protocol.purpose && form.row(checkpointField(protocol, checkpoints.items))}
@@ -42,12 +41,7 @@ export function EvaluateForm({ link, onStarted, onClose }) {
     ${protocol.recordings !== "none" && html`<${Recordings} all=${recordings.items} chosen=${chosen}
       required=${protocol.recordings === "required"} fault=${form.faults.recordings}
       onChange=${(names) => form.type("recordings", names)} />`}
-    <div class="train-foot">
-      <button type="submit" class="primary" disabled=${form.busy}>
-        ${form.busy ? "Starting …" : "Start evaluation"}</button>
-      <span class="faint">Runs in its own process, beside the cell.</span>
-    </div>
-  </form>`;
+  </${StartForm}>`;
 }
 
 /** Stored checkpoints of the purpose of a protocol; empty is the protocol's own. */

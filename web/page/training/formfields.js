@@ -66,13 +66,23 @@ export const OWN = [
   { name: "name", default: "", help: "For the list of jobs; may be empty." },
 ];
 
-/** The head of a form, and what is wrong with it as a whole. */
-export function FormHead({ title, fault, onClose }) {
-  return html`<div class="train-head"><h3>${title}</h3>
+/** The frame of a form that starts a job: title, faults of the whole, button and a note. */
+export function StartForm({ form, title, send, start, note, onClose, children }) {
+  const fault = form.faults[""];
+  return html`<form class="train" ref=${form.ref} onSubmit=${form.submit(send)} noValidate
+    aria-label=${title}>
+    <div class="train-head"><h3>${title}</h3>
       <button type="button" class="quiet-button" aria-label="Close the form" onClick=${onClose}>
         <${Icon} name="close" /></button></div>
     ${fault && html`<p class="notice bad" role="alert"><${Icon} name="alert" />
-      <span>${fault}</span></p>`}`;
+      <span>${fault}</span></p>`}
+    ${children}
+    <div class="train-foot">
+      <button type="submit" class="primary" disabled=${form.busy}>
+        ${form.busy ? "Starting …" : start}</button>
+      ${note && html`<span class="faint">${note}</span>`}
+    </div>
+  </form>`;
 }
 
 /** One field with its unit, help and fault; `prefix` keeps the fields of several forms apart. */

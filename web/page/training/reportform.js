@@ -1,7 +1,7 @@
 // The form that starts a report: from stored results, or measured again.
 import { html } from "../vendor/htm-preact-standalone.module.js";
 import { post } from "../api.js";
-import { FormHead, OWN, parsed, useForm } from "./formfields.js";
+import { OWN, parsed, StartForm, useForm } from "./formfields.js";
 
 const MEASURE = { name: "measure", title: "Results", default: "false", choices: ["false", "true"],
   labels: { false: "stored", true: "measure again" },
@@ -27,15 +27,9 @@ export function ReportForm({ onStarted, onClose }) {
     ...(measure && { episodes: episodes.trim() ? parsed(episodes) : null,
       parallel: parsed(parallel), seed: parsed(seed) }),
   }, key);
-  return html`<form class="train" ref=${form.ref} onSubmit=${form.submit(send)} noValidate
-    aria-label="New report">
-    <${FormHead} title="New report" fault=${form.faults[""]} onClose=${onClose} />
+  return html`<${StartForm} form=${form} title="New report" send=${send} start="Start report"
+    note=${measure && "Its evaluations wait in the queue like others."} onClose=${onClose}>
     <p class="field-help">Every table and figure of the thesis beside the results of Tandem.</p>
     ${[MEASURE, ...(measure ? MEASURED : []), OWN[1]].map((field) => form.row(field))}
-    <div class="train-foot">
-      <button type="submit" class="primary" disabled=${form.busy}>
-        ${form.busy ? "Starting …" : "Start report"}</button>
-      ${measure && html`<span class="faint">Its evaluations wait in the queue like others.</span>`}
-    </div>
-  </form>`;
+  </${StartForm}>`;
 }

@@ -2,7 +2,7 @@
 import { html, useState } from "../vendor/htm-preact-standalone.module.js";
 import { post } from "../api.js";
 import { Icon } from "../icons.js";
-import { FormHead, Loading, OWN, parsed, useForm } from "./formfields.js";
+import { Loading, OWN, parsed, StartForm, useForm } from "./formfields.js";
 
 const MAX_RANGES = 8;
 const COUNTS = [
@@ -51,9 +51,8 @@ export function SweepForm({ presets: { items: presets, error }, cell, onStarted,
     setRanges((now) => now.map((one, k) => (k === place ? { ...one, ...more } : one)));
   };
   const free = preset.fields.filter((f) => !["cell", total.name].includes(f.name) && !ranges.some((r) => r.path === f.name));
-  return html`<form class="train" ref=${form.ref} onSubmit=${form.submit(send)} noValidate
-    aria-label="New sweep">
-    <${FormHead} title="New sweep" fault=${form.faults[""]} onClose=${onClose} />
+  return html`<${StartForm} form=${form} title="New sweep" send=${send} start="Start sweep"
+    note="Its trainings wait in the queue like others." onClose=${onClose}>
     <div class="field"><label for="sweep-preset">Preset</label>
       <select id="sweep-preset" value=${preset.name} onChange=${(e) => {
         setName(e.target.value);
@@ -76,12 +75,7 @@ export function SweepForm({ presets: { items: presets, error }, cell, onStarted,
     ${form.row({ name: "objective.protocol", title: "Evaluation", choices: preset.objectives,
       default: preset.objectives[0] })}
     ${[QUANTITY, EPISODES, PRUNE].map((field) => form.row(field))}
-    <div class="train-foot">
-      <button type="submit" class="primary" disabled=${form.busy}>
-        ${form.busy ? "Starting …" : "Start sweep"}</button>
-      <span class="faint">Its trainings wait in the queue like others.</span>
-    </div>
-  </form>`;
+  </${StartForm}>`;
 }
 
 function cellOf(preset, cell) {

@@ -3,7 +3,7 @@ import { html, useEffect, useState } from "../vendor/htm-preact-standalone.modul
 import { post } from "../api.js";
 import { Icon } from "../icons.js";
 import { BUDGETS, budgetBody, budgetTexts } from "./budgets.js";
-import { capital, changed, FormHead, Loading, OWN, parsed, show, useForm } from "./formfields.js";
+import { capital, changed, Loading, OWN, parsed, show, StartForm, useForm } from "./formfields.js";
 
 const FIRST_FIELDS = ["cell", "learning.total_steps", "learning.n_envs", "learning.lr_start"];
 /**
@@ -39,9 +39,8 @@ export function TrainForm({ presets: { items: presets, error }, cell, from, onSt
   const inRest = rest.some((f) => form.faults[f.name] || changed(f, values));
   const title = from ? `Clone of job ${from.number}` : "New training job";
   const row = (field) => form.row(field, values);
-  return html`<form class="train" ref=${form.ref} onSubmit=${form.submit(send)} noValidate
-    aria-label=${title}>
-    <${FormHead} title=${title} fault=${form.faults[""]} onClose=${onClose} />
+  return html`<${StartForm} form=${form} title=${title} send=${send} start="Start training"
+    note="Runs in its own process, beside the cell." onClose=${onClose}>
     <div class="field">
       <label for="train-preset">Preset</label>
       <select id="train-preset" value=${preset.name}
@@ -62,12 +61,7 @@ export function TrainForm({ presets: { items: presets, error }, cell, from, onSt
       ${byGroup(rest).map(([group, members]) => html`<fieldset key=${group}>
         <legend>${capital(group)}</legend>${members.map(row)}</fieldset>`)}
     </details>`}
-    <div class="train-foot">
-      <button type="submit" class="primary" disabled=${form.busy}>
-        ${form.busy ? "Starting …" : "Start training"}</button>
-      <span class="faint">Runs in its own process, beside the cell.</span>
-    </div>
-  </form>`;
+  </${StartForm}>`;
 }
 
 /** The cell that is shown, as if it had been chosen, where the preset can be trained in it. */
