@@ -1,4 +1,7 @@
-"""Jobs on a Ray cluster of two nodes: with the bits of local ones, whatever is killed."""
+"""Jobs on a Ray cluster of two nodes: with the bits of local ones, whatever is killed.
+
+The tests share the cluster, and need fewer of its nodes from one to the next.
+"""
 
 import os
 import signal
@@ -7,7 +10,7 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import pytest
@@ -31,16 +34,34 @@ PATIENCE_OF_RAY = replace(PATIENCE, cancel_s=60.0, shutdown_s=60.0)
 STEPS = list(range(128, 1025, 128))
 
 
-@contextmanager
-def ray_cluster(n_nodes: int) -> Iterator["subprocess.Popen[str]"]:
-    """Run a cluster; its address is the first line of the output."""
+@dataclass
+class RayCluster:
+    """A cluster in a process of its own."""
+
+    process: "subprocess.Popen[str]"
+    n_nodes: int
+    address: str
+
+    def keep(self, n_nodes: int) -> None:
+        """Remove nodes, as if their machines had failed, until so many are left."""
+        assert n_nodes <= self.n_nodes and self.process.stdin is not None
+        for _ in range(self.n_nodes - n_nodes):
+            self.process.stdin.write("the node\n")
+            self.process.stdin.flush()
+            assert line_of(self.process) == "removed"
+        self.n_nodes = n_nodes
+
+
+@pytest.fixture(scope="module")
+def cluster() -> Iterator[RayCluster]:
+    """A cluster that begins with two nodes."""
     environment = {
         **os.environ,
         "PYTHONPATH": search_path(os.environ),
         "RAY_USAGE_STATS_ENABLED": "0",
         "RAY_worker_niceness": "0",
     }
-    command = [sys.executable, "-m", "tests.jobs.remote.ray_cluster", str(n_nodes)]
+    command = [sys.executable, "-m", "tests.jobs.remote.ray_cluster", "2"]
     with subprocess.Popen(
         command,
         cwd=PROJECT_ROOT,
@@ -50,7 +71,7 @@ def ray_cluster(n_nodes: int) -> Iterator["subprocess.Popen[str]"]:
         text=True,
     ) as process:
         try:
-            yield process
+            yield RayCluster(process, 2, line_of(process))
         finally:
             assert process.stdin is not None
             process.stdin.close()  # the cluster ends with it
@@ -94,37 +115,56 @@ def made_by(store: Store, job: JobRecord) -> list[tuple[int | None, str]]:
     return [(one.step, one.sha256) for one in made]
 
 
-def test_stopped_server_keeps_the_last_step_and_a_killed_one_ends_its_worker(
-    store: Store, tmp_path: Path, address: str
+def test_training_whose_worker_and_node_fail_ends_with_the_checkpoints_of_a_local_one(
+    store: Store, tmp_path: Path, address: str, cluster: RayCluster
 ) -> None:
-    with ray_cluster(1) as cluster:
-        ray_address = line_of(cluster)
-        with running_on(ray_address, store, tmp_path, address):
-            job_id = train(store, **{**FIELDS, "learning.total_steps": 200_000})
-            wait_for(store, job_id, lambda job: job.step >= 128)
-        job = jobs.get_job(store, job_id)
-        state = attempts.load_resume(store, job_id)
-        assert (job.state, job.failures) == ("queued", 0)
-        assert state is not None and state.step >= job.step
-        with running_on(ray_address, store, tmp_path, address):
-            wait_for(store, job_id, lambda job: job.step > state.step)
-            driver = process_of(job_id, "jobs.remote.ray_driver")
-            worker = process_of(job_id)
-            assert driver is not None and worker is not None
-            jobs.request_cancel(store, job_id)
-            os.kill(driver, signal.SIGKILL)
-            while process_of(job_id) == worker:
-                time.sleep(0.05)
-            assert wait_until_final(store, job_id).state == "cancelled"
+    local_supervisor = Supervisor(store, tmp_path, timeouts=PATIENCE)
+    local_supervisor.start()
+    local = wait_until_final(store, train(store, **FIELDS))
+    local_supervisor.stop()
+    with running_on(cluster.address, store, tmp_path, address):
+        job_id = train(store, **FIELDS)
+        wait_for(store, job_id, lambda job: job.step >= 384)
+        pid = process_of(job_id)
+        assert pid is not None
+        os.kill(pid, signal.SIGKILL)
+        wait_for(store, job_id, lambda job: job.attempt == 2 and job.step >= 640)
+        cluster.keep(1)
+        job = wait_until_final(store, job_id)
+    assert (job.state, job.error) == ("succeeded", None)
+    assert job.result == local.result
+    assert made_by(store, job) == made_by(store, local) and len(made_by(store, job)) == 4
+    assert [point.step for point in metrics.list_metrics(store, job_id)] == STEPS
+
+
+def test_stopped_server_keeps_the_last_step_and_a_killed_one_ends_its_worker(
+    store: Store, tmp_path: Path, address: str, cluster: RayCluster
+) -> None:
+    cluster.keep(1)
+    with running_on(cluster.address, store, tmp_path, address):
+        job_id = train(store, **{**FIELDS, "learning.total_steps": 200_000})
+        wait_for(store, job_id, lambda job: job.step >= 128)
+    job = jobs.get_job(store, job_id)
+    state = attempts.load_resume(store, job_id)
+    assert (job.state, job.failures) == ("queued", 0)
+    assert state is not None and state.step >= job.step
+    with running_on(cluster.address, store, tmp_path, address):
+        wait_for(store, job_id, lambda job: job.step > state.step)
+        driver = process_of(job_id, "jobs.remote.ray_driver")
+        worker = process_of(job_id)
+        assert driver is not None and worker is not None
+        jobs.request_cancel(store, job_id)
+        os.kill(driver, signal.SIGKILL)
+        while process_of(job_id) == worker:
+            time.sleep(0.05)
+        assert wait_until_final(store, job_id).state == "cancelled"
 
 
 def test_job_without_a_free_processor_waits_and_says_so(
-    store: Store, tmp_path: Path, address: str
+    store: Store, tmp_path: Path, address: str, cluster: RayCluster
 ) -> None:
-    with (
-        ray_cluster(0) as cluster,
-        running_on(line_of(cluster), store, tmp_path, address) as supervisor,
-    ):
+    cluster.keep(0)
+    with running_on(cluster.address, store, tmp_path, address) as supervisor:
         job_id = train(store, **FIELDS)
         job = wait_for(store, job_id, lambda job: job.waiting is not None)
         assert (job.state, job.waiting) == ("running", "no free CPU in the Ray cluster")
@@ -132,28 +172,3 @@ def test_job_without_a_free_processor_waits_and_says_so(
             time.sleep(0.05)
         jobs.request_cancel(store, job_id)
         assert wait_until_final(store, job_id).state == "cancelled"
-
-
-def test_training_whose_worker_and_node_fail_ends_with_the_checkpoints_of_a_local_one(
-    store: Store, tmp_path: Path, address: str
-) -> None:
-    local_supervisor = Supervisor(store, tmp_path, timeouts=PATIENCE)
-    local_supervisor.start()
-    local = wait_until_final(store, train(store, **FIELDS))
-    local_supervisor.stop()
-    with ray_cluster(2) as cluster, running_on(line_of(cluster), store, tmp_path, address):
-        job_id = train(store, **FIELDS)
-        wait_for(store, job_id, lambda job: job.step >= 384)
-        pid = process_of(job_id)
-        assert pid is not None
-        os.kill(pid, signal.SIGKILL)
-        wait_for(store, job_id, lambda job: job.attempt == 2 and job.step >= 640)
-        assert cluster.stdin is not None
-        cluster.stdin.write("the node\n")
-        cluster.stdin.flush()
-        assert line_of(cluster) == "removed"
-        job = wait_until_final(store, job_id)
-    assert (job.state, job.error) == ("succeeded", None)
-    assert job.result == local.result
-    assert made_by(store, job) == made_by(store, local) and len(made_by(store, job)) == 4
-    assert [point.step for point in metrics.list_metrics(store, job_id)] == STEPS
