@@ -119,12 +119,12 @@ def motion_times(seed: int, seconds: float) -> tuple[dict[str, Vec], str]:
     def asked(question: MotionQuestion) -> Sequence[tuple[str, Callable[[], object]]]:
         question = replace(question, rollout=False)
         alone = replace(question, safety=None)
-        direct = replace(alone, inference_mode="direct")
+        direct, ahead = replace(alone, inference_mode="direct"), replace(alone, rollout=True)
         return (
             ("motion", lambda: one.decide(alone)),
             ("motion-monitored", lambda: one.decide(question)),
             ("motion-direct", lambda: one.decide(direct)),
-            ("motion-rollout", lambda: one.decide(replace(alone, rollout=True))),
+            ("motion-rollout", lambda: one.decide(ahead)),
             ("motion-sb3-predict", predict),
         )
 

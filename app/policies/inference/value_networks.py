@@ -36,6 +36,7 @@ from app.policies.networks.forward import (
     forward_many,
     new_columns,
 )
+from app.policies.networks.large_pages import in_large_pages
 from app.policies.networks.outcome import (
     CLIP,
     N_OUT,
@@ -108,18 +109,22 @@ class ValueNetworks:
         if isinstance(actor, ResidualActor):
             base, fade = actor.base.start, actor.fade
         still = self._n - n  # a plain actor corrects a base motion of 0 behind its inputs
-        self._networks = ActorCritic(
-            actor=_skipping(centred_layers_of(actor.net), n, still),
-            critics=tuple(
-                _skipping(centred_layers_of(one.children()), n, still)
-                for one in critics.children()
-            ),
-            members=tuple(centred_layers_of(member.children()) for member in outcome.members),
-            base=base,
-            fade=np.array(fade or (), dtype=np.float32),
-            mean=outcome.mean.numpy(),
-            scale=outcome.scale.numpy(),
-            widen=float(outcome.widen),
+        self._networks = in_large_pages(
+            ActorCritic(
+                actor=_skipping(centred_layers_of(actor.net), n, still),
+                critics=tuple(
+                    _skipping(centred_layers_of(one.children()), n, still)
+                    for one in critics.children()
+                ),
+                members=tuple(
+                    centred_layers_of(member.children()) for member in outcome.members
+                ),
+                base=base,
+                fade=np.array(fade or (), dtype=np.float32),
+                mean=outcome.mean.numpy(),
+                scale=outcome.scale.numpy(),
+                widen=float(outcome.widen),
+            )
         )
         self._work = new_workspace(self._networks, self._n, CONTROLLED)  # kept by the GIL
         self._few: Callable[..., None] | None = None
