@@ -1,7 +1,7 @@
 """A visitor drags the person into the robot's offset and sees the robot choose another goal."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -133,9 +133,23 @@ def until(server: str, holds: Callable[[dict], bool], limit_s: float) -> dict:
     raise AssertionError(f"the world did not get there: {now['status']}, {now['message']}")
 
 
+@pytest.fixture
+def resumed(server: str) -> Iterator[str]:
+    """The server, whose world goes on with its first targets and person afterwards."""
+    selected = state(server)["selected"]
+    yield server
+    tell(
+        server,
+        {"tag": "set-candidates", "ids": selected},
+        {"tag": "set-mode", "mode": "auto"},
+        {"tag": "resume"},
+    )
+
+
 def test_dragging_a_hand_onto_the_chosen_cube_changes_the_choice(
-    open_page: Callable[..., Page], server: str
+    open_page: Callable[..., Page], resumed: str
 ) -> None:
+    server = resumed
     pause_after_a_pick(server)
     page = open_page()
     expect(page.locator(".story .chip")).to_have_text("Paused")
