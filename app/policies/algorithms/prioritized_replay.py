@@ -136,8 +136,6 @@ class PrioritisedReplay(ReplayBuffer):
 
     Args:
         buffer_size: Capacity in transitions.
-        observation_space: Space of observations.
-        action_space: Space of actions.
         device: Device of minibatches.
         n_envs: Number of environments.
         n_steps: Maximum number of steps of a return.

@@ -26,7 +26,6 @@ class QuantileCritics(Critics):
         width: Units per hidden layer.
         n_obs: Length of observations.
         n_act: Length of an action.
-        n_critics: Number of critics.
         layers: Number of hidden layers of each.
         normed: Whether hidden layers are normalised.
         n_quantiles: Number of quantiles of each.

@@ -67,7 +67,6 @@ class MotionDecider:
     """Decide motions by one policy; safe to call from several threads.
 
     Args:
-        actor: Policy.
         cell: Training cell of the policy.
 
     Raises:

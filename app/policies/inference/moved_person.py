@@ -27,7 +27,6 @@ def scenes_of(
     """Return the observed people beside each posture, the nearest to the robot first.
 
     Args:
-        arm: Robot in its cell.
         shared: From :func:`~app.sim.scene.scene.people_of`.
         q: The robot's joint positions [rad], shape (6,).
         people: Checked people.

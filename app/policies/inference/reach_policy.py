@@ -18,7 +18,6 @@ from app.policies.checkpoints.checkpoint import (
     Checkpoint,
     expect_layout,
     require_purpose,
-    task_of,
 )
 from app.policies.checkpoints.model_state import under
 from app.policies.configs.fields import read_config
@@ -61,11 +60,6 @@ NORMALISATION = "actor.norm"
 
 Floats = NDArray[np.float32]
 Layer = tuple[Floats, Floats]
-
-
-def is_reach(checkpoint: Checkpoint) -> bool:
-    """Return whether a checkpoint is a reach policy."""
-    return task_of(checkpoint) == REACHING
 
 
 def blocked_rules_of(preset: ReachPreset) -> BlockedRules | None:

@@ -107,9 +107,6 @@ class ReachEnvs(Protocol):
 class RolloutImprovement:
     """Improves the actions of one policy; used by one thread at a time.
 
-    Args:
-        actor: The policy.
-
     Raises:
         InvalidInput: The policy cannot be simulated.
     """

@@ -177,7 +177,6 @@ class QNetwork(nn.Sequential):
         n_act: Length of an action.
         layers: Number of hidden layers.
         normed: Whether hidden layers are normalised.
-        n_values: Number of values.
         crowd: Position of the people set; None without one.
     """
 
@@ -203,7 +202,6 @@ class Critics(nn.Module):
         width: Units per hidden layer.
         n_obs: Length of observations.
         n_act: Length of an action.
-        n_critics: Number of value functions.
         layers: Number of hidden layers of each.
         normed: Whether hidden layers are normalised.
         n_values: Number of values of each.

@@ -116,9 +116,7 @@ def evaluate_few(
     """Write actions, values and outcomes of up to ``FEW`` observations.
 
     Args:
-        networks: The networks.
         obs: Observations, shape (n, n_obs).
-        work: Work space.
         act: Filled, shape (n, n_act).
         values: Filled, shape (n,).
         outcomes: Filled, for n observations.

@@ -127,7 +127,6 @@ class DDPGCritics(Critics):
         width: Units per hidden layer.
         n_obs: Length of observations.
         n_act: Length of an action.
-        n_critics: Number of value functions.
         layers: Number of hidden layers of each.
         norm: Normalisation of observations; None for raw ones.
     """

@@ -90,7 +90,6 @@ def _add(rows: int, x: Floats, units: Units, n: int, weights: Floats, sums: Floa
     were read for one row are in the first cache for the next.
 
     Args:
-        rows: Number of rows.
         x: Inputs, shape (rows, n_in) or larger.
         units: Indices of the inputs, of which the first n count.
         n: Number of inputs.

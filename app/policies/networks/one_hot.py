@@ -28,7 +28,6 @@ def sum_rows(codes: Codes, n_codes: int, weight: Floats, out: Floats) -> None:
 
     Args:
         codes: Codes, shape (n, P).
-        n_codes: Number of codes of a place.
         weight: One row per place and code, shape (P * n_codes, width).
         out: Sums, changed in place, shape (n, width).
     """
@@ -94,7 +93,6 @@ class OneHotLinear(nn.Module):
     Args:
         n_places: Number of codes, P.
         n_codes: Number of codes of a place; 0 is a free place.
-        n_plain: Number of plain numbers.
         width: Number of outputs.
     """
 

@@ -40,7 +40,6 @@ class NormedActor(nn.Module):
     Args:
         width: Units per hidden layer.
         n_obs: Length of observations.
-        layers: Number of hidden layers.
     """
 
     def __init__(self, width: int, n_obs: int, layers: int) -> None:

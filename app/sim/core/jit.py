@@ -39,7 +39,6 @@ def direct(compiled: Callable[..., R], arguments: tuple[Any, ...]) -> Callable[.
     array of another type or layout is read as if it were of this one.
 
     Args:
-        compiled: Kernel.
         arguments: Arguments of the types of later calls.
     """
     dispatcher: Any = compiled

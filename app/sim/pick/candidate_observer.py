@@ -26,7 +26,6 @@ class CandidateObserver:
     """Observes candidates in one cell; safe to call from several threads.
 
     Args:
-        cell: The work cell.
         n_obs: Length of an observation, one of those in ``batch.VIEWS``.
         grasp: Phases of a pick.
     """
@@ -64,7 +63,6 @@ class CandidateObserver:
             goals: Targets [m], shape (n, 3).
             time_left_s: Time left [s].
             current: Number of the target that is being picked.
-            progress: Progress of that pick.
 
         Returns:
             Observations, shape (m n, n_obs), those of one set of people together, and whether

@@ -11,11 +11,9 @@ from numpy.typing import NDArray
 
 from app.sim.core.arrays import Vec
 from app.sim.pick.kernels.episode import N_PLAIN
-from app.sim.pick.kernels.observation_layout import LAYOUT
+from app.sim.pick.kernels.observation_layout import LAYOUT, PELVIS_Y
 from app.sim.robot.kernels.arm import CONTROLLED
 
-PELVIS_Y = 1.25
-"""Subtracted from the y of the pelvis in features [m]."""
 PELVIS_TURN = math.pi / 2.0
 """Added to the yaw of the pelvis in features [rad]."""
 

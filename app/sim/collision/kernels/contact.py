@@ -86,8 +86,6 @@ def sweep(
     """Check one period for contact, including between its ends.
 
     Args:
-        arm: Robot in its cell.
-        people: Shared data of the people.
         motion: Motion of robot and people.
         robot0: The robot's capsules at the start, shape (9, n).
         crowd0: The workers' capsules at the start, shape (9, m).
@@ -134,8 +132,6 @@ def _search(
     """Halve the period until every interval is free or too short to be halved.
 
     Args:
-        arm: Robot in its cell.
-        people: Shared data of the people.
         motion: Motion of robot and people.
         begin: Clearances at the start [m].
         end: Clearances at the end [m].

@@ -70,7 +70,6 @@ def clearances_at(
     """Return the distances to people, to the cell and of the robot to itself [m].
 
     Args:
-        arm: Robot in its cell.
         q: Joint positions [rad], shape (6,).
         obstacles: People.
         pose: Work space.
@@ -111,7 +110,6 @@ def motion_free(
     The end and the middle are checked first, where most motions that are not free fail.
 
     Args:
-        arm: Robot in its cell.
         q0: Joint positions at the start [rad], shape (6,).
         qd0: Joint speeds at the start [rad/s], shape (6,).
         c: Coefficients [rad/s^2], shape (6,).
@@ -162,7 +160,6 @@ def first_blocked(
     """Return the first period of a timed path that is not free, or their number if all are.
 
     Args:
-        arm: Robot in its cell.
         q: Joint positions between periods [rad], shape (n + 1, 6).
         qd: Joint speeds between periods [rad/s], shape (n + 1, 6).
         dt: Period [s].

@@ -63,7 +63,6 @@ def worker_at(
     """Write joints, joint speeds and pelvis height of one worker.
 
     Args:
-        people: Shared data.
         state: Rows; the worker's position in its script is updated too.
         e: Environment.
         w: Worker.
@@ -161,13 +160,11 @@ def draw_script_of(
     """Draw a script for one worker.
 
     Args:
-        people: Shared data.
         state: Rows; the script of the worker is written.
         e: Environment.
         w: Worker.
         who: Index of the worker's body.
         first: Initial posture, at home; -1 draws one.
-        rng: Random stream.
     """
     moves = Moves(state.start[e, w], state.duration[e, w], state.chosen[e, w])
     of_station, n_cubes, rows = people.of_station[who], people.n_cubes, state.segments
@@ -203,7 +200,6 @@ def advance_people(
     """Advance the people of one environment by one control period.
 
     Args:
-        people: Shared data.
         state: Rows; joints and cylinders are written.
         e: Environment.
         robot: The robot's capsules at the start of the period, shape (9, n).
@@ -243,9 +239,7 @@ def record_palms(
     """Record the workers' palms over the start of an episode.
 
     Args:
-        people: Shared data.
         state: Rows; row 0 is used.
-        rng: Random stream of the episode.
         robot: The robot's capsules, shape (9, n).
         dt: Time between samples [s].
         geometry: Work space.

@@ -206,7 +206,6 @@ def people_clearance(people: People, robot: Vec, geometry: PeopleGeometry) -> fl
     """Return the clearance between robot and nearest person [m]; FAR without people.
 
     Args:
-        people: Shared data.
         robot: The robot's capsules as columns, shape (9, n).
         geometry: Placed; ``gap`` is filled.
     """
@@ -263,7 +262,6 @@ def person_clearance(people: People, robot: Vec, geometry: PeopleGeometry, who: 
     """Return the clearance between robot and one person [m].
 
     Args:
-        people: Shared data.
         robot: The robot's capsules as columns, shape (9, n).
         geometry: The people, placed; for a worker ``gap`` must be filled.
         who: Index of the person: workers first, then pedestrians.
@@ -281,7 +279,6 @@ def nearest_person(people: People, robot: Vec, geometry: PeopleGeometry) -> int:
     """Return the index of the person nearest to the robot (-1: none), workers first.
 
     Args:
-        people: Shared data.
         robot: The robot's capsules as columns, shape (9, n).
         geometry: The people, placed.
     """
@@ -316,7 +313,6 @@ def see_people(
     with any people.
 
     Args:
-        people: Shared data.
         state: Rows of the people.
         e: Environment.
         robot: The robot's capsules as columns, shape (9, n).
@@ -367,8 +363,6 @@ def see_rows(
     """Write the people of some environments (:func:`see_people`).
 
     Args:
-        people: Shared data.
-        state: Rows of the people.
         robots: The robots' capsules, shape (n_envs, 9, n).
         rows: Indices of the environments, shape (k,).
         geometry: Work space.

@@ -149,7 +149,6 @@ def fit_joints(
         size: Body size [m], shape (12,).
         q_min: Lower joint limits [m, rad], shape (18,).
         q_max: Upper joint limits [m, rad], shape (18,).
-        space: Work space.
         q: Previous joint positions, replaced by the new ones [m, rad], shape (18,).
         held: Whether a joint keeps its value for lack of key-points; written, shape (18,).
     """

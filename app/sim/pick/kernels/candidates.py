@@ -77,12 +77,9 @@ def observe_candidates(
     Robot and people are placed once for all candidates.
 
     Args:
-        arm: Robot in its cell.
         floor_z: Height of the floor [m].
         grasp: Phases of a pick.
         around: Robot and people.
-        targets: The n candidates.
-        work: Work space.
         reachable: Filled, whether target and object are reachable, shape (n,).
         out: Filled, observations of all candidates beside the first set of people, then beside
             the next, shape (m n, length of an observation).

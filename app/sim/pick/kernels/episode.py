@@ -83,7 +83,6 @@ def conclude(
     """Set phase and outcome of environment ``e`` after a motion; return the reward.
 
     Args:
-        world: Shared data.
         task: Rules, action type and reward coefficients.
         state: Environments; changed.
         e: Environment.
@@ -133,12 +132,8 @@ def observe_rows(
     The raw state and the views for one person observe the person nearest to the robot.
 
     Args:
-        world: Shared data.
         grasp: Phases of a pick.
-        state: Environments.
         envs: Numbers of the environments, shape (k,).
-        work: Work space.
-        sight: Work space.
         view: PLAIN (the state of (5.8), ``N_PLAIN`` numbers) or FEATURES.
         out: Filled, shape (k, F).
     """
@@ -205,10 +200,8 @@ def step_batch(
     """Step all environments; environments whose episode has ended do not change.
 
     Args:
-        world: Shared data.
         task: Rules, action type and reward coefficients.
         state: Environments; changed.
-        work: Work space.
         act: Actions in [-1, 1], shape (n_envs, 5).
         rew: Filled with rewards, shape (n_envs,).
         ended: Filled with the outcome of episodes that ended now, RUNNING elsewhere.

@@ -72,7 +72,6 @@ def target_height(rules: GraspRules, phase: int, goal: Vec) -> float:
     """Return the height at which the tool is wanted in a phase [m].
 
     Args:
-        rules: Rules of the grasp.
         phase: Phase of the pick.
         goal: Target over the object [m], shape (3,).
     """
@@ -87,8 +86,6 @@ def distance_left(rules: GraspRules, phase: int, goal: Vec, tcp: Vec) -> float:
     It is the distance to the phase's target, and the descent and lift to come.
 
     Args:
-        rules: Rules of the grasp.
-        phase: Phase of the pick.
         goal: Target over the object [m], shape (3,).
         tcp: Tool centre point [m], shape (3,).
     """
@@ -104,7 +101,6 @@ def next_phase(
     """Return the phase after a control cycle, the closing time [s] and whether it succeeded.
 
     Args:
-        rules: Rules of the grasp.
         phase: Phase of the pick.
         closing: Time for which the tool has been held at the object [s].
         goal: Target over the object [m], shape (3,).

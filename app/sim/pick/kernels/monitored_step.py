@@ -35,11 +35,9 @@ def step_monitored(
     """Step all environments under the safety layer; see ``pick.kernels.episode.step_batch``.
 
     Args:
-        world: Shared data.
         task: Rules, action type and reward coefficients.
         state: Environments; changed.
         monitor: Safety layer and accounts.
-        work: Work space.
         act: Actions in [-1, 1], shape (n_envs, 5).
         rew: Filled with rewards, shape (n_envs,).
         ended: Filled with the outcome of episodes that ended now, RUNNING elsewhere.

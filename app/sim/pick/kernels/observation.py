@@ -34,6 +34,7 @@ from app.sim.pick.kernels.observation_layout import (
     N_WITH_BODY,
     N_WITH_PHASE,
     NEAREST,
+    PELVIS_Y,
     SCALARS,
     SECOND_CLEARANCE,
     STILL_AHEAD,
@@ -139,7 +140,7 @@ def _write_joints(arm: Arm, state: PickQuery, out: Obs) -> None:
     for j in range(18):
         out[20 + j] = human_q[j]
         out[38 + j] = 0.5 * state.human_qd[0, j]
-    out[21] = human_q[1] - 1.25
+    out[21] = human_q[1] - PELVIS_Y
     out[22] = (human_q[2] + 1.5 * math.pi) % (2.0 * math.pi) - math.pi
     if out.shape[0] == N_WITH_BODY:
         for i in range(body.N_SIZE):
@@ -276,12 +277,9 @@ def observe(
     """Write the observation of one state and one target.
 
     Args:
-        arm: Robot in its cell.
         floor_z: Height of the floor [m].
-        state: The state.
         time_left: Time left to reach the target [s].
         robot: The robot, placed at ``state.q``.
-        work: Work space.
         out: Filled, shape (N_FEATURES,), (N_WITH_BODY,), (N_WITH_PHASE,) or (N_PICK,).
     """
     place_person(floor_z, state.human_q[0], state.human_qd[0], state.size[0], work.person)
@@ -368,11 +366,9 @@ def observe_batch(
     """Apply :func:`observe` to n states.
 
     Args:
-        arm: Robot in its cell.
         floor_z: Height of the floor [m].
         states: The states, arrays of shape (n, ...).
         time_left: Time left in each [s], shape (n,).
-        work: Work space.
         out: Filled, shape (n, length of an observation).
     """
     observe_states(arm, floor_z, states, time_left, new_robot_pose(arm), work, out)

@@ -9,6 +9,8 @@ DISTANCE_SCALE = 0.5
 """Unit of distances [m]; they are clipped at three units."""
 FARTHEST = 3.0 * DISTANCE_SCALE
 """Distance at which clearances are clipped [m]."""
+PELVIS_Y = 1.25
+"""Subtracted from the y of a pelvis [m]."""
 
 SIZES = (
     ("q", 5),

@@ -5,7 +5,12 @@ import math
 from app.sim.core.arrays import Vec
 from app.sim.core.jit import kernel
 from app.sim.human.kernels import kinematics as body
-from app.sim.pick.kernels.observation_layout import PELVIS, PRESENT_WITHIN, SECOND_ARMS
+from app.sim.pick.kernels.observation_layout import (
+    PELVIS,
+    PELVIS_Y,
+    PRESENT_WITHIN,
+    SECOND_ARMS,
+)
 from app.sim.pick.kernels.observation_workspace import PickObservationWorkspace, PickQuery
 from app.sim.scenario.kernels.person_observation import (
     TICK,
@@ -46,7 +51,7 @@ def place_second(floor_z: float, state: PickQuery, work: PickObservationWorkspac
 def write_second(q: Vec, goal: Vec, tcp: Vec, person: PersonWorkspace, out: Obs) -> None:
     """Write position, arms and hand velocities of the second person."""
     k = SECOND_ARMS
-    out[PELVIS], out[PELVIS + 1] = q[0], q[1] - 1.25
+    out[PELVIS], out[PELVIS + 1] = q[0], q[1] - PELVIS_Y
     out[PELVIS + 2] = (q[2] + 1.5 * math.pi) % (2.0 * math.pi) - math.pi
     for point in (body.HAND_R, body.HAND_L, body.ELBOW_R, body.ELBOW_L):
         for i in range(3):

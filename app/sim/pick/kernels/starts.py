@@ -167,11 +167,9 @@ def _draw_configuration(
     """Draw a configuration with the tool over a point of the box, tilted a little.
 
     Args:
-        world: Shared data.
         rules: Starts of episodes.
         point: Work space, shape (3,).
         q: Filled with the configuration [rad], shape (6,).
-        rng: Random stream.
     """
     _draw_point(rules, rng, point)
     point[2] += HIGHER * random.uniform(rng)

@@ -136,7 +136,6 @@ def evaluate(net: Network, x: Floats, hidden: Hidden, out: Floats) -> None:
     """Write the output of a network for one input.
 
     Args:
-        net: Network.
         x: Input, shape (n_in,).
         hidden: Work space.
         out: Filled, shape (n_out,).

@@ -228,7 +228,6 @@ def draw_segments(
     A cycle may be reversed, or omit the return to home; the last segment ends at home.
 
     Args:
-        rng: Random stream.
         library: Movement primitives of the cell.
         of_station: First posture and count of each place and hand, shape (n_places, 2, 2).
         n_cubes: Number of cubes; they are the first places.

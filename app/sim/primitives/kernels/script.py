@@ -50,7 +50,6 @@ def script_at(
 
     Args:
         t: Time [s]; before the first move the first posture holds.
-        n_moves: Number of moves.
         start: Start of each move [s], shape (>= n_moves,).
         duration: Duration of each move [s], shape (>= n_moves,).
         postures: Postures [m, rad], shape (>= n_moves + 1, 18).
@@ -108,7 +107,6 @@ def draw_script(
         state: Random stream.
         of_station: Index of the first posture and number of postures of each place and hand,
             shape (n_places, 2, 2); cubes come first, home last.
-        n_cubes: Number of cubes.
         hands: Palm positions of each posture [m], shape (n_postures, 2, 3).
         first: Initial posture; -1 draws one at home.
         moves: Filled.

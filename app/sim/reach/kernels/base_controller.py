@@ -79,7 +79,6 @@ def base_motion(
     All joints keep their shares of the step; the speed falls with the remaining step.
 
     Args:
-        arm: Robot in its cell.
         robot: The placed robot, with its Jacobian.
         goal: Goal of the tcp [m], shape (3,).
         work: Work space; ``q`` is overwritten.
@@ -159,7 +158,6 @@ def write_approach_features(
     """Write the features of this module from ``out[k]`` on.
 
     Args:
-        arm: Robot in its cell.
         top_z: Height of people's tops [m].
         query: State of the robot and goal.
         work: Holds the robot placed at ``query.q`` with its Jacobian, and ``seen``.

@@ -212,10 +212,8 @@ def step_batch(
     """Step all environments; environments whose episode has ended do not change.
 
     Args:
-        world: Shared data.
         task: Rules, action type and reward coefficients.
         state: Environments; changed.
-        work: Work space.
         act: Actions in [-1, 1], shape (n_envs, 6).
         rew: Filled with rewards, shape (n_envs,).
         ended: Filled with the outcome of episodes that ended now, RUNNING elsewhere.

@@ -108,7 +108,6 @@ def write_person(state: PeopleState, e: int, p: int, crowd: PeopleGeometry, out:
     """Write one person of environment ``e`` as a cylinder.
 
     Args:
-        state: State of the people.
         e: Environment.
         p: The person: workers first, then pedestrians; below 0 for NO_PERSON.
         crowd: The people, placed as they are now.
@@ -149,7 +148,6 @@ def extrapolate_clearances(
     """Fill ``work.clearances`` with those of the robot at rest to people at ``HORIZONS``.
 
     Args:
-        people: Shared data.
         state: State of the people, who move at constant velocity.
         e: Environment.
         which: The one person that counts, or ALL_PEOPLE.
@@ -226,7 +224,6 @@ def write_features(
     """Write the features of a state.
 
     Args:
-        arm: Robot in its cell.
         top_z: Height of people's tops [m].
         query: State of the robot and goal.
         clearance: Clearance of robot and people [m].

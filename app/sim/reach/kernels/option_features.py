@@ -74,7 +74,6 @@ def predict_motion(
     """Fill ``work.people``, ``predicted`` and ``n`` with the people that count.
 
     Args:
-        state: State of the people.
         e: Environment.
         which: The one person that counts, workers first, or ALL_PEOPLE.
         seen: The observed person; below 0 for none.
@@ -126,7 +125,6 @@ def _measure_people(arm: Arm, top_z: float, n: int, work: ReachObservationWorksp
     """Fill the clearances of ``n`` configurations, at the looks in turn, to all people.
 
     Args:
-        arm: Robot in its cell.
         top_z: Height of people's tops [m].
         n: Number of configurations in ``work.lanes``.
         work: Holds the predicted people.
@@ -148,7 +146,6 @@ def predict_option_clearances(
     """Fill ``work.aside`` with the clearances of the options that do not lead to the goal.
 
     Args:
-        arm: Robot in its cell.
         top_z: Height of people's tops [m].
         q: Joint positions [rad], shape (6,).
         qd: Joint speeds [rad/s], shape (6,).
@@ -191,7 +188,6 @@ def write_option_features(
     """Write the features of this module from ``out[k]`` on.
 
     Args:
-        arm: Robot in its cell.
         top_z: Height of people's tops [m].
         query: State of the robot and goal.
         work: Holds the robot placed at ``query.q`` with its Jacobian, the predicted people, and

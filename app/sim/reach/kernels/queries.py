@@ -87,10 +87,7 @@ def observe_rows(
     """Write the observations of some environments, each for several goals.
 
     Args:
-        world: Shared data.
-        state: Environments.
         envs: Numbers of the environments, shape (k,).
-        work: Work space.
         view: PLAIN (4.30), FEATURES, FORECAST or PEOPLE_SET.
         which: ALL_PEOPLE (the nearest is observed and all count), or the number of the one
             person that is present.
@@ -135,10 +132,7 @@ def distances_of_rows(
     """Write the distance of the robot to each person in some environments.
 
     Args:
-        world: Shared data.
-        state: Environments.
         envs: Numbers of the environments, shape (k,).
-        work: Work space.
         out: Filled [m], workers first, then pedestrians, shape (k, n_people).
     """
     for k in range(envs.shape[0]):

@@ -17,7 +17,6 @@ def load_state(
     """Place robot and people of environment 0 and write its clearances.
 
     Args:
-        world: Shared data.
         state: Environments; ``clear`` is filled.
         work: Work space; robot and people are placed.
         distances: Filled with the distance of the robot to each person [m]: workers first, then

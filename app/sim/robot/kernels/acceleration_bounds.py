@@ -210,7 +210,6 @@ def advance_to_speeds(
     """Move all joints through one period toward target speeds.
 
     Args:
-        limits: Joint limits.
         dt: Period [s].
         start: State at the start; accelerations are not read.
         qd_target: Target speeds at the end of the period [rad/s], shape (6,).

@@ -95,8 +95,6 @@ def other_coefficients(
         rule: Interpretation of actions.
         qd_target: Target speed [rad/s]; the action is its share of the speed limit.
         held: Whether the joint has no action and follows the speed in any case.
-        at: State of the joint.
-        limits: Limits of the joint.
 
     Returns:
         Coefficients [rad/s^2, rad/s^3] and whether the interval is empty.

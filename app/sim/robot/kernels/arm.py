@@ -176,8 +176,6 @@ def robot_speed_bound(arm: Arm, path: JointPath, before: Vec, after: Vec) -> flo
     along the chain. The ends of a capsule bound the points between them.
 
     Args:
-        arm: Robot in its cell.
-        path: Path of the period.
         before: The robot's capsules at the start, shape (9, n).
         after: Its capsules at the end, shape (9, n).
     """

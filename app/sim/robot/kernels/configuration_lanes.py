@@ -111,7 +111,6 @@ def _approach_capsule(arm: Arm, k: int, frame: Vec, n: int, lanes: Vec) -> None:
     """Lower the clearances in the plane to those of capsule ``k``, raise the highest points.
 
     Args:
-        arm: Robot in its cell.
         k: The capsule.
         frame: Frames of its link, shape (_FRAME,).
         n: Number of configurations.
@@ -149,7 +148,6 @@ def measure_lanes(arm: Arm, top: float, n: int, q: Vec, pose: RobotPose, lanes: 
     Where a point nearest to the axis is above the cylinder, the configuration is placed alone.
 
     Args:
-        arm: Robot in its cell.
         top: Height of the tops of the cylinders [m].
         n: Number of configurations.
         q: Work space, shape (6,).

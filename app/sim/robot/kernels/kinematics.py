@@ -135,7 +135,6 @@ def ik_vertical(lengths: LinkLengths, limits: JointLimits, target: Vec, out: Vec
 
     Args:
         lengths: Lengths of the robot.
-        limits: Joint limits.
         target: Position of the tcp [m], shape (3,).
         out: Filled with the configuration [rad], shape (6,); the nearest one where none exists.
 

@@ -52,7 +52,6 @@ def motion_at(path: JointPath, deceleration: float, t: float, q_out: Vec, qd_out
     """Write joint positions and speeds of a scaled motion at a time.
 
     Args:
-        path: Path of all joints.
         deceleration: Decrease of the path speed [1/s].
         t: Time since the start [s].
         q_out: Filled with positions [rad], shape (6,).

@@ -95,7 +95,6 @@ def link_speed(arm: Arm, space: SsmWorkspace, node: int, k: int, qd: Vec) -> flo
     A capsule's surface comes nearer to anything no faster than its axis moves.
 
     Args:
-        arm: Robot in its cell.
         space: Work space with the links of the pose.
         node: Node where the pose's capsules are.
         k: The capsule.
@@ -268,12 +267,7 @@ def run_episodes(
     """Run episodes ``first`` and following; each is determined by (seed, number).
 
     Args:
-        arm: Robot in its cell.
-        people: Shared data of the people.
         trial: Settings of the trial.
-        seed: Seed of all episodes.
-        first: Number of the first episode.
-        work: Work space.
         out: Filled with results, shape (n, N_RESULT).
     """
     for e in range(out.shape[0]):

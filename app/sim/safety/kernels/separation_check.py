@@ -154,13 +154,11 @@ def place_node(
     """Place the robot at ``q`` and write its clearance to every part of the people.
 
     Args:
-        arm: Robot in its cell.
         people: People as observed.
         q: Joint positions [rad], shape (6,).
         node: Node to fill.
         age: Time since the observation [s]; a cylinder with a known velocity counts along its
             whole path since then.
-        space: Work space.
     """
     robot, gap = space.columns[node], space.gap[node]
     kinematics.link_poses(arm.lengths, q, space.rot, space.pos)
@@ -188,8 +186,6 @@ def violates_separation(
         rule: Assumptions.
         age: Time since people were observed [s].
         t: Time of the node on the path [s].
-        node: Node.
-        space: Work space.
     """
     gap = space.gap[node]
     for j in range(gap.shape[0]):
@@ -206,8 +202,6 @@ def path_bounds(arm: Arm, path: JointPath, s_end: float) -> tuple[float, float]:
     """Return bounds on the first and second derivative along a path of any robot point.
 
     Args:
-        arm: Robot in its cell.
-        path: Path of all joints.
         s_end: End of the path [s].
 
     Returns:
@@ -239,11 +233,9 @@ def _interval_clear(
 
     Args:
         rule: Assumptions.
-        segment: Segment of the path.
         latency: Age of people at the start of the period [s].
         a: Node at the start; placed.
         b: Node at the end; placed.
-        space: Work space.
 
     Returns:
         Whether it is clear, and a bound on the displacement of robot and people in it [m].
@@ -282,12 +274,10 @@ def segment_clear(
     """Return whether the robot keeps contact speed limits on one segment of a path.
 
     Args:
-        arm: Robot in its cell.
         rule: Assumptions.
         latency: Age of people at the start of the period [s].
         people: People as observed.
         segment: Segment; its nodes are placed.
-        space: Work space.
     """
     top, fresh, left = 0, FIRST_BETWEEN, segment.first
     space.right[0] = segment.last

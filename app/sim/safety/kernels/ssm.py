@@ -122,7 +122,6 @@ def admissible(
     """Return whether a path scaled to ``override``, and the stop after it, obey the rule.
 
     Args:
-        arm: Robot in its cell.
         rule: Assumptions.
         latency: Age of people relative to the robot's state [s].
         people: People as observed.
@@ -198,11 +197,9 @@ def decide(
     between) the greatest admissible one is taken.
 
     Args:
-        arm: Robot in its cell.
         rule: Assumptions.
         age: Age of the people beyond ``rule.latency`` [s].
         people: People as last observed.
-        path: Commanded path of the period.
         space: Work space; filled with the executed motion and the cause of the override.
     """
     latency = rule.latency + age

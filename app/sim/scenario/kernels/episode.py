@@ -175,8 +175,6 @@ def move(
     """Move robot and people of environment ``e`` through one control cycle.
 
     Args:
-        arm: Robot in its cell.
-        people: Shared data of the people.
         action: Action type and bounds.
         state: Environments; changed.
         e: Environment.

@@ -274,8 +274,6 @@ def move_monitored(
     """Move robot and people of environment ``e`` through one control cycle.
 
     Args:
-        arm: Robot in its cell.
-        people: Shared data of the people.
         state: Environments; changed.
         e: Environment.
         monitor: Safety layer, tracks and accounts.

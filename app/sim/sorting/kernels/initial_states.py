@@ -49,7 +49,6 @@ def write_goal(rows: SortingRows, rules: SortingRules, e: int, wanted: Ints) -> 
 
     Args:
         rows: Rows.
-        rules: Rules.
         e: Row.
         wanted: Number of objects per code, shape (types + 1,).
     """
@@ -71,7 +70,6 @@ def draw_codes(rng: random.State, there: Ints, n: int, wanted: Ints) -> None:
     """Draw ``n`` objects without replacement.
 
     Args:
-        rng: Random stream.
         there: Number of existing objects per code, shape (types + 1,).
         n: Number of draws, at most that of existing objects.
         wanted: Filled with how many of each code were drawn.
@@ -157,7 +155,6 @@ def start_row(rows: SortingRows, rules: SortingRules, seed: int, row: int, e: in
 
     Args:
         rows: Rows; changed.
-        rules: Starts of episodes.
         seed: Seed of the batch.
         row: Number of the row in the random streams.
         e: Row.

@@ -355,7 +355,6 @@ def plan_by_rules(objects: Objects, task: Task, work: PlannerWork) -> tuple[int,
     Args:
         objects: Positions of the objects.
         task: Goal and failure probabilities.
-        work: Work space.
 
     Returns:
         Fewest moves, and expected attempts of the plan; -1 and 0 where the goal cannot be met.

@@ -78,7 +78,6 @@ def distance_cost(
     Args:
         towers: Objects on the towers, shape (C, K).
         goal: Goal of the towers, shape (C, K).
-        n_sizes: Number of sizes.
         weights: Coefficients.
     """
     total: float = 0.0

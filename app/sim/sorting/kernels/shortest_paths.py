@@ -379,7 +379,6 @@ def ties_on_tower(index: int, still: int, code: int, p: ShortestPaths) -> bool:
     Args:
         index: State after the removal to the clutter, on a shortest plan.
         still: Tower on which it is put.
-        code: The object.
         p: The states, ``table`` filled.
     """
     found = _meet(index, 0, p)

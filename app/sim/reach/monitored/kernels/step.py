@@ -42,7 +42,6 @@ def monitored_cycle(
     """Execute one control cycle of environment ``e``; return the reward.
 
     Args:
-        world: Shared data.
         task: Time limit and reward coefficients.
         state: Environments; changed.
         e: Environment.
@@ -93,11 +92,9 @@ def step_rows(
     One kernel for actions and segments, because two would compile the control cycle twice.
 
     Args:
-        world: Shared data.
         task: Rules, action type and reward coefficients.
         state: Environments; changed.
         monitor: Safety layer, tracks and accounts.
-        work: Work space.
         envs: Numbers of the environments, shape (k,).
         commands: Actions or segments.
         results: Filled for these environments.

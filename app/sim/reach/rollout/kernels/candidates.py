@@ -105,7 +105,6 @@ def write_joint_move(arm: Arm, aim: Vec, q: Vec, act: Floats) -> None:
     """Write the action that moves all joints to a configuration.
 
     Args:
-        arm: Robot in its cell.
         aim: The configuration [rad], shape (6,).
         q: Joint positions [rad], shape (6,).
         act: Filled, shape (6,).
@@ -126,7 +125,6 @@ def sample_waypoint(arm: Arm, q: Vec, rng: random.State, aim: Vec) -> int:
     """Sample a waypoint uniformly; return the duration of the motion to it [steps].
 
     Args:
-        arm: Robot in its cell.
         q: Joint positions [rad], shape (6,).
         rng: Random stream, shape (1,).
         aim: Filled with the waypoint [rad], shape (6,).
@@ -144,7 +142,6 @@ def perturb_waypoint(arm: Arm, aim: Vec, steps: int, rng: random.State, out: Vec
     """Sample a waypoint near another one; return the duration of the motion to it [steps].
 
     Args:
-        arm: Robot in its cell.
         aim: The other waypoint [rad], shape (6,).
         steps: Duration of the motion to the other waypoint [steps].
         rng: Random stream, shape (1,).

@@ -150,10 +150,8 @@ def _score_threshold(state: EpisodeState, e: int, outcome: int, score: float) ->
     """Return the score that candidates must exceed; infinity if none is simulated.
 
     Args:
-        state: Environments.
         e: Environment.
         outcome: Outcome of the better one of policy and warm start.
-        score: Its score.
     """
     if outcome == COLLISION:
         return score + BETTER
@@ -218,9 +216,7 @@ def _improve(
     separately, for half a minute.
 
     Args:
-        world: Shared data.
         rule: Action type and bounds.
-        state: Environments.
         e: Environment.
         work: Work space; ``best_act`` holds the policy's action, then that of the selection.
     """
@@ -263,9 +259,7 @@ def improve_batch(
     """Improve the actions of all environments whose episode is running.
 
     Args:
-        world: Shared data.
         rule: Action type and bounds.
-        state: Environments.
         act: Actions of the policy, shape (n_envs, 6); replaced where a candidate is better.
         work: Policy and work space.
         chosen: Filled with the number of the candidate selected, or POLICY, shape (n_envs,).

@@ -58,11 +58,8 @@ def predict_people(
     """Predict the people of environment ``e``; in an empty cell this is NO_PERSON.
 
     Args:
-        world: Shared data.
-        state: Environments.
         e: Environment.
         moments: Number of moments: N_MOMENTS or N_LONG_MOMENTS.
-        work: Work space.
         out: Filled.
     """
     place_people(world.people, state.people, e, work.crowd)

@@ -256,11 +256,9 @@ def _margin_left(
     """Return the clearance to people beyond the required distance [m].
 
     Args:
-        world: Shared data.
         clearance: Clearance of the placed robot to people [m].
         t: Time from now [s].
         share: Share of the prediction margin.
-        work: Work space.
     """
     left = clearance
     if work.ssm_distance[0] > 0.0:
@@ -298,9 +296,7 @@ def simulate_candidate(
     """Simulate one candidate from the present state of environment ``e``.
 
     Args:
-        world: Shared data.
         rule: Action type and bounds.
-        state: Environments.
         e: Environment.
         candidate: The candidate; the action of POLICY is ``work.best_act``, the waypoint of
             SAMPLE is ``work.waypoint``.

@@ -87,11 +87,8 @@ def new_rollout_workspace(
     """Return work space for a policy and ``n_envs`` environments.
 
     Args:
-        arm: Robot in its cell.
         net: The policy's network.
         base_weight: Weight of the base motion in its action.
-        sight: Work space of observations.
-        n_envs: Number of environments.
     """
     vias = np.zeros((N_VIAS, 6))
     vias[:-1] = np.clip(arm.home + np.array(VIAS), arm.limits.q_min, arm.limits.q_max)
