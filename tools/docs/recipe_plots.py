@@ -129,7 +129,7 @@ def recipes(results: Path) -> Figure:
             for file, name, colour in row.curves:
                 for k, curve in enumerate(curves_of(results, file, name)):
                     points = pooled(curve)
-                    shown = name if k == 0 else None
+                    shown = name.replace(", ", ",\n") if k == 0 else None
                     view.plot(
                         *_columns(points, over, "success"), color=colour, lw=1.2, label=shown
                     )
@@ -142,8 +142,9 @@ def recipes(results: Path) -> Figure:
             view.yaxis.set_major_formatter(PercentFormatter(1.0, decimals=0, symbol=" %"))
         dashed = "; dashed: collisions" if row.printed else ""
         views[0].set_title(f"{row.title}: success{dashed}")
-        if views[0].get_legend_handles_labels()[0]:
-            views[0].legend(loc="center right", fontsize=7)
+        lines = views[0].get_legend_handles_labels()
+        if lines[0]:
+            views[-1].legend(*lines, loc="upper left", bbox_to_anchor=(1.0, 1.0), fontsize=7)
     return figure
 
 

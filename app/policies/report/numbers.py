@@ -38,6 +38,8 @@ def stored_value(found: Json, row: str, key: str, unit: str = "") -> str | None:
 def curve_end(found: Json, preset: str, key: str, unit: str = "", task: str = "") -> str | None:
     """Return the last point of learning curves, as the mean over seeds; None without one.
 
+    Curves of different lengths are compared at the end of the shortest.
+
     Args:
         found: Content of the result file.
         key: Key of the point; ``standing_still`` is the return of a robot that does not move.
@@ -53,11 +55,12 @@ def curve_end(found: Json, preset: str, key: str, unit: str = "", task: str = ""
         still = [one[key] for one in curves if key in one]
         return f"{still[0]:.2f}" if still else None
     points = [one.get("pairs") or one.get("targets") or one["played"] for one in curves]
-    ends = [point[-1] for point in points if point and point[-1].get(key) is not None]
-    if not ends:
+    points = [point for point in points if point and point[-1].get(key) is not None]
+    if not points:
         return None
-    mean = sum(end[key] for end in ends) / len(ends)
-    steps, seeds = max(end["step"] for end in ends), len(ends)
+    steps, seeds = min(point[-1]["step"] for point in points), len(points)
+    ends = [[one for one in point if one["step"] <= steps][-1] for point in points]
+    mean = sum(end[key] for end in ends) / seeds
     text = f"{mean:.2f}" if unit else f"{100.0 * mean:.1f} %"
     return f"{text} after {steps / 1e6:.2f} M steps, {seeds} seed{'s'[: seeds > 1]}"
 
