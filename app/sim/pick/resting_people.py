@@ -61,7 +61,8 @@ class RestingPeoplePlanner:
     _t: float = 0.0
     _goal: Vec = field(default_factory=lambda: np.full(6, np.nan))
     _executor: ReplanningExecutor | None = None
-    _people: tuple[bytes, bytes] = (b"", b"")
+    _beside: tuple[bytes, bytes, float] = (b"", b"", 0.0)
+    """People and least clearance [m] of the answers."""
     _free: dict[bytes, bool] = field(default_factory=dict)
     """Answers of :meth:`free` beside these people."""
 
@@ -86,14 +87,15 @@ class RestingPeoplePlanner:
             q_over: Joint positions over the objects [rad], shape (n, 6).
             q_grasp: Joint positions at the objects [rad], shape (n, 6).
         """
-        here = people.columns.tobytes(), people.cylinders.tobytes()
-        if here != self._people:
-            self._people, self._free = here, {}
+        least = grasp.start_clearance
+        beside = people.columns.tobytes(), people.cylinders.tobytes(), least
+        if beside != self._beside:
+            self._beside, self._free = beside, {}
         found = np.empty(len(q_over), dtype=np.bool_)
         for k, pair in enumerate(zip(q_over, q_grasp, strict=True)):
             key = b"".join(at.tobytes() for at in pair)
             if key not in self._free:
-                checker = Checker(self.arm, people, grasp.start_clearance)
+                checker = Checker(self.arm, people, least)
                 self._free[key] = all(checker.is_free(at) for at in pair)
             found[k] = self._free[key]
         return found

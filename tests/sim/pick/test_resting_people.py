@@ -122,3 +122,14 @@ def test_people_who_moved_are_checked_again() -> None:
     ends = GOAL.q_over[None], GOAL.q_grasp[None]
     answers = [planner.free(people, GRASP, *ends)[0] for people in (near, no_people(), near)]
     assert answers == [False, True, False]
+
+
+def test_targets_are_checked_again_under_rules_with_another_clearance() -> None:
+    planner, (over, low, _) = (
+        rested(),
+        target_configurations(ARM, GRASP, station("cube4")[None]),
+    )
+    people = shapes_of(CELL, human.rest_posture(*CELL.human.home)[None])
+    assert planner.free(people, GRASP, over, low).all()
+    assert not planner.free(people, GRASP._replace(start_clearance=5.0), over, low).any()
+    assert planner.free(people, GRASP, over, low).all()
