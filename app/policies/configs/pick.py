@@ -59,9 +59,27 @@ class PickNetworks(ActorCriticNetworks):
         "Actor: residual to the nominal controller; or plain, with layer normalisation. "
         "Plain actors and their critics are Glorot-initialised",
     )
-    target_value: Literal["mean", "least"] = choice(
-        "mean", "Target value: the mean of the critics, or the least as in TD3"
+    critic: Literal["mean", "quantiles"] = choice(
+        "mean", "Critic: expected return, or quantiles of it (TQC)"
     )
+    target_value: Literal["mean", "least"] = choice(
+        "mean",
+        "Target value: the mean of the critics, or the least as in TD3; quantiles of all "
+        "critics are pooled",
+    )
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        """Check that the values of targets fit the critics.
+
+        Raises:
+            InvalidInput: They contradict each other.
+        """
+        if self.critic == "quantiles" and self.target_value != "mean":
+            raise InvalidInput(
+                "networks.target_value", self.target_value, "needs critic = mean"
+            )
+        return self
 
 
 class PickEpisode(FieldGroup):
@@ -207,7 +225,7 @@ PICK_LEARNING = PickLearning(
 
 
 class PickPreset(TrainingConfig):
-    """TD3 on the pick scenario; the defaults are those of ``pick-td3``."""
+    """TD3 on the pick scenario; ``PICK`` is ``pick-td3``."""
 
     name: str = "pick-td3"
     cell: CellName = "pick-and-place"
@@ -238,6 +256,8 @@ class PickPreset(TrainingConfig):
         return self
 
 
+PICK = PickPreset(networks=PickNetworks(critic="quantiles"))
+"""Whole picks beside up to two people."""
 REACH_ONLY = PickPreset(
     name="pick-reach-td3",
     learning=PICK_LEARNING.model_copy(
@@ -258,8 +278,8 @@ REACH_ONLY = PickPreset(
 )
 """The task without a grasp: a target counts when it is reached, as in the thesis."""
 MONITORED = PickPreset(name="pick-td3-monitored", episode=PickEpisode(safety="ssm"))
-"""``pick-td3`` under speed and separation monitoring; a person may touch the robot at
-standstill."""
+"""``pick-td3`` under speed and separation monitoring, with critics of the expected return; a
+person may touch the robot at standstill."""
 THESIS = PickPreset(
     name="pick-td3-thesis",
     learning=PickLearning(
@@ -316,4 +336,4 @@ Stable-Baselines 2, the library of its chapters 3 and 4 (docs/method.md 3.5).
 Deviates: 20 environments are stepped together, with one update per step of each, and the bounds
 of actions are never empty, so that no trajectory is unfeasible.
 """
-PICK_PRESETS = (PickPreset(), REACH_ONLY, MONITORED, THESIS)
+PICK_PRESETS = (PICK, REACH_ONLY, MONITORED, THESIS)

@@ -54,21 +54,14 @@ class ReachNetworks(ActorCriticNetworks):
     normalisation: Literal["none", "running"] = choice(
         "none", "Observations of ddpg networks: as they are, or by running mean and deviation"
     )
-    n_quantiles: Whole = number(25, 2, 100, "", "Quantiles per critic")
-    dropped_quantiles: Whole = number(
-        2, 0, 99, "", "Dropped quantiles: the highest ones per critic, left out in targets"
-    )
 
     @model_validator(mode="after")
     def _check(self) -> Self:
-        """Check the quantiles, and that the networks fit into a checkpoint.
+        """Check the normalisation, and that the networks fit into a checkpoint.
 
         Raises:
-            InvalidInput: All quantiles are dropped, or the networks are too large.
+            InvalidInput: The normalisation has no user, or the networks are too large.
         """
-        if self.dropped_quantiles >= self.n_quantiles:
-            rule = f"must be below n_quantiles = {self.n_quantiles}"
-            raise InvalidInput("networks.dropped_quantiles", self.dropped_quantiles, rule)
         if self.normalisation == "running" and (self.actor, self.critic) != ("ddpg", "ddpg"):
             rule = "needs actor = ddpg and critic = ddpg"
             raise InvalidInput("networks.normalisation", self.normalisation, rule)

@@ -42,6 +42,22 @@ class ActorCriticNetworks(FieldGroup):
     layers: Whole = number(2, 1, 12, "", "Hidden layers")
     critic_norm: Literal["layer", "none"] = choice("layer", "Normalisation of the critics")
     n_critics: Whole = number(2, 1, 10, "", "Critics: value functions")
+    n_quantiles: Whole = number(25, 2, 100, "", "Quantiles per critic")
+    dropped_quantiles: Whole = number(
+        2, 0, 99, "", "Dropped quantiles: the highest ones per critic, left out in targets"
+    )
+
+    @model_validator(mode="after")
+    def _check_quantiles(self) -> Self:
+        """Check that targets keep quantiles.
+
+        Raises:
+            InvalidInput: All quantiles are dropped.
+        """
+        if self.dropped_quantiles >= self.n_quantiles:
+            rule = f"must be below n_quantiles = {self.n_quantiles}"
+            raise InvalidInput("networks.dropped_quantiles", self.dropped_quantiles, rule)
+        return self
 
 
 class NoiseExploration(FieldGroup):

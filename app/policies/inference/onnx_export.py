@@ -153,6 +153,8 @@ def _pick(graph: Graph, checkpoint: Checkpoint, obs: str) -> list[onnx.ValueInfo
     values = [
         graph.layers(both, f"critic.q{k}") for k in range(1, preset.networks.n_critics + 1)
     ]
+    if preset.networks.critic == "quantiles":
+        values = [graph.add("ReduceMean", one, axes=[1], keepdims=1) for one in values]
     graph.add("Min", *values, output="value")
     return [
         _tensor("action", CONTROLLED, "joint actions in [-1, 1] (docs/method.md 2.2)"),

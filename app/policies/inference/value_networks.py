@@ -75,6 +75,13 @@ def _skipping(layers: Layers, first: int, n: int) -> Layers:
     return (layers[0]._replace(weight=weight), *layers[1:])
 
 
+def _averaged(layers: Layers) -> Layers:
+    """Return layers whose output is the mean of all outputs, such as quantiles."""
+    last = layers[-1]
+    weight, bias = last.weight.mean(axis=1, keepdims=True), last.bias.mean(keepdims=True)
+    return (*layers[:-1], last._replace(weight=weight, bias=bias))
+
+
 class ValueNetworks:
     """Actor, critics and outcome networks; safe to call from several threads.
 
@@ -113,7 +120,7 @@ class ValueNetworks:
             ActorCritic(
                 actor=_skipping(centred_layers_of(actor.net), n, still),
                 critics=tuple(
-                    _skipping(centred_layers_of(one.children()), n, still)
+                    _averaged(_skipping(centred_layers_of(one.children()), n, still))
                     for one in critics.children()
                 ),
                 members=tuple(

@@ -5,6 +5,7 @@ from torch import nn
 
 from app.policies.configs.pick import PickPreset
 from app.policies.networks.actor_critic import Critics, Fade, MeanCritics, ResidualActor, hidden
+from app.policies.networks.quantiles import QuantileCritics
 from app.sim.pick.kernels.observation_layout import (
     BODY_SIZES,
     DISTANCE_SCALE,
@@ -76,11 +77,11 @@ def actor_of(preset: PickPreset, n_obs: int) -> ResidualActor | NormedActor:
 def critics_for(preset: PickPreset, n_obs: int) -> Critics:
     """Return new critics for observations of a length."""
     sizes = preset.networks
-    kind = MeanCritics if sizes.target_value == "mean" else Critics
+    shape = sizes.width, n_obs, CONTROLLED, sizes.n_critics, sizes.layers
     normed = sizes.critic_norm == "layer"
-    critics = kind(
-        sizes.width, n_obs, n_critics=sizes.n_critics, layers=sizes.layers, normed=normed
-    )
+    if sizes.critic == "quantiles":
+        return QuantileCritics(*shape, normed, sizes.n_quantiles, sizes.dropped_quantiles)
+    critics = (MeanCritics if sizes.target_value == "mean" else Critics)(*shape, normed)
     if sizes.actor == "plain":
         initialise_glorot(critics)
     return critics

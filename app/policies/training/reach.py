@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.policies.algorithms.exploration import Exploration, OUNoise, PerEnvAR1Noise
-from app.policies.algorithms.quantiles import QuantileCritics
 from app.policies.algorithms.td3 import Networks
 from app.policies.configs.reach import ReachExploration, ReachPreset
 from app.policies.inference.reach_policy import LAYOUTS, PEOPLE_SET, blocked_rules_of
 from app.policies.networks.actor_critic import Critics, PlainActor, ResidualActor
 from app.policies.networks.ddpg import DDPGActor, DDPGCritics, RunningNormalisation
+from app.policies.networks.quantiles import QuantileCritics
 from app.policies.training.reporter import Callbacks, Reporter
 from app.policies.training.run import TrainingRun
 from app.policies.training.td3 import (

@@ -11,7 +11,7 @@ from app.policies.algorithms.td3 import critics_of
 from app.policies.checkpoints import pretrained
 from app.policies.checkpoints.checkpoint import Checkpoint, pack
 from app.policies.checkpoints.model_state import weights_of
-from app.policies.configs.pick import THESIS
+from app.policies.configs.pick import PICK, THESIS, PickPreset
 from app.policies.inference.onnx_export import LIMITS, export
 from app.policies.inference.reach_policy import LAYOUTS, PEOPLE_SET, ReachPolicy
 from app.policies.inference.value_networks import ValueNetworks
@@ -65,8 +65,9 @@ def test_exported_pick_policy_acts_and_values_as_the_checkpoint() -> None:
     np.testing.assert_allclose(value[:, 0], expected[1], atol=TOLERANCE)
 
 
-def test_exported_policy_of_the_raw_state_acts_as_its_actor() -> None:
-    run, _ = start(THESIS, 4, load_cell(THESIS.cell))
+@pytest.mark.parametrize("preset", [PICK, THESIS], ids=["quantiles", "raw-state"])
+def test_exported_pick_policy_acts_and_values_as_the_training(preset: PickPreset) -> None:
+    run, _ = start(preset, 4, load_cell(preset.cell))
     checkpoint = run.policy()
     obs = observations(checkpoint)
     with torch.inference_mode():

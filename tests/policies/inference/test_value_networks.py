@@ -6,7 +6,7 @@ import torch
 
 from app.policies.checkpoints import pretrained
 from app.policies.checkpoints.model_state import under
-from app.policies.configs.pick import THESIS
+from app.policies.configs.pick import PICK, THESIS
 from app.policies.inference.value_networks import ValueNetworks, pick_preset_of
 from app.policies.networks.forward import FEW
 from app.policies.networks.outcome import OutcomeHead
@@ -14,6 +14,7 @@ from app.policies.networks.pick import actor_of, critics_for
 from app.policies.training.pick import settings_of, start
 from app.sim.cells.cell import load_cell
 from app.sim.pick.batch import WHOLE_PICK, PickBatch, PickSettings
+from app.sim.pick.kernels.observation_layout import N_PICK
 
 
 @pytest.mark.parametrize("n", [1, 3, FEW, FEW + 1, 200])
@@ -39,6 +40,21 @@ def test_the_shipped_policy_decides_as_its_modules_of_torch_do(n: int) -> None:
         head = parts["outcome"].predict(rows, torch.as_tensor(values))
     for one, other in zip(found, head, strict=True):
         np.testing.assert_allclose(one, other, atol=1e-4)
+
+
+@pytest.mark.parametrize("n", [2, FEW + 1])
+def test_the_value_of_quantiles_is_the_least_mean(n: int) -> None:
+    cell = load_cell(PICK.cell)
+    run, _ = start(PICK, 4, cell)
+    checkpoint = run.policy()
+    critics = critics_for(PICK, N_PICK)
+    critics.load_state_dict(under(checkpoint.arrays(), "critic"))
+    obs = PickBatch(cell, n, 5, settings_of(PICK)).reset()
+    act, values, _ = ValueNetworks(checkpoint).evaluate(obs)
+    with torch.inference_mode():
+        least = critics.least(torch.as_tensor(obs), torch.as_tensor(act))
+    np.testing.assert_allclose(values, least.numpy(), atol=1e-4)
+    assert np.ptp(values) > 0.0
 
 
 @pytest.mark.parametrize("n", [2, FEW + 1])

@@ -6,9 +6,10 @@ import pytest
 import torch
 from torch import nn
 
-from app.policies.configs.pick import REACH_ONLY, THESIS, PickPreset
+from app.policies.configs.pick import PICK, REACH_ONLY, THESIS, PickPreset
 from app.policies.networks.actor_critic import Critics, MeanCritics
 from app.policies.networks.pick import NormedActor, actor_of, critics_for
+from app.policies.networks.quantiles import QuantileCritics
 
 
 def test_targets_are_the_least_or_the_mean_of_the_values():
@@ -20,6 +21,7 @@ def test_targets_are_the_least_or_the_mean_of_the_values():
 
 
 def test_the_preset_says_which():
+    assert type(critics_for(PICK, 12)) is QuantileCritics
     assert type(critics_for(PickPreset(), 12)) is MeanCritics
     assert type(critics_for(REACH_ONLY, 12)) is Critics
 

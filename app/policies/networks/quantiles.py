@@ -48,6 +48,11 @@ class QuantileCritics(Critics):
         super().__init__(width, n_obs, n_act, n_critics, layers, normed, n_quantiles, crowd)
         self._kept = n_critics * (n_quantiles - dropped)
 
+    def least(self, obs: Tensor, act: Tensor) -> Tensor:
+        """Return the minimum over the critics' mean quantiles, shape (n,)."""
+        means = [quantiles.mean(dim=1) for quantiles in self.forward(obs, act)]
+        return torch.stack(means).amin(dim=0)
+
     def targets(self, obs: Tensor, act: Tensor) -> Tensor:
         """Return the quantiles for targets, shape (B, K): all but the highest.
 

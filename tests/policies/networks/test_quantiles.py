@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import torch
 
-from app.policies.algorithms.quantiles import QuantileCritics, quantile_loss
+from app.policies.networks.quantiles import QuantileCritics, quantile_loss
 
 
 def test_targets_leave_out_the_highest_quantiles_of_all_critics():
@@ -17,6 +17,8 @@ def test_targets_leave_out_the_highest_quantiles_of_all_critics():
     assert everything.shape == (7, 15) and kept.shape == (7, 9)
     assert torch.equal(kept.sort(dim=1).values, everything.sort(dim=1).values[:, :9])
     assert torch.allclose(critics.first(obs, act).detach()[:, 0], everything.mean(dim=1))
+    means = everything.reshape(7, 3, 5).mean(dim=2)
+    assert torch.allclose(critics.least(obs, act).detach(), means.amin(dim=1))
 
 
 def test_quantiles_of_a_known_distribution_are_learned():
