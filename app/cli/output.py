@@ -57,6 +57,11 @@ def _cell(value: Any) -> str:
     if isinstance(value, Mapping) and {"mean", "low", "high"} <= value.keys():
         mean, low, high = (100.0 * value[key] for key in ("mean", "low", "high"))
         return f"{mean:.1f} % [{low:.1f}, {high:.1f}]"
+    if isinstance(value, Mapping):
+        known = ((name, one) for name, one in value.items() if one is not None)
+        return ", ".join(f"{name} {_cell(one)}" for name, one in known)
+    if isinstance(value, list):
+        return " to ".join("any" if one is None else _cell(one) for one in value)
     if isinstance(value, float):
         return f"{value:.3g}"
     return "" if value is None else str(value)

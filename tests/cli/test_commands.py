@@ -183,6 +183,13 @@ def test_sorting_of_a_policy_file_prints_one_json_object_and_a_table_without_pai
     assert "pairs_below" in table(result) and "'n_goal'" not in table(result)
 
 
+def test_the_table_shows_nested_values_as_text() -> None:
+    rate = {"mean": 0.5, "low": 0.25, "high": 0.75}
+    row = {"expected": {"first": None, "switches": [1, None]}, "beside": {"nearest": rate}}
+    result = {"protocol": "pick-cases", "seed": 1, "episodes": 4, "results": [row]}
+    assert table(result).splitlines()[-1] == "switches 1 to any  nearest 50.0 % [25.0, 75.0]"
+
+
 def test_a_policy_that_picks_cannot_be_measured_at_sorting(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
