@@ -92,14 +92,19 @@ def test_targets_are_drawn_uniformly(cell: Cell) -> None:
     np.testing.assert_allclose(counts / 4000, 1 / len(cell.stations), atol=0.03)
 
 
-def test_candidates_are_different_stations_in_the_asked_for_number(cell: Cell) -> None:
-    batch = PickBatch(cell, 500, 10, PickSettings(n_candidates=(2, 3)))
+@pytest.mark.parametrize("fewest", [2, 4])
+def test_candidates_are_different_stations_in_the_asked_for_number(
+    cell: Cell, fewest: int
+) -> None:
+    most = fewest + 2
+    batch = PickBatch(cell, 500, 10, PickSettings(n_candidates=(fewest, most)))
     batch.reset()
-    for row in batch.state.candidates:
+    at = (batch.state.q[:, None] == batch.world.station_q).all(axis=2)
+    for row, occupied in zip(batch.state.candidates, at, strict=True):
         offered = row[row >= 0]
-        assert len(set(offered)) == len(offered)
+        assert len(set(offered)) == len(offered) and not occupied[offered].any()
     sizes = (batch.state.candidates >= 0).sum(axis=1)
-    assert set(sizes) == {2, 3}
+    assert set(sizes) == set(range(fewest, most + 1))
 
 
 def test_meshes_find_no_contact_that_the_kernels_missed(cell: Cell) -> None:

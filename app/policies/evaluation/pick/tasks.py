@@ -47,6 +47,8 @@ ORACLE = "oracle"
 PAIR: tuple[HumanKind, ...] = ("worker", "worker")
 FASTER = 1.4
 """Speed of faster people, relative to the library's."""
+MANY_TARGETS = (4, 6)
+"""Fewest and most targets of a table with more objects."""
 
 
 def evaluators_of(
@@ -105,7 +107,7 @@ class ChoiceRun:
     """Episodes of one setting under all selection rules.
 
     Args:
-        evaluator: Episodes with 2 or 3 candidates.
+        evaluator: Episodes with several candidates.
         name: Name of the setting, first in the names of the rows; may be empty.
     """
 
@@ -123,7 +125,8 @@ class ChoiceRun:
             recorded = n_recorded if name == CRITIC else 0
             self._runs[name] = self._evaluator.run(rule, recorded)
             yield self._runs[name].row(self._prefix + name)
-        runs = [self._evaluator.run(choice_rules.fixed(k)) for k in range(3)]
+        most = self._evaluator.batch.settings.n_candidates[1]
+        runs = [self._evaluator.run(choice_rules.fixed(k)) for k in range(most)]
         self._runs[ORACLE] = _oracle(runs)
         yield self._runs[ORACLE].row(self._prefix + ORACLE)
 
@@ -166,13 +169,14 @@ def run_choice(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
 
 
 def run_choice_hard(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
-    """Evaluate the selection beside two people, faster people, and two faster people."""
+    """Evaluate the selection beside two or faster people, or both, and among more targets."""
     usual = settings_for((2, 3), pick_preset_of(checkpoint))
     fast = replace(usual, work=replace(usual.work, pace=FASTER))
     settings = {
         "two-people": replace(usual, people=PAIR),
         "faster": fast,
         "two-people-faster": replace(fast, people=PAIR),
+        "two-people-4-to-6-targets": replace(usual, people=PAIR, n_candidates=MANY_TARGETS),
     }
     networks, cell = ValueNetworks(checkpoint), cell_of(checkpoint.manifest)
     rows = request.rows(len(settings) * (len(OTHER_RULES) + 2))

@@ -125,6 +125,15 @@ def test_choices_are_compared_on_the_same_episodes():
     assert result["settings"]["grasp"]["close_s"] == 1.25
 
 
+def test_the_oracle_of_harder_choices_covers_every_target():
+    result = evaluate("pick-choice-hard", pretrained.load("pick"), episodes=4, seed=5)
+    rate = {row["name"]: row["success"]["mean"] for row in result["results"]}
+    numbers = {"two-people": [2, 3], "two-people-4-to-6-targets": [4, 6]}
+    for name, candidates in numbers.items():
+        assert result["settings"][name]["candidates"] == candidates
+        assert rate[f"{name} oracle"] >= rate[f"{name} random"]
+
+
 def test_cases_count_each_clause_and_keep_the_values_over_time():
     result = evaluate("pick-cases", pretrained.load("pick"), episodes=6, seed=5)
     assert [row["name"] for row in result["results"]] == [f"case-{k}" for k in (1, 2, 3, 4)]
