@@ -11,14 +11,18 @@ computed once per kernel instead of at every call.
 """
 
 import copy
+from collections import defaultdict
 from collections.abc import Callable
 from typing import Any
 
 import llvmlite.binding as llvm
+from numba.core import ir
+from numba.core.analysis import compute_cfg_from_blocks, compute_use_defs
 from numba.core.caching import CompileResultCacheImpl, FunctionCache
 from numba.core.codegen import JITCodeLibrary
-from numba.core.compiler import CompilerBase, CompileResult, DefaultPassBuilder
+from numba.core.compiler import CompilerBase, CompileResult, DefaultPassBuilder, Flags
 from numba.core.compiler_machinery import PassManager, register_pass
+from numba.core.lowering import Lower
 from numba.core.registry import CPUDispatcher
 from numba.core.typed_passes import NativeLowering
 from numba.core.untyped_passes import InlineInlinables
@@ -95,8 +99,44 @@ class _CalleeCache(FunctionCache):
     _impl_class = _CalleeCacheImpl
 
 
+class _ValueLower(Lower):
+    """Keeps variables that are assigned once as values of LLVM, without memory.
+
+    numba does so where all uses lie in one block. It copies all other variables to and from the
+    stack: a tuple of a hundred arrays, number by number, at each use. Most of the compilation
+    was the removal of these copies.
+    """
+
+    def _find_singly_assigned_variable(self) -> None:
+        super()._find_singly_assigned_variable()
+        blocks = self.func_ir.blocks
+        dominators = compute_cfg_from_blocks(blocks).dominators()
+        places, uses = defaultdict(list), defaultdict(list)
+        for label, block in blocks.items():
+            for one in block.find_insts(ir.Assign):
+                places[one.target.name].append(label)
+        for label, names in compute_use_defs(blocks).usemap.items():
+            for name in names:
+                uses[name].append(label)
+        self._singly_assigned_vars |= {  # blocks are lowered in the order of their labels
+            name
+            for name, (first, *more) in places.items()
+            if not more and all(first < use and first in dominators[use] for use in uses[name])
+        }
+
+
 @register_pass(mutates_CFG=True, analysis_only=False)
-class _CalleeLowering(NativeLowering):
+class _ValueLowering(NativeLowering):
+    _name = "value_lowering"
+
+    @property
+    def lowering_class(self) -> type[Lower]:
+        """Class that writes LLVM's code."""
+        return _ValueLower
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class _CalleeLowering(_ValueLowering):
     _name = "callee_lowering"
 
     def run_pass(self, state: Any) -> bool:
@@ -157,10 +197,23 @@ def _untyped_pipeline(state: Any) -> PassManager:
     return _with_passes(passes, InlineInlinables=_InlineKernels)
 
 
+class _QuickFlags(Flags):
+    """Flags of a compilation; numba compares them for each call of a built-in function."""
+
+    def __hash__(self) -> int:
+        return hash(frozenset(self._values))
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _QuickFlags) and bool(self._values == other._values)
+
+
 class _EntryCompiler(CompilerBase):
     """Compiles a kernel with an entry for Python."""
 
-    changed: dict[str, type] = {"InlineInlinables": _InlineKernels}
+    changed: dict[str, type] = {
+        "InlineInlinables": _InlineKernels,
+        "NativeLowering": _ValueLowering,
+    }
 
     def define_pipelines(self) -> list[PassManager]:
         """Return the passes."""
@@ -190,6 +243,8 @@ class Kernel(CPUDispatcher):
         )
         self._callee._cache = _CalleeCache(py_func)
         super().__init__(py_func, locals, targetoptions=options, pipeline_class=_EntryCompiler)
+        for one in (self, self._callee):
+            one._compiler._customize_flags = _QuickFlags
         self.enable_caching()
 
     @property

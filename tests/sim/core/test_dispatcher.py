@@ -62,6 +62,28 @@ def test_inlined_kernel_gives_what_its_function_gives() -> None:
         assert clipped_shares(a, b) == expected
 
 
+@kernel()
+def sums_over_branches(rows: tuple[float, ...], n: int, low: float) -> tuple[float, float]:
+    total, last = 0.0, 0.0
+    scale = rows[0] * 2.0  # assigned once, used in all branches and after the loop
+    for i in range(n):
+        now = rows[i % 3] + scale
+        if now < low:
+            kept = now  # assigned once, used in this branch
+            total -= 0.5 * kept
+        else:
+            last = now
+            total += last * scale
+    return total + scale, last
+
+
+def test_variables_keep_their_values_over_branches_and_rounds() -> None:
+    for rows in ((1.0, -4.0, 2.5), (-1.0, 3.0, 0.5)):
+        for n in (3, 6):
+            expected = sums_over_branches.py_func(rows, n, -1.0)
+            assert sums_over_branches(rows, n, -1.0) == expected
+
+
 def test_error_of_a_kernel_passes_through_its_caller() -> None:
     with pytest.raises(ZeroDivisionError):
         clipped_shares(1.0, 0.0)
