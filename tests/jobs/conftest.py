@@ -1,3 +1,4 @@
+import shutil
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -8,6 +9,7 @@ from jobs.executor import LocalProcess
 from jobs.supervisor import Supervisor
 from tests.jobs.machinery import PATIENCE
 from tests.jobs.supervisor_process import COUNTING
+from tests.jobs.trainings import Made, made_undisturbed
 from tests.support.databases import database_url, migrated, postgresql, store
 
 __all__ = ["database_url", "migrated", "postgresql", "store"]
@@ -29,3 +31,13 @@ def supervisor(
     started.start()
     yield started
     started.stop()
+
+
+@pytest.fixture(scope="session")
+def undisturbed(migrated: Path, tmp_path_factory: pytest.TempPathFactory) -> Made:
+    """What the training of ``trainings`` makes where nothing kills or stops it."""
+    folder = tmp_path_factory.mktemp("undisturbed")
+    one = Store(f"sqlite:///{shutil.copy(migrated, folder)}")
+    made = made_undisturbed(one, folder)
+    one.close()
+    return made

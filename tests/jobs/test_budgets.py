@@ -8,7 +8,7 @@ from app.store.engine import Store
 from jobs.spec import parse_spec
 from jobs.supervisor import Supervisor
 from tests.jobs.machinery import assert_counted_once, queue, wait_for, wait_until_final
-from tests.jobs.test_run import checkpoints_of
+from tests.jobs.trainings import made_by
 
 TRAIN = {"kind": "train", "preset": "pick-td3", "seed": 1}
 
@@ -33,7 +33,7 @@ def test_job_ends_at_the_first_point_beyond_its_steps_and_goes_on_with_more(
     job = wait_until_final(store, job_id)
     assert (job.state, job.ended_by, job.attempt) == ("succeeded", None, 2)
     assert job_actions.resume_steps(store, [job_id]) == {}
-    found = [one.step for one in checkpoints_of(store, job_id)]
+    found = [step for step, _ in made_by(store, job_id).checkpoints]
     assert found == [100, 80, 60, 45, 40, 20]
 
 

@@ -10,31 +10,19 @@ import pytest
 
 from app.policies.checkpoints import pretrained
 from app.policies.checkpoints.trained_cell import is_for
-from app.policies.configs.presets import nested
 from app.store import attempts, checkpoints, events, job_actions, jobs, metrics
 from app.store.engine import Store
-from app.store.records import CheckpointRecord, NewCheckpoint
+from app.store.records import NewCheckpoint
 from jobs.cell_catalog import CellCatalog
 from jobs.recording_catalog import RecordingCatalog
 from jobs.spec import parse_spec
 from jobs.supervisor import Supervisor
 from tests.jobs.machinery import PATIENCE, WAIT_S, wait_for, wait_until_final, worker_pids
+from tests.jobs.trainings import Made, made_by, train
 from tests.policies.evaluation.sorting_players import untrained
 from tests.sim.recorded_person import csv_text, working
 from tests.support import workshop
 from tests.support.databases import SQLITE_ONLY
-
-TINY = {
-    "learning.total_steps": 2048,
-    "learning.n_envs": 8,
-    "learning.progress_steps": 128,
-    "learning.checkpoint_steps": 512,
-    "learning.learning_starts": 512,
-    "learning.buffer_size": 2000,
-    "learning.batch_size": 16,
-    "networks.width": 16,
-}
-"""Nothing is learned by so little; everything is run through."""
 
 
 @pytest.fixture
@@ -44,13 +32,6 @@ def supervisor(store: Store, tmp_path: Path) -> Iterator[Supervisor]:
     started.start()
     yield started
     started.stop()
-
-
-def train(store: Store, step_budget: int | None = None, **overrides: float | str) -> str:
-    fields = nested(TINY | overrides)
-    body = {"kind": "train", "preset": "pick-td3", "seed": 4, "overrides": fields}
-    body["step_budget"] = step_budget
-    return jobs.create_job(store, parse_spec(body).new_job()).id
 
 
 @pytest.mark.usefixtures("supervisor")
@@ -68,23 +49,16 @@ def test_training_stores_its_curve_and_policies(store: Store) -> None:
 @pytest.mark.usefixtures("supervisor")
 @SQLITE_ONLY
 def test_killed_training_ends_with_the_checkpoints_of_one_that_was_not(
-    store: Store, tmp_path: Path
+    store: Store, tmp_path: Path, undisturbed: Made
 ) -> None:
-    fields: dict[str, float | str] = {"learning.total_steps": 4096}
-    whole = wait_until_final(store, train(store, **fields))
-    killed_id = train(store, **fields)
+    killed_id = train(store)
     wait_for(store, killed_id, lambda job: job.step >= 640)
     (pid,) = worker_pids(os.getpid())
     os.kill(pid, signal.SIGKILL)
     assert any((tmp_path / "resume" / killed_id).iterdir())
     killed = wait_until_final(store, killed_id)
     assert (killed.state, killed.attempt) == ("succeeded", 2)
-    assert killed.result == whole.result
-    ids = [
-        [(one.step, one.sha256) for one in checkpoints_of(store, job.id)]
-        for job in (whole, killed)
-    ]
-    assert ids[0] == ids[1] and len(ids[0]) == 8
+    assert made_by(store, killed_id) == undisturbed
     deadline = time.monotonic() + WAIT_S
     while (tmp_path / "resume" / killed_id).exists():  # removed after the end is recorded
         assert time.monotonic() < deadline
@@ -93,18 +67,15 @@ def test_killed_training_ends_with_the_checkpoints_of_one_that_was_not(
 
 @pytest.mark.usefixtures("supervisor")
 @SQLITE_ONLY
-def test_training_that_a_budget_ended_goes_on_to_the_same_bits(store: Store) -> None:
-    whole = wait_until_final(store, train(store))
+def test_training_that_a_budget_ended_goes_on_to_the_same_bits(
+    store: Store, undisturbed: Made
+) -> None:
     job = wait_until_final(store, train(store, step_budget=700))
     assert (job.state, job.ended_by, job.step) == ("succeeded", "step budget", 768)
     assert job.result is not None and job.result["step"] == 768
     job_actions.resume_job(store, job.id, {"step_budget": None})
     job = wait_until_final(store, job.id)
-    assert (job.ended_by, job.result) == (None, whole.result)
-
-
-def checkpoints_of(store: Store, job_id: str) -> tuple[CheckpointRecord, ...]:
-    return checkpoints.list_checkpoints(store, job_id=job_id).items
+    assert (job.ended_by, job.result) == (None, undisturbed.result)
 
 
 @pytest.mark.usefixtures("supervisor")
@@ -126,7 +97,9 @@ def test_training_with_damaged_files_goes_on_from_an_earlier_state(
     assert [m.step for m in metrics.list_metrics(store, job_id)] == list(range(128, 4097, 128))
     resumed = [e.data.get("resumed_from_step") for e in events.list_events(store, job_id)]
     assert newest.step - 512 in resumed
-    assert [c.step for c in checkpoints_of(store, job_id)] == list(range(4096, 0, -512))
+    assert [step for step, _ in made_by(store, job_id).checkpoints] == list(
+        range(4096, 0, -512)
+    )
 
 
 @pytest.mark.usefixtures("supervisor")

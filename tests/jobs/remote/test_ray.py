@@ -15,14 +15,13 @@ from pathlib import Path
 
 import pytest
 
-from app.store import attempts, checkpoints, jobs, metrics
+from app.store import attempts, jobs, metrics
 from app.store.engine import Store
-from app.store.records import JobRecord
 from jobs.executor import PROJECT_ROOT, LocalProcess, search_path
 from jobs.supervisor import Supervisor
 from tests.jobs.machinery import PATIENCE, wait_for, wait_until_final
 from tests.jobs.remote.serving import TOKEN
-from tests.jobs.test_run import train
+from tests.jobs.trainings import made_by, train
 from tests.support.databases import SQLITE_ONLY
 
 pytestmark = [pytest.mark.ray, SQLITE_ONLY]
@@ -110,11 +109,6 @@ def process_of(job_id: str, module: str = "jobs.remote.run") -> int | None:
     return None
 
 
-def made_by(store: Store, job: JobRecord) -> list[tuple[int | None, str]]:
-    made = checkpoints.list_checkpoints(store, job_id=job.id).items
-    return [(one.step, one.sha256) for one in made]
-
-
 def test_training_whose_worker_and_node_fail_ends_with_the_checkpoints_of_a_local_one(
     store: Store, tmp_path: Path, address: str, cluster: RayCluster
 ) -> None:
@@ -132,8 +126,8 @@ def test_training_whose_worker_and_node_fail_ends_with_the_checkpoints_of_a_loca
         cluster.keep(1)
         job = wait_until_final(store, job_id)
     assert (job.state, job.error) == ("succeeded", None)
-    assert job.result == local.result
-    assert made_by(store, job) == made_by(store, local) and len(made_by(store, job)) == 4
+    made = made_by(store, job_id)
+    assert made == made_by(store, local.id) and len(made.checkpoints) == 4
     assert [point.step for point in metrics.list_metrics(store, job_id)] == STEPS
 
 

@@ -5,19 +5,17 @@ import signal
 from dataclasses import replace
 from pathlib import Path
 
-from app.store import attempts, checkpoints, jobs, metrics
+from app.store import attempts, jobs, metrics
 from app.store.engine import Store
-from app.store.records import JobRecord
 from jobs.executor import LocalProcess
 from jobs.spec import parse_spec
 from jobs.supervisor import Supervisor
 from tests.jobs.machinery import PATIENCE, wait_for, wait_until_final, worker_pids
 from tests.jobs.remote.serving import TOKEN, serving
-from tests.jobs.test_run import train
+from tests.jobs.trainings import Made, made_by, train
 from tests.support.databases import SQLITE_ONLY
 
 pytestmark = SQLITE_ONLY
-FIELDS: dict[str, float | str] = {"learning.total_steps": 2048}
 
 
 def elsewhere(folder: Path, address: str) -> LocalProcess:
@@ -26,23 +24,14 @@ def elsewhere(folder: Path, address: str) -> LocalProcess:
     return LocalProcess(None, folder / "elsewhere", "jobs.remote.run", settings)
 
 
-def made_by(store: Store, job: JobRecord) -> list[tuple[int | None, str]]:
-    made = checkpoints.list_checkpoints(store, job_id=job.id).items
-    return [(one.step, one.sha256) for one in made]
-
-
 def test_training_over_http_killed_once_ends_with_the_checkpoints_of_a_local_one(
-    store: Store, tmp_path: Path, address: str
+    store: Store, tmp_path: Path, address: str, undisturbed: Made
 ) -> None:
-    with_database = Supervisor(store, tmp_path, timeouts=PATIENCE)
-    with_database.start()
-    local = wait_until_final(store, train(store, **FIELDS))
-    with_database.stop()
     over_http = Supervisor(
         store, tmp_path, executor=elsewhere(tmp_path, address), timeouts=PATIENCE
     )
     over_http.start()
-    killed_id = train(store, **FIELDS)
+    killed_id = train(store)
     wait_for(store, killed_id, lambda job: job.step >= 640)
     (pid,) = worker_pids(os.getpid())
     os.kill(pid, signal.SIGKILL)
@@ -50,8 +39,7 @@ def test_training_over_http_killed_once_ends_with_the_checkpoints_of_a_local_one
     killed = wait_until_final(store, killed_id)
     over_http.stop()
     assert (killed.state, killed.error, killed.attempt) == ("succeeded", None, 2)
-    assert killed.result == local.result
-    assert made_by(store, killed) == made_by(store, local) and len(made_by(store, local)) == 4
+    assert made_by(store, killed_id) == undisturbed
     steps = [point.step for point in metrics.list_metrics(store, killed_id)]
     assert steps == list(range(128, 2049, 128))
     assert not (tmp_path / "elsewhere" / "resume").exists()

@@ -1,0 +1,58 @@
+"""A training of seconds as a job, and its result where nothing disturbs it."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from app.policies.configs.presets import nested
+from app.store import checkpoints, jobs
+from app.store.engine import Store
+from jobs.spec import parse_spec
+from jobs.supervisor import Supervisor
+from tests.jobs.machinery import PATIENCE, wait_until_final
+
+TINY = {
+    "learning.total_steps": 2048,
+    "learning.n_envs": 8,
+    "learning.progress_steps": 128,
+    "learning.checkpoint_steps": 512,
+    "learning.learning_starts": 512,
+    "learning.buffer_size": 2000,
+    "learning.batch_size": 16,
+    "networks.width": 16,
+}
+"""Nothing is learned by so little; everything is run through."""
+
+
+@dataclass(frozen=True)
+class Made:
+    """What a training made."""
+
+    result: dict[str, Any] | None
+    checkpoints: list[tuple[int | None, str]]
+    """Steps and digests, the newest first."""
+
+
+def train(store: Store, step_budget: int | None = None, **overrides: float | str) -> str:
+    """Post a training; returns the job's id."""
+    fields = nested(TINY | overrides)
+    body = {"kind": "train", "preset": "pick-td3", "seed": 4, "overrides": fields}
+    body["step_budget"] = step_budget
+    return jobs.create_job(store, parse_spec(body).new_job()).id
+
+
+def made_by(store: Store, job_id: str) -> Made:
+    """Return what a job made."""
+    items = checkpoints.list_checkpoints(store, job_id=job_id).items
+    return Made(jobs.get_job(store, job_id).result, [(one.step, one.sha256) for one in items])
+
+
+def made_undisturbed(store: Store, folder: Path) -> Made:
+    """Run the training in a process of this machine to its end."""
+    supervisor = Supervisor(store, folder, timeouts=PATIENCE)
+    supervisor.start()
+    job = wait_until_final(store, train(store))
+    supervisor.stop()
+    made = made_by(store, job.id)
+    assert job.state == "succeeded" and len(made.checkpoints) == 4
+    return made
