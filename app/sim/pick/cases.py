@@ -114,7 +114,7 @@ CASES = (
         expected="cube1",
         first="cube4",
         switches=(1, 1),
-        palm_offset=(0.0, 0.05, 0.0),
+        palm_offset=(0.05, 0.05, 0.0),
     ),
 )
 
