@@ -34,13 +34,15 @@ SIDE_BY_SIDE = --numprocesses $$((1 + $$(getconf _NPROCESSORS_ONLN))) --maxproce
 	--dist loadgroup --no-loadscope-reorder
 
 # $(call INSTALL_LOCK,file): installs exactly what the file lists, and counts along. pip's
-# notes on a configured index that lacks a package are left out: another one has it.
-INSTALL_LOCK = $(PIP) install --require-hashes --no-deps --progress-bar off -r $(1) \
+# notes on a configured index that lacks a package are left out: another one has it. pip would
+# write all bytecode in one process, which took half of the time, that of packages' tests too.
+INSTALL_LOCK = $(PIP) install --require-hashes --no-deps --no-compile --progress-bar off -r $(1) \
 	2> >(grep -v '^WARNING: Location' >&2) \
 	| awk -v total=$$(grep -c '==' $(1)) -v every=$$(test -t 2 && echo 1 || echo 25) ' \
 		/^(Collecting|Requirement already)/ && ++n % every == 0 { \
 			printf "%s    %d of %d packages", (every > 1 && n > every ? "\n" : "\r"), n, total; fflush() } \
-		/^Installing/ { printf ", installing them"; fflush() } END { print "" }'
+		/^Installing/ { printf ", installing them"; fflush() } END { print "" }' \
+	&& { $(PY) -m compileall -q -j 0 -x '/tests?/' $(VENV)/lib/python*/site-packages >/dev/null 2>&1 || true; }
 
 SAY := @printf '==> %s\n'
 
@@ -120,10 +122,10 @@ $(VENV)/created.stamp:
 
 $(VENV)/torch.stamp: $(VENV)/created.stamp
 	$(SAY) "PyTorch $(TORCH): its CPU build (about 200 MB), where one is to be had"
-	@$(PIP) install --quiet --only-binary torch "torch==$(TORCH)+cpu" 2>/dev/null \
-		|| { test -n "$(TORCH_INDEX)" && $(PIP) install --quiet --retries 1 --timeout 15 --index-url $(TORCH_INDEX) "torch==$(TORCH)" 2>/dev/null; } \
+	@$(PIP) install --quiet --no-compile --only-binary torch "torch==$(TORCH)+cpu" 2>/dev/null \
+		|| { test -n "$(TORCH_INDEX)" && $(PIP) install --quiet --no-compile --retries 1 --timeout 15 --index-url $(TORCH_INDEX) "torch==$(TORCH)" 2>/dev/null; } \
 		|| { echo "    no CPU build found: the default index it is (on Linux several GB of CUDA packages)"; \
-			$(PIP) install --quiet "torch==$(TORCH)"; }
+			$(PIP) install --quiet --no-compile "torch==$(TORCH)"; }
 	@$(PY) -W ignore -c 'import torch; print("    torch", torch.__version__, "(CUDA build)" if torch.version.cuda else "(CPU build)")'
 	@touch $@
 
