@@ -7,13 +7,15 @@ not used: the framework makes the spans of requests.
 """
 
 from collections.abc import Awaitable, Callable, Iterable
-from typing import Any, NamedTuple, get_type_hints
+from typing import NamedTuple, get_type_hints
 
 from fastapi.routing import APIRoute
 from pydantic import BaseModel, ValidationError
+from pydantic_core import to_json
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from app.api.bodies import MAX_BODY_BYTES, is_json
+from app.api.schemas.numbers import Data
 from app.api.security import headers_of, path_of
 from app.api.texts import fault_in_json
 from app.errors import ServiceError
@@ -27,7 +29,7 @@ class _Direct(NamedTuple):
     """A route of an asynchronous function of a body, ``request``, and the services."""
 
     route: APIRoute
-    decide: Callable[..., Awaitable[BaseModel]]
+    decide: Callable[..., Awaitable[BaseModel | Data]]
     model: type[BaseModel]
     """Model of the body."""
 
@@ -103,11 +105,10 @@ async def _answer(
         return None
     try:
         request = found.model.model_validate_json(body)
-        answer: Any = await found.decide(request, scope["app"].state.services)
+        answer = await found.decide(request, scope["app"].state.services)
     except (ValidationError, ServiceError):
         return None
-    content: bytes = answer.__pydantic_serializer__.to_json(answer)
-    return content
+    return to_json(answer, inf_nan_mode="null")
 
 
 def _again(messages: list[Message], receive: Receive) -> Receive:

@@ -7,10 +7,12 @@ not processed on the event loop.
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
+from app.api.schemas.numbers import Data
 from app.api.schemas.people import (
     CylinderPerson,
     KeypointsPerson,
@@ -43,37 +45,39 @@ from app.sim.perception.single_frame import estimate_once
 from app.sim.pick.task_policy import Decision
 from app.sim.scene.scene import arm_of, people_of
 
+_SAME = tuple(range(MAX_PEOPLE))
 _PERSON = re.compile(r"^people\[(\d+)\]")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class KnownPerson:
+class KnownPerson(NamedTuple):
     """One person of a request, for a policy and for a safety layer."""
 
     person: Person | None
     """State at present, for the policy; None: a tracker has never seen this person."""
     observed: Person | None
     """Last observed state, for a safety layer; None: no person."""
-    age_s: float = 0.0
-    """Age of that observation [s]."""
     source: Source
     """Kind of description in the request."""
     speeds: Speeds
     """Origin of the speeds."""
+    age_s: float = 0.0
+    """Age of that observation [s]."""
     estimate: PersonEstimate | None = None
     """Estimate from key-points; None without key-points."""
 
-    def use(self, seen: bool, dropped: bool = False) -> PersonUse:
-        """Return the answer's member about this person.
+    def use(self, seen: bool, dropped: bool = False) -> Data:
+        """Return the data of the answer's member about this person.
 
         Args:
             seen: Whether the policy uses this person.
             dropped: Whether this person is left out because the request has too many.
         """
-        use = PersonUse.from_domain(
+        use = PersonUse.data_of(
             self.source, seen, self.speeds, self.person, self.observed, self.estimate
         )
-        return use.model_copy(update={"flags": [*use.flags, "dropped"]}) if dropped else use
+        if dropped:
+            use["flags"].append("dropped")
+        return use
 
 
 def known_people(
@@ -89,8 +93,7 @@ def known_people(
     )
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class PeopleForPolicy:
+class PeopleForPolicy(NamedTuple):
     """The people of a request that a policy may observe: at most four, the nearest."""
 
     known: tuple[KnownPerson, ...]
@@ -102,7 +105,7 @@ class PeopleForPolicy:
 
     def in_request(self, decision: Decision) -> Decision:
         """Return a decision about them with the request's indices of people."""
-        if self.places == tuple(range(len(self.places))):
+        if self.places == _SAME[: len(self.places)]:
             return decision
         seen = decision.seen
         return replace(
@@ -111,8 +114,8 @@ class PeopleForPolicy:
             outside=renumbered(decision.outside, self.places),
         )
 
-    def uses(self, seen: int | None) -> list[PersonUse]:
-        """Return the use of each person of the request.
+    def uses(self, seen: int | None) -> list[Data]:
+        """Return the data of the use of each person of the request.
 
         Args:
             seen: Index in the request of the observed person nearest to the robot.

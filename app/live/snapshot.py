@@ -66,10 +66,9 @@ def candidate_snapshots(
     offered: Sequence[Candidate], decision: Decision | None
 ) -> tuple[CandidateSnapshot, ...]:
     """Return the stations that are offered, with what the decision says of them."""
-    outcomes = None if decision is None else decision.outcomes
     snapshots = []
     for k, candidate in enumerate(offered):
-        outcome = None if outcomes is None else outcomes[k]
+        outcome = None if decision is None else decision.outcome(k)
         snapshots.append(
             CandidateSnapshot(
                 id=candidate.id,

@@ -3,12 +3,11 @@
 Source: docs/method.md 2.
 """
 
-from dataclasses import replace
-
 from starlette.concurrency import run_in_threadpool
 
 from app.api.known_people import known_people, nearest_places, renumbered, take_time
-from app.api.schemas.motion import MotionAnswer, MotionRequest, PersonMet
+from app.api.schemas.motion import MotionAnswer, MotionRequest
+from app.api.schemas.numbers import Data
 from app.api.services import Services
 from app.api.tracker_sessions import TrackerSessions
 from app.policies.inference.motion_decision import MotionDecider
@@ -16,10 +15,12 @@ from app.sim.cells.cell import Cell, require_cell
 from app.sim.safety.layer import safety_settings
 
 PATH = "/v1/motion"
+UNMET = {"separation": None, "weight": 0.0}
+"""Distance and weight of a person who is not used."""
 
 
-async def answer(request: MotionRequest, services: Services) -> MotionAnswer:
-    """Return the answer to one request.
+async def answer(request: MotionRequest, services: Services) -> Data:
+    """Return the data of the answer to one request, a :class:`MotionAnswer`.
 
     Raises:
         ServiceError: The request cannot be answered.
@@ -29,13 +30,13 @@ async def answer(request: MotionRequest, services: Services) -> MotionAnswer:
     decider = await _decider(request.checkpoint, services)
     require_cell(cell, decider.actor.cell, decider.actor.cell_sha256)
 
-    def decided() -> MotionAnswer:
+    def decided() -> Data:
         with services.span("decision"):
             return decide(request, cell, decider, services.trackers)
 
     # A decision takes less time than a change of thread usually does, on the event loop.
     found = await run_in_threadpool(decided) if take_time(request.people) else decided()
-    services.metrics.count_outside(PATH, found.outside, found.state_outside)
+    services.metrics.count_outside(PATH, found["outside"], found["state_outside"])
     return found
 
 
@@ -54,8 +55,8 @@ async def _decider(name: str | None, services: Services) -> MotionDecider:
 
 def decide(
     request: MotionRequest, cell: Cell, decider: MotionDecider, trackers: TrackerSessions
-) -> MotionAnswer:
-    """Return the answer to one request.
+) -> Data:
+    """Return the data of the answer to one request, a :class:`MotionAnswer`.
 
     Args:
         request: State, people and goal.
@@ -80,17 +81,15 @@ def decide(
     with request.robot.faults_in_place():
         decision = decider.decide(question)
     if not seen == monitored == list(range(len(people))):
-        decision = replace(
-            decision,
+        decision = decision._replace(
             seen=None if decision.seen is None else seen[decision.seen],
             terms_of=None if decision.terms_of is None else monitored[decision.terms_of],
             outside=renumbered(decision.outside, seen),
         )
     met = dict(zip(seen, decision.met, strict=True))
     uses = [
-        PersonMet.from_use(
-            one.use(i == decision.seen, i in last and i not in monitored), met.get(i)
-        )
+        one.use(i == decision.seen, i in last and i not in monitored)
+        | (met[i]._asdict() if i in met else UNMET)
         for i, one in enumerate(people)
     ]
-    return MotionAnswer.from_domain(decision, question, uses, cell.robot.dt, request.stamp)
+    return MotionAnswer.data_of(decision, question, uses, cell.robot.dt, request.stamp)

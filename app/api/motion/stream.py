@@ -18,6 +18,7 @@ from typing import Any, Literal
 
 import anyio
 from pydantic import ValidationError
+from pydantic_core import to_json
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from app.api.motion.decision import answer
@@ -173,7 +174,8 @@ class MotionSocket:
             if refused is None:
                 asked, left_out = _reduced(MotionRequest.model_validate(body), left_out)
                 found = await answer(asked, self._services)
-                return found.model_copy(update={"stream": use(left_out, 200)}).model_dump_json()
+                found["stream"] = use(left_out, 200)
+                return str(to_json(found, inf_nan_mode="null"), "utf-8")
         except Exception as error:
             refused = _problem(error)
         content: dict[str, object] = json.loads(bytes(refused.body))

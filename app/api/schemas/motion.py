@@ -1,13 +1,13 @@
 """``POST /v1/motion``: state, people and goal in, the next trajectory segment out."""
 
 from collections.abc import Sequence
-from typing import Annotated, Literal, Self
+from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import Field
 
 from app.api.schemas.examples import MOTION, shows
-from app.api.schemas.numbers import Answer, Body, Vector3, Vector6
+from app.api.schemas.numbers import Answer, Body, Data, Vector3, Vector6
 from app.api.schemas.people import PersonInput, PersonUse
 from app.api.schemas.robot_state import ROS_NAMES, RobotState
 from app.api.schemas.separation import Override, SafetyInput
@@ -20,7 +20,6 @@ from app.sim.reach.motion_types import (
     MotionDecision,
     MotionMode,
     MotionQuestion,
-    PersonWeight,
 )
 from app.sim.robot.trajectory_segment import TrajectorySegment
 from app.sim.safety.decision import SafetyDecision, powers_of_time
@@ -48,7 +47,7 @@ class MotionRequest(Body):
     frame: FrameName = Field("robot-base", description=FRAME_TEXT)
     stamp: Stamp = Field(None, description="your time of the state; returned unchanged")
     robot: ArmState
-    people: Sequence[PersonInput] = Field(
+    people: list[PersonInput] = Field(
         max_length=MAX_SKELETONS,
         description="people in the cell, each as joint angles, key-points, a cylinder or a "
         "track; of more than four the nearest four are used, the others are flagged `dropped`",
@@ -140,33 +139,34 @@ class SegmentPublic(Answer):
     qd: Vector6 = Field(description="joint speeds there [rad/s]")
     qdd: Vector6 = Field(description="joint accelerations there [rad/s^2]")
 
-    @classmethod
-    def commanded(cls, piece: TrajectorySegment, q: Vec, qd: Vec, dt: float) -> Self:
-        """Return the segment commanded by the policy from joint positions and speeds."""
+    @staticmethod
+    def commanded(piece: TrajectorySegment, q: Vec, qd: Vec, dt: float) -> Data:
+        """Return the data of the policy's segment from joint positions and speeds."""
         parts = [q, qd, piece.c]
         if piece.d.any():
             parts.append(piece.d)
-        return cls(
-            coefficients=np.stack(parts, axis=1).tolist(),
-            until=dt,
-            q=piece.q.tolist(),
-            qd=piece.qd.tolist(),
-            qdd=piece.qdd.tolist(),
-        )
+        return {
+            "coefficients": np.array(parts).T.tolist(),
+            "until": dt,
+            "q": piece.q.tolist(),
+            "qd": piece.qd.tolist(),
+            "qdd": piece.qdd.tolist(),
+        }
 
-    @classmethod
-    def executed(cls, safe: SafetyDecision, question: MotionQuestion, dt: float) -> Self:
-        """Return the segment scaled by monitoring."""
+    @staticmethod
+    def executed(safe: SafetyDecision, question: MotionQuestion, dt: float) -> Data:
+        """Return the data of the segment scaled by monitoring."""
         powers = powers_of_time(safe, question.q, question.qd)
         used = np.flatnonzero(powers.any(axis=0))
         n = max(3, int(used[-1]) + 1 if used.size else 0)
-        return cls(
-            coefficients=powers[:, :n].tolist(),
-            until=dt if safe.path_deceleration * dt <= 1.0 else 1.0 / safe.path_deceleration,
-            q=safe.q.tolist(),
-            qd=safe.qd.tolist(),
-            qdd=safe.qdd.tolist(),
-        )
+        until = dt if safe.path_deceleration * dt <= 1.0 else 1.0 / safe.path_deceleration
+        return {
+            "coefficients": powers[:, :n].tolist(),
+            "until": until,
+            "q": safe.q.tolist(),
+            "qd": safe.qd.tolist(),
+            "qdd": safe.qdd.tolist(),
+        }
 
 
 class Target(Answer):
@@ -192,12 +192,6 @@ class PersonMet(PersonUse):
         "dropped"
     )
     weight: float = Field(description="weight of the action beside this person")
-
-    @classmethod
-    def from_use(cls, use: PersonUse, met: PersonWeight | None) -> Self:
-        """Return the use of a person with its distance, if known."""
-        separation, weight = (None, 0.0) if met is None else met
-        return cls(**dict(use), separation=separation, weight=weight)
 
 
 LeftOut = Literal["search", "rollout"]
@@ -259,16 +253,15 @@ class MotionAnswer(Answer):
     stamp: Stamp = None
     stream: StreamUse | None = Field(default=None, description="null but on a socket")
 
-    @classmethod
-    def from_domain(
-        cls,
+    @staticmethod
+    def data_of(
         decision: MotionDecision,
         question: MotionQuestion,
-        people: Sequence[PersonMet],
+        people: list[Data],
         dt: float,
         stamp: Stamp,
-    ) -> Self:
-        """Return the answer of a decision; models of lists are made in one call."""
+    ) -> Data:
+        """Return the data of the answer of a decision."""
         segment, safe = (
             SegmentPublic.commanded(decision.piece, question.q, question.qd, dt),
             decision.safe,
@@ -277,27 +270,26 @@ class MotionAnswer(Answer):
         if safe is not None and safe.override < 1.0:
             segment = SegmentPublic.executed(safe, question, dt)
         to_people, to_cell, to_itself = decision.clearance
-        return cls.model_validate(
-            {
-                "joints": list(ROS_NAMES),  # pydantic copies a default deeply
-                "dt": dt,
-                "segment": segment,
-                "commanded": commanded,
-                "act": decision.act.tolist(),
-                "inference_mode": decision.inference_mode,
-                "rollout": decision.rollout,
-                "alternative": decision.candidate,
-                "targets": [{"position": p, "weight": w} for p, w in decision.targets],
-                "safety": Override.from_domain(decision),
-                "people": people,
-                "clearance": {"people": to_people, "cell": to_cell, "robot": to_itself},
-                "distance": decision.distance,
-                "beyond_reach": decision.beyond_reach,
-                "unfeasible": decision.unfeasible,
-                "state_outside": decision.state_outside,
-                "outside": decision.outside,
-                "checkpoint": decision.checkpoint,
-                "elapsed_ms": decision.elapsed_ms,
-                "stamp": stamp,
-            }
-        )
+        return {
+            "joints": ROS_NAMES,
+            "dt": dt,
+            "segment": segment,
+            "commanded": commanded,
+            "act": decision.act.tolist(),
+            "inference_mode": decision.inference_mode,
+            "rollout": decision.rollout,
+            "alternative": decision.candidate,
+            "targets": [{"position": p, "weight": w} for p, w in decision.targets],
+            "safety": Override.data_of(decision),
+            "people": people,
+            "clearance": {"people": to_people, "cell": to_cell, "robot": to_itself},
+            "distance": decision.distance,
+            "beyond_reach": decision.beyond_reach,
+            "unfeasible": decision.unfeasible,
+            "state_outside": decision.state_outside,
+            "outside": decision.outside,
+            "checkpoint": decision.checkpoint,
+            "elapsed_ms": decision.elapsed_ms,
+            "stamp": stamp,
+            "stream": None,
+        }

@@ -23,6 +23,9 @@ Listed = Annotated[list[float], BeforeValidator(_listed)]
 """Numbers of an array."""
 Counts = Annotated[list[int], BeforeValidator(_listed)]
 """Whole numbers of an array."""
+Data = dict[str, Any]
+"""Content of an answer, or of a part of it, as the members of its model: data that is made by
+this program and need not be validated before it is written as JSON."""
 Sparse = Annotated[list[float | None], BeforeValidator(_listed)]
 """Numbers of an array that are null where they are not finite."""
 

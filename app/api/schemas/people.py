@@ -8,13 +8,13 @@ Source: docs/method.md 2.8.
 
 import math
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import BeforeValidator, Discriminator, Field, Tag
 from pydantic_core import PydanticCustomError
 
-from app.api.schemas.numbers import Answer, Body, Finite, Time, Vector18
+from app.api.schemas.numbers import Answer, Body, Data, Finite, Time, Vector18
 from app.errors import InvalidInput
 from app.sim.cells.cell import Cell
 from app.sim.core.arrays import Vec
@@ -225,8 +225,11 @@ _MARKS: dict[str, Source] = {
 
 def source_of(entry: Any) -> Source | None:
     """Return the kind of an entry from its members."""
-    if isinstance(entry, Mapping):
-        return next((_MARKS[name] for name in _MARKS if name in entry), None)
+    if type(entry) is dict or isinstance(entry, Mapping):  # the second takes long
+        for name, source in _MARKS.items():
+            if name in entry:
+                return source
+        return None
     kinds: dict[type, Source] = {
         PersonState: "joint-angles",
         KeypointsPerson: "keypoints",
@@ -276,17 +279,16 @@ class PersonUse(Answer):
         description="time since the newest credible key-point [s]; null where there was none"
     )
 
-    @classmethod
-    def from_domain(
-        cls,
+    @staticmethod
+    def data_of(
         source: Source,
         seen: bool,
         speeds: Speeds,
         person: Person | None,
         observed: Person | None,
         estimate: PersonEstimate | None,
-    ) -> Self:
-        """Return the use of a person.
+    ) -> Data:
+        """Return the data of the use of a person.
 
         Args:
             source: Kind of description in the request.
@@ -296,20 +298,20 @@ class PersonUse(Answer):
             observed: State for monitoring; None: not used.
             estimate: Estimate from key-points; None without key-points.
         """
-        return cls(
-            by=source,
-            seen=seen,
-            as_cylinder=person is not None and person.cylinder is not None,
-            monitored_as_cylinder=observed is not None and observed.cylinder is not None,
-            speeds=speeds,
-            flags=[
+        return {
+            "by": source,
+            "seen": seen,
+            "as_cylinder": person is not None and person.cylinder is not None,
+            "monitored_as_cylinder": observed is not None and observed.cylinder is not None,
+            "speeds": speeds,
+            "flags": [
                 *(() if estimate is None else estimate.flags),
                 *(() if person is None else degradations(person)),
             ],
-            held=[] if estimate is None else list(estimate.held),
-            missing=[] if estimate is None else list(estimate.missing),
-            strays=[] if estimate is None else list(estimate.strays),
-            unusable=[] if estimate is None else list(estimate.unusable),
-            implausible=None if estimate is None else estimate.implausible,
-            age_s=estimate.age_s if estimate and math.isfinite(estimate.age_s) else None,
-        )
+            "held": [] if estimate is None else list(estimate.held),
+            "missing": [] if estimate is None else list(estimate.missing),
+            "strays": [] if estimate is None else list(estimate.strays),
+            "unusable": [] if estimate is None else list(estimate.unusable),
+            "implausible": None if estimate is None else estimate.implausible,
+            "age_s": estimate.age_s if estimate and math.isfinite(estimate.age_s) else None,
+        }

@@ -7,7 +7,7 @@ from pydantic import Field
 
 from app.api.schemas.examples import PLAN, shows
 from app.api.schemas.motion import SegmentPublic
-from app.api.schemas.numbers import Answer, Vector3
+from app.api.schemas.numbers import Answer, Data, Vector3
 from app.api.schemas.people import PersonInput, PersonUse
 from app.api.schemas.robot_state import RobotState
 from app.api.schemas.sorting import SortingFields, SortingMove, Word, move_of
@@ -199,7 +199,7 @@ class PlanAnswer(Answer):
         query: PlanQuery,
         request: PlanRequest,
         names: SortingNames,
-        people: list[PersonUse],
+        people: list[Data],
     ) -> Self:
         """Return the answer of a plan.
 
@@ -220,7 +220,7 @@ class PlanAnswer(Answer):
             target=None if chosen is None else (chosen.pick or chosen.place).position.tolist(),
             segment=None
             if segment is None
-            else SegmentPublic.commanded(segment, query.q, query.qd, plan.dt),
+            else SegmentPublic(**SegmentPublic.commanded(segment, query.q, query.qd, plan.dt)),
             dt=plan.dt,
             because=reason(plan, query.objective),
             moves=[
@@ -236,7 +236,7 @@ class PlanAnswer(Answer):
             ],
             fewest_moves=plan.near.plan.moves,
             expected_attempts=plan.near.plan.attempts,
-            people=people,
+            people=[PersonUse(**one) for one in people],
             state_outside=[]
             if decision is None
             else [Outside.model_validate(one) for one in decision.outside],

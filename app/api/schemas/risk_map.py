@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from app.api.schemas.examples import RISK_MAP, shows
-from app.api.schemas.numbers import Answer, Body, Finite
+from app.api.schemas.numbers import Answer, Body, Data, Finite
 from app.api.schemas.people import PersonUse
 from app.api.schemas.task_selection import Stamp, TaskSelectionRequest
 from app.errors import InvalidInput
@@ -112,7 +112,7 @@ class RiskMapAnswer(Answer):
         found: RiskMap,
         reached: NDArray[np.bool_],
         request: RiskMapRequest,
-        people: list[PersonUse],
+        people: list[Data],
         checkpoint: str,
     ) -> Self:
         """Return the answer of a map.
@@ -142,7 +142,7 @@ class RiskMapAnswer(Answer):
             contact=None if found.contact is None else rows(found.contact),
             clearance_m=rows(found.clearance_m),
             reason=rows(reason, ~none),
-            people=people,
+            people=[PersonUse(**one) for one in people],
             checkpoint=checkpoint,
             elapsed_ms=found.elapsed_ms,
             stamp=request.stamp,

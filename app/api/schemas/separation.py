@@ -4,11 +4,11 @@ Source: ISO/TS 15066; docs/method.md 2.7.
 """
 
 from dataclasses import replace
-from typing import Annotated, Self
+from typing import Annotated
 
 from pydantic import Field
 
-from app.api.schemas.numbers import Answer, Body
+from app.api.schemas.numbers import Answer, Body, Data
 from app.sim.human.model import CAPSULE_NAMES
 from app.sim.reach.motion_types import MotionDecision
 from app.sim.safety.layer import SafetySettings
@@ -95,17 +95,23 @@ class Override(Answer):
         description="S_p of that person, else of the nearest; null without people"
     )
 
-    @classmethod
-    def from_domain(cls, decision: MotionDecision) -> Self | None:
-        """Return the override of a decision; None without monitoring."""
+    @staticmethod
+    def data_of(decision: MotionDecision) -> Data | None:
+        """Return the data of the override of a decision; None without monitoring."""
         safe, whose, terms = decision.safe, decision.terms_of, decision.terms
         if safe is None:
             return None
-        return cls.from_object(
-            safe,
-            set_by=None if safe.person is None else whose,
-            part=None if safe.part is None else CAPSULE_NAMES[safe.part],
-            terms=None
-            if whose is None or terms is None
-            else Terms.from_object(terms, person=whose),
-        )
+        known = None
+        if whose is not None and terms is not None:
+            known = {
+                name: whose if name == "person" else getattr(terms, name)
+                for name in Terms.model_fields
+            }
+        return {
+            "override": safe.override,
+            "set_by": None if safe.person is None else whose,
+            "part": None if safe.part is None else CAPSULE_NAMES[safe.part],
+            "lacking": safe.lacking,
+            "stop_distance": safe.stop_distance,
+            "terms": known,
+        }

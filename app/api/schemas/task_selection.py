@@ -1,13 +1,13 @@
 """``POST /v1/task-selection``: state in, decision out."""
 
 from collections.abc import Sequence
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import ConfigDict, Field
 
 from app.api.schemas.examples import TASK_SELECTION, shows
-from app.api.schemas.numbers import Answer, Body, Finite, Vector3, Vector6
+from app.api.schemas.numbers import Answer, Body, Data, Finite, Vector3, Vector6
 from app.api.schemas.people import PersonInput, PersonUse
 from app.api.schemas.people import PersonState as PersonState
 from app.api.schemas.robot_state import RobotState
@@ -18,7 +18,6 @@ from app.sim.pick.task_policy import (
     Candidate,
     Decision,
     Objective,
-    OutcomeEstimate,
     PickProgress,
 )
 
@@ -49,7 +48,7 @@ class TaskSelectionRequest(Body):
     frame: FrameName = Field("robot-base", description=FRAME_TEXT)
     stamp: Stamp = Field(None, description="your time of the state; returned unchanged")
     robot: RobotState
-    people: Sequence[PersonInput] = Field(
+    people: list[PersonInput] = Field(
         max_length=MAX_SKELETONS,
         description="people in the cell, each as joint angles, key-points, a cylinder or a "
         "track; a policy for one person uses the one nearest to the robot; of more than four "
@@ -91,9 +90,7 @@ class TaskSelectionRequest(Body):
         return (
             self.robot.joints(self.robot.q),
             self.robot.joints(self.robot.qd),
-            tuple(
-                Candidate(id=one.id, position=np.array(one.position)) for one in self.candidates
-            ),
+            tuple([Candidate(one.id, np.array(one.position)) for one in self.candidates]),
         )
 
     @property
@@ -148,11 +145,11 @@ class Outcome(Answer):
     time_s: float = Field(description="expected time to success [s]")
 
     @staticmethod
-    def data_of(outcome: OutcomeEstimate | None) -> dict[str, Any] | None:
-        """Return the data of a prediction, if there is one."""
+    def data_of(outcome: Sequence[float] | None) -> Data | None:
+        """Return the data of the fields of an ``OutcomeEstimate``, if there is one."""
         if outcome is None:
             return None
-        success, (low, high), contact, (least, most), time_s = outcome
+        success, low, high, contact, least, most, time_s = outcome
         return {
             "success": {"mean": success, "low": low, "high": high},
             "contact": {"mean": contact, "low": least, "high": most},
@@ -188,36 +185,30 @@ class TaskSelection(Answer):
     elapsed_ms: float = Field(description="time of the decision [ms]")
     stamp: Stamp = None
 
-    @classmethod
-    def from_domain(
-        cls,
-        decision: Decision,
-        candidates: tuple[Candidate, ...],
-        people: list[PersonUse],
-        stamp: Stamp,
-    ) -> Self:
-        """Return the answer of a decision; all of its models are made in one call."""
-        speeds = decision.qd_target.tolist()
-        outcomes = decision.outcomes or (None,) * len(candidates)
-        return cls.model_validate(
-            {
-                "chosen": decision.chosen,
-                "candidates": [
-                    {
-                        "id": candidate.id,
-                        "value": decision.values[index],
-                        "chosen": index == decision.index,
-                        "outcome": Outcome.data_of(outcomes[index]),
-                        "reachable": decision.reachable[index],
-                        "action": {"qd_target": speeds[index]},
-                        "outside": decision.outside_candidates[index],
-                    }
-                    for index, candidate in enumerate(candidates)
-                ],
-                "people": people,
-                "state_outside": decision.outside,
-                "checkpoint": decision.checkpoint,
-                "elapsed_ms": decision.elapsed_ms,
-                "stamp": stamp,
-            }
-        )
+    @staticmethod
+    def data_of(
+        decision: Decision, candidates: Sequence[Candidate], people: list[Data], stamp: Stamp
+    ) -> Data:
+        """Return the data of the answer of a decision."""
+        speeds, outcomes = decision.qd_target.tolist(), decision.outcomes
+        expected = [None] * len(candidates) if outcomes is None else outcomes.tolist()
+        return {
+            "chosen": decision.chosen,
+            "candidates": [
+                {
+                    "id": candidate.id,
+                    "value": decision.values[index],
+                    "chosen": index == decision.index,
+                    "outcome": Outcome.data_of(expected[index]),
+                    "reachable": decision.reachable[index],
+                    "action": {"qd_target": speeds[index]},
+                    "outside": decision.outside_candidates[index],
+                }
+                for index, candidate in enumerate(candidates)
+            ],
+            "people": people,
+            "state_outside": decision.outside,
+            "checkpoint": decision.checkpoint,
+            "elapsed_ms": decision.elapsed_ms,
+            "stamp": stamp,
+        }

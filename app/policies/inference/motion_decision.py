@@ -32,7 +32,7 @@ from app.sim.core.jit import direct
 from app.sim.human import model as human
 from app.sim.human.person import Person
 from app.sim.perception.observed_people import (
-    as_known,
+    checked_and_known,
     checked_people,
     checked_vector,
     person_from_cylinder,
@@ -59,6 +59,8 @@ from app.sim.safety.layer import SafetyLayer, SafetySettings
 from app.sim.scene.scene import FAR_AWAY, arm_of
 
 _FAR = np.full(3, 10.0)
+_WHOLE = np.ones(1)
+_SHOULDER = tuple(map(float, SHOULDER))
 Monitored = tuple[SafetyDecision | None, int | None, SeparationTerms | None]
 """Decision of the safety layer, index of the decisive person, and terms of S_p."""
 
@@ -88,6 +90,8 @@ class MotionDecider:
         self._improvements: dict[QueryState, RolloutImprovement] = {}
         self._layer = SafetyLayer(self.arm, SafetySettings())
         self._busy = threading.Lock()
+        self._longest = LONGEST_REACH + max(self.arm.lengths.tool - 0.12, 0.0)
+        """Reach of the arm [m]."""
 
     @property
     def checkpoint(self) -> str:
@@ -104,29 +108,30 @@ class MotionDecider:
         """
         started = time.perf_counter()
         robot, goal = self._numbers(question)
-        people = checked_people(question.people)
+        people, known_people = checked_and_known(question.people)
         mode = self._mode(question.inference_mode)
         rollout = self._rollout(question.rollout)
         order = _bodies_first(people)
-        known = [people[i] for i in order]
+        known, viewed = [people[i] for i in order], [known_people[i] for i in order]
         with self._busy:
             stage = self._stage(known, self._stages)
             time_left = min(max(0.0, question.time_left_s), HORIZON_S)
             stage.load(robot.measured, known, time_left)
             apart, clearance = stage.distances.tolist(), stage.clear.tolist()
-            distance, shapes = math.dist(stage.tcp, goal), stage.shapes
-            if question.safety is None:
+            point, monitors = goal.tolist(), question.safety is not None
+            distance = math.dist(stage.tcp.tolist(), point)
+            shapes = stage.shapes if monitors else None
+            if not monitors:
                 _require_apart(apart, order)
             # Distances and monitoring use measured people, the policy clipped ones.
-            viewed = [as_known(person) for person in known]
             if robot.outside or any(a is not b for a, b in zip(known, viewed, strict=True)):
                 stage.load(robot.clamped, viewed, time_left)
             nearest = int(stage.distances.argmin()) if order else None
             act, targets, weights, seen = self._act(stage, question, goal, mode)
             candidate = self._improve(stage, question, goal, act) if rollout else None
             segment, unfeasible = self._segment(robot, act)
-            shapes, places = self._observed(question.observed, robot) or (shapes, order)
-            safe, terms_of, terms = self._monitored(question, robot, segment, shapes, places)
+            last = self._observed(question.observed, robot) or (shapes, order)
+            safe, terms_of, terms = self._monitored(question, robot, segment, *last)
             state = np.concatenate((robot.clamped.q, robot.clamped.qd, goal))
             outside = self._trained.outside(state, as_given(seen, known, viewed), order)
         met = [
@@ -148,7 +153,7 @@ class MotionDecider:
             terms_of=terms_of,
             clearance=(clearance[0], clearance[1], clearance[2]),
             distance=distance,
-            beyond_reach=self._beyond_reach(goal),
+            beyond_reach=max(0.0, math.dist(point, _SHOULDER) - self._longest),
             state_outside=robot.outside,
             outside=outside,
             checkpoint=self.checkpoint,
@@ -254,7 +259,7 @@ class MotionDecider:
         """Return action, targets, weights of the people, and the observed people."""
         apart = stage.distances
         nearest = int(apart.argmin()) if len(apart) else None
-        places, shares = goal[None], np.ones(1)
+        places, shares = goal[None], _WHOLE
         if mode == "interpolated":
             assert self._between is not None
             mix, around = self._between.around(goal[None])
@@ -302,12 +307,12 @@ class MotionDecider:
         question: MotionQuestion,
         robot: MeasuredState,
         segment: TrajectorySegment,
-        people: Shapes,
+        people: Shapes | None,
         order: Sequence[int],
     ) -> Monitored:
         """Return the decision of the safety layer and the terms of the decisive person."""
         settings = question.safety
-        if settings is None:
+        if settings is None or people is None:
             return None, None, None
         q, qd, _ = robot.measured
         if settings != self._layer.settings:
@@ -317,11 +322,6 @@ class MotionDecider:
         if decisive is None:
             return safe, None, None
         return safe, order[decisive[0]], decisive[1]
-
-    def _beyond_reach(self, goal: Vec) -> float:
-        """Return the distance of a goal beyond the reach of the arm [m]; 0 within reach."""
-        longest = LONGEST_REACH + max(self.arm.lengths.tool - 0.12, 0.0)
-        return max(0.0, math.dist(goal, SHOULDER) - longest)
 
 
 def _bodies_first(people: Sequence[Person]) -> list[int]:

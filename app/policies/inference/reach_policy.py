@@ -34,7 +34,12 @@ from app.sim.reach.goal_sets import halton_targets
 from app.sim.reach.kernels import option_features, people_set
 from app.sim.reach.kernels.observation import BASE_START, N_FEATURES, SIZES, STATE_SIZES
 from app.sim.reach.recipe_rules import BlockedRules
-from app.sim.reach.rollout.kernels.actor import FEW, act_batch, new_compiled_actor
+from app.sim.reach.rollout.kernels.actor import (
+    FEW,
+    CompiledActor,
+    act_batch,
+    new_compiled_actor,
+)
 from app.sim.robot.actions import ActionSettings
 
 LAYOUTS = {
@@ -119,6 +124,7 @@ class ReachPolicy(TrainedPolicy):
             self._moments = mean.numpy(), spread.numpy()
         self._residual = preset.networks.actor == "residual"
         self._few = self.kernel_network
+        self._actor: CompiledActor | None = None
         self._answers: Callable[..., None] | None = None
 
     @property
@@ -167,7 +173,9 @@ class ReachPolicy(TrainedPolicy):
         """Return the actions of :meth:`acts`, computed by the kernel."""
         seen = np.ascontiguousarray(obs, dtype=np.float32)
         acts = np.empty((len(seen), N_ACT), dtype=np.float32)
-        arguments = new_compiled_actor(network, BASE_WEIGHT), seen, acts
+        if self._actor is None:
+            self._actor = new_compiled_actor(network, BASE_WEIGHT)  # the kernel keeps the GIL
+        arguments = self._actor, seen, acts
         if self._answers is None:
             self._answers = direct(act_batch, arguments)
         self._answers(*arguments)

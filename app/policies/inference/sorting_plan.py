@@ -276,7 +276,7 @@ def _estimates(decision: Decision, targets: dict[int, Vec]) -> dict[int, MotionE
         place: MotionEstimate(
             position=point,
             value=decision.values[i],
-            outcome=None if decision.outcomes is None else decision.outcomes[i],
+            outcome=decision.outcome(i),
             outside=decision.outside_candidates[i],
         )
         for i, (place, point) in enumerate(targets.items())

@@ -8,9 +8,9 @@ the same networks.
 Source: thesis eq. (5.1)-(5.7). Deviates: hysteresis is ours; 0 gives the source's rule.
 """
 
+import math
 import time
 from collections.abc import Sequence
-from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -22,7 +22,7 @@ from app.policies.inference.moved_person import scenes_of
 from app.policies.inference.trained_policy import TrainedPolicy
 from app.policies.inference.trained_ranges import TrainedRanges
 from app.policies.inference.value_networks import ValueNetworks, pick_preset_of
-from app.policies.networks.outcome import OutcomePrediction
+from app.policies.networks.outcome import OutcomePrediction, estimates_of
 from app.policies.networks.pick import CLEARANCE
 from app.sim.cells.cell import Cell, require_cell
 from app.sim.core.arrays import Vec
@@ -30,7 +30,7 @@ from app.sim.core.kernels.bounds import are_inside
 from app.sim.human import model as human
 from app.sim.human.person import Person
 from app.sim.perception.observed_people import (
-    as_known,
+    checked_and_known,
     checked_people,
     checked_vector,
     is_far,
@@ -48,7 +48,6 @@ from app.sim.pick.task_policy import (
     Decision,
     MovedPerson,
     Objective,
-    OutcomeEstimate,
     PickProgress,
     RiskMap,
 )
@@ -70,17 +69,6 @@ _LOWEST, _HIGHEST = np.full(3, -10.0), np.full(3, 10.0)
 """Bounds of the coordinates of a candidate [m]."""
 _FAR_PERSON = Person(q=human.rest_posture(*FAR_AWAY), qd=np.zeros(18))
 """Observed person of an empty cell."""
-
-
-def estimates(predicted: OutcomePrediction) -> tuple[OutcomeEstimate, ...]:
-    """Return predicted outcomes one by one, with the intervals of their probabilities."""
-    mean, spread = predicted.probability, predicted.spread
-    low, high = np.maximum(mean - spread, 0.0), np.minimum(mean + spread, 1.0)
-    (success, contact, _), lows, highs = (rows.T.tolist() for rows in (mean, low, high))
-    intervals = [zip(lows[k], highs[k], strict=True) for k in range(2)]
-    times = predicted.time_s.tolist()
-    fields = zip(success, intervals[0], contact, intervals[1], times, strict=True)
-    return tuple(map(partial(tuple.__new__, OutcomeEstimate), fields))  # not its slow __new__
 
 
 def select(
@@ -175,9 +163,7 @@ class TaskChooser(TrainedPolicy):
         observes also the one nearest to the candidate.
         """
         started = time.perf_counter()
-        terms = ChoiceTerms(
-            previous=previous, progress=progress, time_left_s=time_left_s, objective=objective
-        )
+        terms = ChoiceTerms(previous, progress, time_left_s, objective)
         asked = self._ask(q, qd, candidates, terms)
         observed = self._observed(asked.state.measured.q, people)
         found = self._evaluate(asked, _arrays(observed, self._people.bodies[0]))
@@ -193,7 +179,7 @@ class TaskChooser(TrainedPolicy):
             reachable=tuple(found.reachable.tolist()),
             outside=asked.state.outside + self._ranges.of_state(q, qd, person, seen),
             outside_candidates=self._ranges.of_goals(asked.goals),
-            outcomes=None if found.outcomes is None else estimates(found.outcomes),
+            outcomes=None if found.outcomes is None else estimates_of(found.outcomes),
             checkpoint=self.checkpoint,
             elapsed_ms=1e3 * (time.perf_counter() - started),
             seen=seen,
@@ -234,7 +220,7 @@ class TaskChooser(TrainedPolicy):
         """Return a checked question."""
         state = self._limits.take(q, qd)
         ids, goals = _check_candidates(candidates)
-        if not np.isfinite(terms.time_left_s):
+        if not math.isfinite(terms.time_left_s):
             raise InvalidInput("time_left_s", terms.time_left_s, "must be finite [s]")
         if terms.objective != "value" and not self._networks.predicts:
             rule = "needs a checkpoint with outcome probabilities"
@@ -272,7 +258,7 @@ class TaskChooser(TrainedPolicy):
             )
             return np.stack([segment.qd for segment in segments])
         speeds = np.zeros((len(act), 6))
-        speeds[:, :CONTROLLED] = act * self._arm.limits.qd_max[:CONTROLLED]
+        np.multiply(act, self._arm.limits.qd_max[:CONTROLLED], out=speeds[:, :CONTROLLED])
         return speeds
 
     def _observed(self, q: Vec, people: Sequence[Person]) -> list[tuple[int | None, Person]]:
@@ -280,12 +266,12 @@ class TaskChooser(TrainedPolicy):
 
         In an empty cell it is a person far away.
         """
-        known = checked_people(people)
-        near = [i for i, person in enumerate(known) if not is_far(person)]
-        first = nearest_index(self._arm, self._people, q, [known[i] for i in near])
+        given, known = checked_and_known(people)
+        near = [i for i, one in enumerate(given) if one is known[i] or not is_far(one)]
+        first = nearest_index(self._arm, self._people, q, [given[i] for i in near])
         if first is None:
             return [(None, _FAR_PERSON)]
-        return [(i, as_known(known[i])) for i in (near.pop(first), *near)]
+        return [(i, known[i]) for i in (near.pop(first), *near)]
 
 
 def _arrays(observed: list[tuple[int | None, Person]], body: Vec) -> tuple[Vec, Vec, Vec]:
@@ -310,10 +296,12 @@ def _check_candidates(candidates: Sequence[Candidate]) -> tuple[list[str], Vec]:
 def _positions(candidates: Sequence[Candidate]) -> Vec:
     """Return the checked positions of candidates [m], shape (n, 3)."""
     given = [candidate.position for candidate in candidates]
-    if all(isinstance(one, np.ndarray) and one.shape == (3,) for one in given):
+    try:
         goals = np.array(given, dtype=np.float64)
-        if are_inside(goals.ravel(), _LOWEST, _HIGHEST):
-            return goals
+    except (TypeError, ValueError):
+        goals = np.empty(0)
+    if goals.shape == (len(given), 3) and are_inside(goals.ravel(), _LOWEST, _HIGHEST):
+        return goals
     paths = (f"candidates[{i}].position" for i in range(len(given)))
     checked = [
         checked_vector(path, one, 3, _LOWEST, _HIGHEST, "m")

@@ -112,32 +112,32 @@ def _add(rows: int, x: Floats, units: Units, n: int, weights: Floats, sums: Floa
 
 
 @kernel(inline="always")
-def _nonzero(rows: int, x: Floats, n_in: int, units: Units) -> int:
-    """Write the indices of the inputs that are not zero in all rows; return their number."""
-    n = 0
+def _nonzero(rows: int, x: Floats, total: Floats, n_in: int, units: Units) -> int:
+    """Write the indices of the units that are not zero in all rows; return their number.
+
+    Args:
+        x: Rectified units, shape (rows, n_in) or larger.
+        total: Work space, shape (n_in,) or longer.
+        n_in: Number of units.
+        units: Filled, shape (n_in,) or longer.
+    """
     for k in range(n_in):
-        for i in range(rows):
-            if x[i, k] != 0.0:
-                units[n] = k
-                n += 1
-                break
-    return n
-
-
-@kernel(inline="always")
-def _inputs_where(varying: Flags, differs: bool, units: Units) -> int:
-    """Write the indices of the inputs that differ between rows, or do not; return how many."""
+        total[k] = x[0, k]
+    for i in range(1, rows):
+        for k in range(n_in):
+            total[k] += x[i, k]
     n = 0
-    for k in range(varying.shape[0]):
-        if varying[k] == differs:
-            units[n] = k
-            n += 1
+    for k in range(n_in):  # without branches, which cannot be predicted
+        units[n] = k
+        n += total[k] != 0.0
     return n
 
 
 @kernel(nogil=True)
 def _add_constants(x: Floats, varying: Flags, units: Units, layer: Layer, sums: Floats) -> None:
     """Write the biases of a layer plus what inputs add to them that are equal in all rows.
+
+    Inputs of 0 add nothing.
 
     Args:
         x: Inputs of a row, shape (1 or more, n_in).
@@ -147,7 +147,11 @@ def _add_constants(x: Floats, varying: Flags, units: Units, layer: Layer, sums: 
         sums: Filled, shape (1 or more, n_out) or larger.
     """
     copy_values(layer.bias, sums[0])
-    _add(1, x, units, _inputs_where(varying, False, units), layer.weight, sums)
+    n = 0
+    for k in range(varying.shape[0]):
+        units[n] = k
+        n += (not varying[k]) & (x[0, k] != 0.0)
+    _add(1, x, units, n, layer.weight, sums)
 
 
 @kernel(nogil=True, fastmath=QUICK)
@@ -166,7 +170,10 @@ def forward_few(
     first, n_layers, rows = layers[0], len(layers), x.shape[0]
     units, shared, now = work.units, work.rows[0], work.rows[1]
     _add_constants(x, varying, units, first, shared)
-    n = _inputs_where(varying, True, units)
+    n = 0
+    for k in range(varying.shape[0]):
+        units[n] = k
+        n += varying[k]
     for i in range(rows):
         copy_values(shared[0], now[i])
     _add(rows, x, units, n, first.weight, now)
@@ -174,7 +181,7 @@ def forward_few(
         _activate(first, n_layers == 1, now[i])
     for d in range(1, n_layers):
         layer, after = layers[d], work.rows[1 - d % 2]
-        n = _nonzero(rows, now, layer.weight.shape[0], units)
+        n = _nonzero(rows, now, after[0], layer.weight.shape[0], units)
         for i in range(rows):
             copy_values(layer.bias, after[i])
         _add(rows, now, units, n, layer.weight, after)
@@ -188,7 +195,7 @@ def forward_few(
 
 @kernel(nogil=True, fastmath=QUICK)
 def _activate_columns(
-    layer: Layer, sums: Floats, scale: Floats, columns: Floats, speaking: Units
+    layer: Layer, sums: Floats, scale: Floats, columns: Floats, to: Floats, speaking: Units
 ) -> int:
     """Add sums to a layer's units, normalise and rectify them; leave out those that are silent.
 
@@ -198,8 +205,8 @@ def _activate_columns(
         layer: A layer that is not the last.
         sums: Added to each unit, shape (n_out,).
         scale: Work space, shape (n,).
-        columns: Units of n rows, shape (n_out, n); the first of them become those that are not
-            zero in all rows.
+        columns: Units of n rows, shape (n_out, n).
+        to: Filled with those that are not zero in all rows, shape (n_out, n).
         speaking: Filled with their indices, shape (n_out,) or longer.
 
     Returns:
@@ -216,14 +223,12 @@ def _activate_columns(
         for i in range(n):
             scale[i] = one / np.sqrt(scale[i] / n_out + np.float32(EPSILON))
     for j in range(n_out):
-        unit, added, total = columns[j], sums[j], zero
+        unit, after, added, total = columns[j], to[kept], sums[j], zero
         gain, shift = (layer.gain[j], layer.shift[j]) if normed else (one, zero)
         for i in range(n):
-            unit[i] = max((unit[i] + added) * scale[i] * gain + shift, zero)
-            total += unit[i]
+            after[i] = max((unit[i] + added) * scale[i] * gain + shift, zero)
+            total += after[i]
         if total != zero:
-            if kept < j:
-                copy_values(unit, columns[kept])
             speaking[kept] = j
             kept += 1
     return kept
@@ -259,7 +264,10 @@ def centred_layers_of(modules: Iterable[nn.Module]) -> Layers:
 
 
 def new_columns(networks: Iterable[Layers]) -> Floats:
-    """Return work space of :func:`forward_many` for networks and up to ``MANY`` rows."""
+    """Return work space of :func:`forward_many` for networks and up to ``MANY`` rows.
+
+    Sums of a layer, and its units.
+    """
     widest = max(layer.bias.shape[0] for network in networks for layer in network)
     return np.empty((2, widest * MANY), dtype=np.float32)
 
@@ -283,14 +291,12 @@ def forward_many(
     sums = np.empty((1, len(first.bias)), dtype=np.float32)
     _add_constants(constant, varying, units, first, sums)
     weight, sums = first.weight[varying], sums[0]
-    for d, layer in enumerate(layers):
-        width = layer.bias.shape[0]
-        columns = work[d % 2, : width * n].reshape(width, n)
+    for layer, after in zip(layers, (*layers[1:], None), strict=True):
+        columns, units_of = (part[: len(layer.bias) * n].reshape(-1, n) for part in work)
         np.matmul(weight.T, x, out=columns)
-        if layer is layers[-1]:
+        if after is None:
             break
-        kept = _activate_columns(layer, sums, scale, columns, units)
-        after = layers[d + 1]
-        x, weight, sums = columns[:kept], after.weight[units[:kept]], after.bias
-    columns += sums[:, None]
-    return columns
+        kept = _activate_columns(layer, sums, scale, columns, units_of, units)
+        x, weight, sums = units_of[:kept], after.weight.take(units[:kept], axis=0), after.bias
+    found: Floats = np.add(columns, sums[:, None], out=columns)
+    return found

@@ -10,6 +10,8 @@ using deep ensembles* (2017). The thesis shows the critic's values only.
 """
 
 import math
+from collections.abc import Callable
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -18,7 +20,7 @@ from numpy.typing import NDArray
 from torch import nn
 
 from app.policies.networks.actor_critic import hidden
-from app.sim.core.jit import kernel
+from app.sim.core.jit import direct, kernel
 
 Floats = NDArray[np.float32]
 MEMBERS = 3
@@ -121,6 +123,31 @@ def combine_members(outputs: Floats, widen: float, to: OutcomePrediction) -> Non
             else:
                 to.probability[i, k] = mean
                 to.spread[i, k] = 1.96 * widen * math.sqrt(square / (members - 1))
+
+
+@kernel()
+def _write_estimates(found: OutcomePrediction, out: Floats) -> None:
+    """See :func:`estimates_of`."""
+    zero, one = np.float32(0.0), np.float32(1.0)
+    for i in range(out.shape[0]):
+        for k in range(2):
+            mean, spread = found.probability[i, k], found.spread[i, k]
+            out[i, 3 * k] = mean
+            out[i, 3 * k + 1] = max(mean - spread, zero)
+            out[i, 3 * k + 2] = min(mean + spread, one)
+        out[i, 6] = found.time_s[i]
+
+
+@cache
+def _estimating() -> Callable[..., None]:
+    return direct(_write_estimates, (new_prediction(1), np.empty((1, 7), dtype=np.float32)))
+
+
+def estimates_of(predicted: OutcomePrediction) -> Floats:
+    """Return the fields of an ``OutcomeEstimate`` for each of n observations, shape (n, 7)."""
+    found = np.empty((len(predicted.time_s), 7), dtype=np.float32)
+    _estimating()(predicted, found)
+    return found
 
 
 def new_prediction(n: int) -> OutcomePrediction:

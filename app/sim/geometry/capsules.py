@@ -145,7 +145,9 @@ def capsule_clearances(a: Vec, b: Vec, out: Vec) -> None:
 
 
 @kernel(error_model="numpy", fastmath=FAST)
-def nearest_parts(a: Vec, n: int, b: Vec, first: int, last: int, out: Vec, part: Vec) -> None:
+def nearest_parts(
+    a: Vec, n: int, b: Vec, first: int, last: int, out: Vec, part: Vec | None
+) -> None:
     """Write, for the first n columns of ``a``, the nearest of a range of columns of ``b``.
 
     Args:
@@ -155,16 +157,19 @@ def nearest_parts(a: Vec, n: int, b: Vec, first: int, last: int, out: Vec, part:
         first: First column of ``b`` in the range.
         last: Last column of ``b`` in the range.
         out: Filled with distances [m], shape (n,) or longer.
-        part: Filled with columns of ``b``, shape (n,) or longer.
+        part: Filled with columns of ``b``, shape (n,) or longer; None: distances only.
     """
     for j in range(n):
-        out[j], part[j] = FAR, first
+        out[j] = FAR
+        if part is not None:
+            part[j] = first
     for i in range(first, last + 1):
         p, u, radius = start_of(b, i), span_of(b, i), b[RADIUS, i]
         for j in range(n):
             axes = segment_distance(p, u, start_of(a, j), span_of(a, j))
             d = axes - radius - a[RADIUS, j]
-            part[j] = i if d < out[j] else part[j]
+            if part is not None:
+                part[j] = i if d < out[j] else part[j]
             out[j] = d if d < out[j] else out[j]
 
 

@@ -57,6 +57,10 @@ _KNOWN_LOW = np.concatenate((human.Q_MIN, -_QD_LIMIT, [*human.Q_MIN[:2], 0.01]))
 _KNOWN_HIGH = np.concatenate((human.Q_MAX, _QD_LIMIT, [*human.Q_MAX[:2], KNOWN_RADIUS]))
 _KNOWN_HIGH += _SLACK
 _KNOWN_LOW[_YAW], _KNOWN_HIGH[_YAW] = -_MOST_YAW, _MOST_YAW
+_KNOWN_BODY = _KNOWN_LOW[:36], _KNOWN_HIGH[:36]
+"""Bounds of a person with joint angles."""
+_FLOATS = np.dtype(np.float64)
+_MOST_TURN = float(human.Q_MAX[_YAW])
 _KNOWN_PAST = np.array([KNOWN_RADIUS, KNOWN_WALK])
 
 
@@ -137,6 +141,8 @@ def person_anywhere() -> Person:
 
 def degradations(person: Person) -> tuple[str, ...]:
     """Return the differences of an observation from the given person: ``far``, ``clamped``."""
+    if is_plain(person):
+        return ()
     near = _brought_near(person)
     far = ("far",) if near is not person else ()
     return far if _is_known(near) else (*far, "clamped")
@@ -171,7 +177,7 @@ def _brought_near(person: Person) -> Person:
     """Return a person within the known distance; the same object if it is within already."""
     cylinder = person.cylinder
     there = person.q[:2] if cylinder is None else cylinder[:2]
-    away, most = max(abs(float(there[0])), abs(float(there[1]))), float(human.Q_MAX[0])
+    away, most = max(abs(there.item(0)), abs(there.item(1))), float(human.Q_MAX[0])
     if away <= most + _SLACK:
         return person
     here = most / away * there
@@ -182,12 +188,11 @@ def _brought_near(person: Person) -> Person:
 
 def _is_known(person: Person) -> bool:
     """Return whether all values are within the range known to policies, except the yaw."""
-    parts: tuple[Vec, ...] = (person.q, person.qd)
-    if person.cylinder is not None:
-        parts = (person.q, person.qd, person.cylinder)
-    values = np.concatenate(parts)
-    n = len(values)
-    inside = are_inside(values, _KNOWN_LOW[:n], _KNOWN_HIGH[:n])
+    if person.cylinder is None:
+        inside = are_inside(np.concatenate((person.q, person.qd)), *_KNOWN_BODY)
+    else:
+        values = np.concatenate((person.q, person.qd, person.cylinder))
+        inside = are_inside(values, _KNOWN_LOW, _KNOWN_HIGH)
     if not inside or not abs(person.growth) <= KNOWN_GROWTH:
         return False
     return person.past is None or bool((person.past <= _KNOWN_PAST).all())
@@ -204,13 +209,28 @@ def checked_people(people: Sequence[Person]) -> tuple[Person, ...]:
     return tuple(checked_person(person, f"people[{i}]") for i, person in enumerate(people))
 
 
+def checked_and_known(
+    people: Sequence[Person],
+) -> tuple[tuple[Person, ...], tuple[Person, ...]]:
+    """Return validated people, and the same as observed by policies.
+
+    Raises:
+        InvalidInput: More than four people, or a value out of range.
+    """
+    if len(people) <= MAX_PEOPLE and all(map(is_plain, people)):
+        same = tuple(people)
+        return same, same
+    checked = checked_people(people)
+    return checked, tuple(map(as_known, checked))
+
+
 def checked_person(person: Person, path: str) -> Person:
     """Return a validated person.
 
     Raises:
         InvalidInput: A value out of range.
     """
-    if _is_valid(person):
+    if is_plain(person):
         return person
     size, cylinder = person.size, person.cylinder
     if size is not None:
@@ -232,17 +252,20 @@ def checked_person(person: Person, path: str) -> Person:
     )
 
 
-def _is_valid(person: Person) -> bool:
-    """Return whether a person is valid, by one quick comparison of ordinary arrays."""
+def is_plain(person: Person) -> bool:
+    """Return whether a person is valid and known to policies, by one quick comparison.
+
+    False for a person of another size or with a past, who may be both.
+    """
     if person.size is not None or person.past is not None:
         return False
-    parts: tuple[Vec, ...] = (person.q, person.qd)
-    if person.cylinder is not None:
-        parts = (person.q, person.qd, person.cylinder)
-    for part, n in zip(parts, (18, 18, 3), strict=False):
-        if type(part) is not np.ndarray or part.dtype != np.float64 or part.shape != (n,):
+    parts = (person.q, person.qd, person.cylinder)
+    for part, shape in zip(parts, ((18,), (18,), (3,)), strict=True):
+        if part is None:
+            continue
+        if type(part) is not np.ndarray or part.dtype is not _FLOATS or part.shape != shape:
             return False
-    return _is_known(person) and abs(person.q[_YAW]) <= human.Q_MAX[_YAW]
+    return _is_known(person) and -_MOST_TURN <= person.q.item(_YAW) <= _MOST_TURN
 
 
 def _checked_q(path: str, q: Vec) -> Vec:

@@ -15,8 +15,7 @@ from app.sim.pick.kernels.grasp import APPROACH, GraspRules
 from app.sim.robot.actions import ActionSettings
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Candidate:
+class Candidate(NamedTuple):
     """One geometric task: bring the tool to ``position``, or pick the object below it."""
 
     id: str
@@ -30,12 +29,16 @@ class OutcomeEstimate(NamedTuple):
 
     success: float
     """Probability of success."""
-    success_interval: tuple[float, float]
-    """Its 95 % interval."""
+    success_low: float
+    """Lower bound of its 95 % interval."""
+    success_high: float
+    """Upper bound."""
     contact: float
     """Probability of a contact."""
-    contact_interval: tuple[float, float]
-    """Its 95 % interval."""
+    contact_low: float
+    """Lower bound of its 95 % interval."""
+    contact_high: float
+    """Upper bound."""
     time_s: float
     """Expected time to success [s]."""
 
@@ -69,10 +72,15 @@ class Decision:
     """SHA-256 of the checkpoint."""
     elapsed_ms: float
     """Duration of the decision [ms]."""
-    outcomes: tuple[OutcomeEstimate, ...] | None = None
-    """Predicted outcome of each candidate; None where the checkpoint predicts none."""
+    outcomes: NDArray[np.float32] | None = None
+    """Predicted outcome of each candidate, the fields of ``OutcomeEstimate``, shape (n, 7);
+    None where the checkpoint predicts none."""
     seen: int | None = None
     """Index of the observed person nearest to the robot; None without people."""
+
+    def outcome(self, i: int) -> OutcomeEstimate | None:
+        """Return the predicted outcome of a candidate."""
+        return None if self.outcomes is None else OutcomeEstimate(*self.outcomes[i].tolist())
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -93,8 +101,7 @@ class RiskMap:
     """Duration [ms]."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class PickProgress:
+class PickProgress(NamedTuple):
     """Progress of a pick that has begun."""
 
     phase: int
@@ -117,8 +124,7 @@ class MovedPerson:
     """Joint positions in each posture [m, rad], shape (m, 18); speeds stay."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ChoiceTerms:
+class ChoiceTerms(NamedTuple):
     """What a choice depends on beside the state; as in :meth:`TaskPolicy.decide`."""
 
     previous: str | None = None

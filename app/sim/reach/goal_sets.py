@@ -25,6 +25,7 @@ from app.errors import GoalOutside, InvalidInput
 from app.sim.cells.parts import GoalRegion
 from app.sim.core.arrays import Vec
 from app.sim.core.jit import direct
+from app.sim.core.kernels.bounds import are_inside
 from app.sim.core.out_of_range import OutsideField
 from app.sim.reach.kernels.interpolation_weights import (
     N_BOX,
@@ -107,7 +108,7 @@ def _inside(low: Vec, high: Vec, goals: Vec, field: str) -> Vec:
     points = np.array(goals, dtype=np.float64, ndmin=2)
     if points.ndim != 2 or points.shape[1] != 3:
         raise InvalidInput(field, list(np.shape(goals)), "must have the shape [n, 3]")
-    if ((points >= low) & (points <= high)).all():
+    if are_inside(points.ravel(), low, high):
         return points
     held = np.clip(points, low, high)
     # negated so that NaN is rejected too

@@ -71,8 +71,7 @@ class PersonWeight(NamedTuple):
     """Weight of the action beside this person alone; 1 for the observed person."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class MotionDecision:
+class MotionDecision(NamedTuple):
     """The next motion and its explanation."""
 
     act: Vec

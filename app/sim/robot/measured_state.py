@@ -106,10 +106,13 @@ class StateLimits:
                 farther outside its limits than a robot is measured.
         """
         given = (q, qd, _AT_REST if qdd is None else qdd)
-        state = np.array([_six(name, one) for (name, _), one in zip(PARTS, given, strict=True)])
-        measured = Joints(*state)
-        if are_inside(state.ravel(), *self._bounds):
+        values = np.concatenate(
+            [_six(name, one) for (name, _), one in zip(PARTS, given, strict=True)]
+        )
+        measured = Joints(values[:6], values[6:12], values[12:])
+        if are_inside(values, *self._bounds):
             return MeasuredState(measured, measured, ())
+        state = values.reshape(3, 6)
         inside = (self._low - SLACK <= state) & (state <= self._high + SLACK)
         self._require_near(state)
         outside = tuple(
@@ -177,9 +180,9 @@ def returning(arm: Arm, q: Vec, act: Vec) -> tuple[Vec, JointLimits]:
         Action, shape (6,), and limits; those of ``arm`` itself where no joint is outside.
     """
     limits = arm.limits
-    below, above = q < limits.q_min, q > limits.q_max
-    if not (below | above).any():
+    if are_inside(q, limits.q_min, limits.q_max):
         return act, limits
+    below, above = q < limits.q_min, q > limits.q_max
     inward = np.where(above, -1.0, np.where(below, 1.0, act))
     low, high = np.where(below, -FREE, limits.q_min), np.where(above, FREE, limits.q_max)
     return inward, limits._replace(q_min=low, q_max=high)

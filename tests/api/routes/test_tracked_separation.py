@@ -113,7 +113,7 @@ class Scene:
             "rollout": False,
         }
         request = MotionRequest.model_validate(body)
-        answer = decide(request, CELL, policy(), self.trackers)
+        answer = MotionAnswer(**decide(request, CELL, policy(), self.trackers))
         assert answer.safety is not None
         assert answer.safety.override <= self.allowed(request, answer) + 1e-9
         self.answers += answer.safety.override > 0.0
@@ -183,7 +183,8 @@ def decide_beside(scene: Scene) -> MotionAnswer:
         "goal": [0.05, 0.75, 0.31],
         "people": [{"tracker": scene.session.id, "person": 0}],
     }
-    return decide(MotionRequest.model_validate(body), CELL, policy(), scene.trackers)
+    found = decide(MotionRequest.model_validate(body), CELL, policy(), scene.trackers)
+    return MotionAnswer.model_validate(found)
 
 
 def test_the_property_is_tried_where_the_robot_may_move() -> None:

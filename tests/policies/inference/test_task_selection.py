@@ -222,14 +222,14 @@ def test_an_object_in_hand_stays_chosen_while_it_is_lifted(chooser):
 def test_probabilities_are_answered_and_may_be_the_objective(chooser):
     state = HOME, np.zeros(6), [person()], cubes("cube0", "cube3", "dock1")
     decision = chooser.decide(*state)
-    assert decision.outcomes is not None
-    for one in decision.outcomes:
-        low, high = one.success_interval
-        assert 0.0 <= low <= one.success <= high <= 1.0
+    found = [one for i in range(3) if (one := decision.outcome(i)) is not None]
+    assert len(found) == 3
+    for one in found:
+        assert 0.0 <= one.success_low <= one.success <= one.success_high <= 1.0
         assert one.success + one.contact <= 1.0 + 1e-6
         assert 0.0 < one.time_s < 20.0
-    success = [one.success for one in decision.outcomes]
-    times = [one.time_s / max(one.success, 0.01) for one in decision.outcomes]
+    success = [one.success for one in found]
+    times = [one.time_s / max(one.success, 0.01) for one in found]
     assert chooser.decide(*state, objective="success").index == int(np.argmax(success))
     assert chooser.decide(*state, objective="time").index == int(np.argmin(times))
 

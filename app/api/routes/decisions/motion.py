@@ -17,6 +17,7 @@ from app.api.description import MISMATCH
 from app.api.motion.decision import answer
 from app.api.motion.stream import MotionSocket, Which
 from app.api.schemas.motion import MotionAnswer, MotionRequest
+from app.api.schemas.numbers import Data
 from app.api.services import ServicesDep
 from app.api.sockets import refuse
 
@@ -25,8 +26,13 @@ logger = logging.getLogger(__name__)
 router = APIRouter(prefix="/v1/motion", tags=["deciding"])
 
 
-@router.post("", summary="Decide how the robot moves next", responses=MISMATCH)
-async def decide_motion(request: MotionRequest, services: ServicesDep) -> MotionAnswer:
+@router.post(
+    "",
+    summary="Decide how the robot moves next",
+    responses=MISMATCH,
+    response_model=MotionAnswer,
+)
+async def decide_motion(request: MotionRequest, services: ServicesDep) -> Data:
     """Return the next trajectory segment, the speed override and its reason.
 
     Calls are independent: state, people and goal may change at any time. For loops,

@@ -10,6 +10,7 @@ from starlette.concurrency import run_in_threadpool
 
 from app.api.description import MISMATCH
 from app.api.known_people import people_for_policy, take_time
+from app.api.schemas.numbers import Data
 from app.api.schemas.task_selection import TaskSelection, TaskSelectionRequest
 from app.api.services import ServicesDep
 from app.api.world_policies import require_task_policy
@@ -20,8 +21,13 @@ MAX_INLINE_CANDIDATES = 32
 router = APIRouter(prefix="/v1/task-selection", tags=["deciding"])
 
 
-@router.post("", summary="Choose what the robot does next", responses=MISMATCH)
-async def select_task(request: TaskSelectionRequest, services: ServicesDep) -> TaskSelection:
+@router.post(
+    "",
+    summary="Choose what the robot does next",
+    responses=MISMATCH,
+    response_model=TaskSelection,
+)
+async def select_task(request: TaskSelectionRequest, services: ServicesDep) -> Data:
     """Return the selected candidate, every candidate's value and the policy's action."""
     # A few candidates take about a millisecond, less than a change of thread.
     services.readiness.require()
@@ -42,7 +48,7 @@ async def select_task(request: TaskSelectionRequest, services: ServicesDep) -> T
         objective=request.objective,
     )
 
-    def answer() -> TaskSelection:
+    def answer() -> Data:
         people = people_for_policy(request.people, cell, services.trackers, q)
         span = services.span("decision")
         with span, request.robot.faults_in_place():
@@ -51,7 +57,7 @@ async def select_task(request: TaskSelectionRequest, services: ServicesDep) -> T
             router.prefix, decision.outside, *decision.outside_candidates
         )
         uses = people.uses(decision.seen)
-        return TaskSelection.from_domain(decision, candidates, uses, request.stamp)
+        return TaskSelection.data_of(decision, candidates, uses, request.stamp)
 
     long = len(candidates) > MAX_INLINE_CANDIDATES or take_time(request.people)
     return await run_in_threadpool(answer) if long else answer()

@@ -48,6 +48,7 @@ from app.sim.pick.kernels.observation_workspace import (
     COARSE_P0,
     COARSE_SPAN,
     FIRST_PART,
+    GOAL_LANES,
     LAST_PART,
     MOVING_LANES,
     N_COARSE,
@@ -110,9 +111,9 @@ def _place_lanes(arm: Arm, q: Vec, first: int, work: PickObservationWorkspace) -
 
 
 @kernel(inline="always")
-def _find_nearest(work: PickObservationWorkspace, lanes: int, person: Vec) -> None:
-    """Find the part of a person, shape (9, 16), that is nearest to each of the first lanes."""
-    nearest_parts(work.lanes, lanes, person, FIRST_PART, LAST_PART, work.gap, work.part)
+def _measure_gaps(work: PickObservationWorkspace, lanes: int, person: Vec) -> None:
+    """Write the distance of a person, shape (9, 16), to each of the first lanes."""
+    nearest_parts(work.lanes, lanes, person, FIRST_PART, LAST_PART, work.gap, None)
 
 
 @kernel(inline="always")
@@ -253,13 +254,13 @@ def _write_look_ahead(
         if not predicts:
             extrapolate_capsules(person.now, person.later, HORIZONS[i], person.moved)
         moved = work.ahead[0, i] if predicts else person.moved
-        _find_nearest(work, lanes, moved)
+        _measure_gaps(work, lanes, moved)
         if lanes == N_LANES:
             out[STILL_AHEAD + i] = _lane_clearance(STILL, work)
         _write_clearances(work, STILL_AHEAD, i, out)
         if second > 0:
             moved, k = work.ahead[1, i], SECOND_CLEARANCE + 1
-            _find_nearest(work, N_LANES, moved)
+            _measure_gaps(work, N_LANES, moved)
             out[k + i] = _lane_clearance(STILL, work)
             _write_clearances(work, k, i, out)
 
@@ -318,8 +319,11 @@ def observe_target(
         out[MOTION + j] = q_goal[j] - q[j]
         out[BASE_START + j] = base[j]
     _place_lanes(arm, state.q_grasp, AT_GOAL, work)
-    _find_nearest(work, lanes, person.now)
-    if not again:
+    if again:
+        _measure_gaps(work, GOAL_LANES, person.now)
+    else:
+        now, gap, part = person.now, work.gap, work.part
+        nearest_parts(work.lanes, N_LANES, now, FIRST_PART, LAST_PART, gap, part)
         _write_nearest(work, out)
     out[AT_GOAL_AHEAD] = _lane_clearance(AT_GOAL, work)
     if n_obs == N_WITH_PHASE or n_obs == N_PICK:
@@ -333,7 +337,7 @@ def observe_target(
         for k in range(SECOND_CLEARANCE, N_PICK):
             out[k] = FARTHEST / DISTANCE_SCALE
     if second > 0:
-        _find_nearest(work, N_LANES, work.second.now)
+        _measure_gaps(work, N_LANES, work.second.now)
         out[SECOND_CLEARANCE] = _lane_clearance(STILL, work)
         out[SECOND_CLEARANCE + 7] = _lane_clearance(AT_GOAL, work)
     _write_look_ahead(arm, floor_z, state, second, work, out, lanes)

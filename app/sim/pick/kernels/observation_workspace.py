@@ -35,12 +35,12 @@ COARSE_RADIUS = np.array([0.09, 0.075, 0.066, 0.066, 0.045])
 COARSE_FIRST = (0, 1, 2, 4, 5)
 """First coarse capsule of each of the four link groups, and their number."""
 N_COARSE = 5
-ALONG_BASE, AT_GOAL, STILL = 0, N_COARSE, 2 * N_COARSE
-"""First lane of three robot configurations that are evaluated together: along the base motion,
-at the goal, now."""
+AT_GOAL, ALONG_BASE, STILL = 0, N_COARSE, 2 * N_COARSE
+"""First lane of three robot configurations that are evaluated together: at the goal, along the
+base motion, now."""
 N_LANES = padded_size(3 * N_COARSE)
-MOVING_LANES = 12
-"""Number of lanes that cover the former two in whole vectors."""
+GOAL_LANES, MOVING_LANES = 8, 12
+"""Numbers of lanes that cover the first and the first two of them in whole vectors."""
 FIRST_PART, LAST_PART = body.C_ABDOMEN, body.C_HAND_L
 """Human capsules used by the features: those above the table."""
 

@@ -50,7 +50,7 @@ def act_once(actor: CompiledActor, obs: Obs, act: Floats) -> None:
         act[j] = math.tanh(act[j] + math.atanh(actor.base_weight * base))
 
 
-@kernel(nogil=True)
+@kernel()
 def act_batch(actor: CompiledActor, obs: Obs, acts: Floats) -> None:
     """Write the actions for some states; each result is independent of the other states.
 
