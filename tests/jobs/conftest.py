@@ -9,8 +9,8 @@ from jobs.executor import LocalProcess
 from jobs.supervisor import Supervisor
 from tests.jobs.machinery import PATIENCE
 from tests.jobs.supervisor_process import COUNTING
-from tests.jobs.trainings import Made, made_undisturbed
 from tests.support.databases import database_url, migrated, postgresql, store
+from tests.support.trainings import Made, made_undisturbed
 
 __all__ = ["database_url", "migrated", "postgresql", "store"]
 

@@ -8,7 +8,7 @@ from app.store.engine import Store
 from jobs.spec import parse_spec
 from jobs.supervisor import Supervisor
 from tests.jobs.machinery import assert_counted_once, queue, wait_for, wait_until_final
-from tests.jobs.trainings import made_by
+from tests.support.trainings import made_by
 
 TRAIN = {"kind": "train", "preset": "pick-td3", "seed": 1}
 

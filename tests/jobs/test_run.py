@@ -18,11 +18,11 @@ from jobs.recording_catalog import RecordingCatalog
 from jobs.spec import parse_spec
 from jobs.supervisor import Supervisor
 from tests.jobs.machinery import PATIENCE, WAIT_S, wait_for, wait_until_final, worker_pids
-from tests.jobs.trainings import Made, made_by, train
 from tests.policies.evaluation.sorting_players import untrained
 from tests.sim.recorded_person import csv_text, working
 from tests.support import workshop
 from tests.support.databases import SQLITE_ONLY
+from tests.support.trainings import Made, made_by, train
 
 
 @pytest.fixture

@@ -21,8 +21,8 @@ from jobs.executor import PROJECT_ROOT, LocalProcess, search_path
 from jobs.supervisor import Supervisor
 from tests.jobs.machinery import PATIENCE, wait_for, wait_until_final
 from tests.jobs.remote.serving import TOKEN
-from tests.jobs.trainings import made_by, train
 from tests.support.databases import SQLITE_ONLY
+from tests.support.trainings import made_by, train
 
 pytestmark = [pytest.mark.ray, SQLITE_ONLY]
 FIELDS: dict[str, float | str] = {

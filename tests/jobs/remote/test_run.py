@@ -12,8 +12,8 @@ from jobs.spec import parse_spec
 from jobs.supervisor import Supervisor
 from tests.jobs.machinery import PATIENCE, wait_for, wait_until_final, worker_pids
 from tests.jobs.remote.serving import TOKEN, serving
-from tests.jobs.trainings import Made, made_by, train
 from tests.support.databases import SQLITE_ONLY
+from tests.support.trainings import Made, made_by, train
 
 pytestmark = SQLITE_ONLY
 
