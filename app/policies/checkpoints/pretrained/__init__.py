@@ -8,7 +8,7 @@ from app.policies.checkpoints import checkpoint as formats
 from app.policies.checkpoints.checkpoint import Checkpoint
 
 SHA256 = {
-    "pick": "be2bb3570edc6629af154dd0763b64ccdb799c4a8d68ec31a720ddbf10934902",
+    "pick": "b94c40ff9c2595d27a43709fb6906998ac84f9f9944f374d4c7f04c12fdc42c9",
     "pick-monitored": "42109f5ff7ad7ac991f841f1e5c4ad78c08c261316fead769ec4c14330ca9efc",
     "sorting-e0": "7f1ffee69a2a4e1ab6eda76b5b4ff158a7b35ac23c60adecb4a3b5d0cbcb9555",
     "sorting-e1": "932b690abc9780c13a1a3eb5287f4d0f0d5715c846c23ae7f89bcfb7f68d9b9a",
