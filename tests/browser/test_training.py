@@ -39,8 +39,10 @@ def test_posted_job_appears_and_its_curve_grows(
     page.click("form.train summary")
     for name, value in FINE["learning"].items():
         page.fill(f"#train-learning-{name}", str(value))
-    page.click("form.train button[type=submit]")
-    job_id = page.get_attribute(".job.is-open", "data-job")
+    with page.expect_response(lambda one: one.request.method == "POST") as answer:
+        page.click("form.train button[type=submit]")
+    job_id = answer.value.json()["id"]
+    page.wait_for_selector(f'.job.is-open[data-job="{job_id}"]')
     page.wait_for_selector("[data-points]", timeout=GROWTH_MS)
     seen = points(page)
     page.wait_for_function(
