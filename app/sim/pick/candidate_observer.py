@@ -1,13 +1,12 @@
 """Observations of one state for each of several candidates, as task selection needs them."""
 
 from collections.abc import Callable
-from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from app.sim.cells.cell import Cell
-from app.sim.core.arrays import Vec
+from app.sim.core.arrays import Vec, as_kernel_array
 from app.sim.core.jit import direct
 from app.sim.pick.batch import Flags, observation_workspace_of
 from app.sim.pick.kernels.candidates import (
@@ -21,8 +20,6 @@ from app.sim.pick.kernels.observation_layout import N_FEATURES
 from app.sim.pick.task_policy import NOT_BEGUN, PickProgress
 from app.sim.robot.kernels.arm import new_robot_pose
 from app.sim.scene.scene import arm_of
-
-_contiguous = partial(np.ascontiguousarray, dtype=np.float64)
 
 
 class CandidateObserver:
@@ -71,12 +68,12 @@ class CandidateObserver:
             Observations, shape (m n, n_obs), those of one set of people together, and whether
             each target is reachable, (n,).
         """
-        q, qd = _contiguous(robot[0]), _contiguous(robot[1])
-        sets = [_contiguous(value) for value in people]
+        q, qd = as_kernel_array(robot[0]), as_kernel_array(robot[1])
+        sets = [as_kernel_array(value) for value in people]
         if sets[0].ndim == 2:
             sets = [value[None] for value in sets]
         at, share = -1 if current is None else current, progress.closing_s / self._grasp.close_s
-        targets = Targets(_contiguous(goals), at, progress.phase, share)
+        targets = Targets(as_kernel_array(goals), at, progress.phase, share)
         n = len(targets.goals)
         reachable = np.empty(n, dtype=np.bool_)
         obs = np.empty((len(sets[0]) * n, self._n_obs), dtype=np.float32)
