@@ -11,9 +11,7 @@ from app.store import jobs
 from app.store.database.tables import jobs as table
 from app.store.engine import Store
 from app.store.records import JobState
-from tests.support.databases import SQLITE_ONLY
-
-pytestmark = SQLITE_ONLY  # query plans and counts of its virtual machine
+from tests.support.databases import POSTGRESQL_ONLY, SQLITE_ONLY
 
 STATES = ("succeeded", "failed", "cancelled", "queued", "running")
 
@@ -76,6 +74,21 @@ def database_steps(store: Store, call: Callable[[], object]) -> int:
     return steps
 
 
+def rows_read(store: Store, call: Callable[[], object]) -> int:
+    """Return the rows that PostgreSQL reads in a call, those it then leaves out included."""
+    ((query, parameters),) = asked(store, call)
+    with store.reading() as connection:
+        explain = f"EXPLAIN (ANALYZE, FORMAT JSON) {query}"
+        (found,) = connection.exec_driver_sql(explain, parameters).scalar_one()
+    return _rows_of(found["Plan"])
+
+
+def _rows_of(node: dict[str, Any]) -> int:
+    rows = node["Actual Rows"] + node.get("Rows Removed by Filter", 0)
+    return rows * node["Actual Loops"] + sum(_rows_of(one) for one in node.get("Plans", []))
+
+
+@SQLITE_ONLY
 @pytest.mark.parametrize(
     ("state", "cursor", "expected"),
     [
@@ -98,6 +111,7 @@ def test_a_page_is_read_by_an_index_without_sorting(
     assert plan(store, query, parameters) == expected
 
 
+@SQLITE_ONLY
 @pytest.mark.parametrize("part_of", ["none", f"{7:036}"])
 def test_pages_of_parts_and_without_them_are_read_by_an_index(
     store: Store, part_of: str
@@ -108,6 +122,7 @@ def test_pages_of_parts_and_without_them_are_read_by_an_index(
     assert plan(store, query, parameters) == expected
 
 
+@SQLITE_ONLY
 @pytest.mark.parametrize("state", [None, *STATES])
 def test_a_page_costs_the_same_among_ten_times_as_many_jobs(
     store: Store, state: JobState | None
@@ -119,3 +134,23 @@ def test_a_page_costs_the_same_among_ten_times_as_many_jobs(
     few = database_steps(store, page)
     add(store, 1000, 10_000)
     assert 0 < database_steps(store, page) <= 1.1 * few
+
+
+@POSTGRESQL_ONLY
+@pytest.mark.parametrize("state", [None, *STATES])
+def test_postgresql_reads_no_more_rows_for_a_page_among_ten_times_as_many_jobs(
+    store: Store, state: JobState | None
+) -> None:
+    def page() -> None:
+        jobs.list_jobs(store, state=state, limit=3)
+
+    def statistics() -> None:
+        with store.writing() as connection:
+            connection.exec_driver_sql("ANALYZE jobs")
+
+    add(store, 0, 1000)
+    statistics()
+    few = rows_read(store, page)
+    add(store, 1000, 10_000)
+    statistics()
+    assert 0 < rows_read(store, page) <= few
