@@ -138,6 +138,8 @@ def browser() -> Iterator[Browser]:
 def open_page(browser: Browser, server: str) -> Iterator[OpenPage]:
     """Open Tandem's page as a visitor; ``page.problems`` lists what went wrong on it.
 
+    The clock of the live cell runs again after the test.
+
     Software takes long to draw the scene, in the page's own thread: a test that does not look
     at it leaves it out with ``scene=False``.
     """
@@ -169,6 +171,8 @@ def open_page(browser: Browser, server: str) -> Iterator[OpenPage]:
     yield open_it
     for page in pages:
         page.close()
+    commands = f"{server}/v1/worlds/main/commands"
+    patient_http.post(commands, json={"tag": "resume"}).raise_for_status()
 
 
 def complaint(message: ConsoleMessage) -> list[str]:

@@ -90,7 +90,6 @@ def test_keyboard_sees_when_it_is_in_the_scene(open_page: Callable[..., Page]) -
     assert page.evaluate(ring) == "solid"
     page.locator('[data-action="pause"]').click()
     page.locator(".viewer:not(.is-keyed)").wait_for()
-    page.locator('[data-action="pause"]').click()
 
 
 def test_person_follows_the_mode_chosen_by_arrow_keys(

@@ -151,4 +151,3 @@ def test_values_carry_the_time_of_their_decision(
     expect(page.locator(".story .chip").first).to_have_text("Paused")
     decided = world(server)["decided_s"]
     expect(page.locator('[data-role="decided"]')).to_have_text(f"at {decided:.1f} s")
-    page.click('[data-action="pause"]')
