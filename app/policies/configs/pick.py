@@ -180,7 +180,7 @@ class PickEpisode(FieldGroup):
 class PickPeople(FieldGroup):
     """People in the cell."""
 
-    n_people: Whole = number(2, 1, 4, "", "People: the policy observes the nearest one")
+    n_people: Whole = number(2, 1, 4, "", "People: the policy observes the nearest two")
     human_motion: Literal["library", "reaches"] = choice(
         "library", "Motion: movement primitives of the task, or synthetic reaches"
     )
@@ -277,9 +277,13 @@ REACH_ONLY = PickPreset(
     reward=PickReward(c_step=0.005, c_c_end=5.0),
 )
 """The task without a grasp: a target counts when it is reached, as in the thesis."""
-MONITORED = PickPreset(name="pick-td3-monitored", episode=PickEpisode(safety="ssm"))
-"""``pick-td3`` under speed and separation monitoring, with critics of the expected return; a
-person may touch the robot at standstill."""
+MONITORED = PickPreset(
+    name="pick-td3-monitored",
+    networks=PickNetworks(critic="quantiles"),
+    episode=PickEpisode(safety="ssm"),
+)
+"""``pick-td3`` under speed and separation monitoring; a person may touch the robot at
+standstill."""
 THESIS = PickPreset(
     name="pick-td3-thesis",
     learning=PickLearning(
