@@ -1,4 +1,4 @@
-"""The table of picks by training seeds: the shipped policy, and critics of the mean return."""
+"""The table of picks by training seeds, the shipped policy first."""
 
 import json
 from pathlib import Path
@@ -8,13 +8,8 @@ from tools.docs.headline import percent, share
 
 Json = dict[str, Any]
 
-SUFFIXES = {
-    "1, shipped": "",
-    "1, `mean`": "-mean-seed1",
-    "2, `mean`": "-mean-seed2",
-    "3, `mean`": "-mean-seed3",
-}
-"""Training seeds and critics, and the suffixes of their result files."""
+SUFFIXES = {"1, shipped": "", "2": "-seed2", "3": "-seed3"}
+"""Training seeds, and the suffixes of their result files."""
 SINGLE, CHOICE, HARD, CASES = "pick-single", "pick-choice", "pick-choice-hard", "pick-cases"
 CHOICES = {
     "2 or 3 targets": (CHOICE, ""),
