@@ -14,11 +14,12 @@ from typing import Any
 import numpy as np
 import torch
 
-from app.errors import CheckpointMismatch
+from app.errors import CheckpointMismatch, InvalidInput
 from app.policies.algorithms.prioritized_replay import PrioritisedReplay
 from app.policies.checkpoints.checkpoint import TensorFile, check_file, tensor_bytes
 from app.policies.checkpoints.model_state import moments_of, restore, weights_of
 from app.policies.checkpoints.trained_cell import DEFINITION, manifest_fields
+from app.policies.configs.fields import read_config
 from app.policies.configs.presets import Preset
 from app.sim.cells.cell import Cell
 from app.state_dict import State
@@ -87,17 +88,28 @@ def origin(preset: Preset, seed: int, cell: Cell) -> dict[str, Any]:
 def require_origin(state: TrainingState, preset: Preset, seed: int, cell: Cell) -> None:
     """Check that a state belongs to a training.
 
+    Fields that were added since the state was written had their defaults.
+
     Raises:
         CheckpointMismatch: A field of the configuration, the seed or the cell differs.
     """
     names = ("preset", "seed", "cell", DEFINITION)
     wanted = dict(_leaves(origin(preset, seed, cell)))
-    found = dict(_leaves({name: state.manifest.get(name) for name in names}))
+    stored = {name: state.manifest.get(name) for name in names}
+    found = dict(_leaves({**stored, "preset": _completed(stored["preset"], type(preset))}))
     for name in sorted({*wanted, *found}):
         if wanted.get(name) != found.get(name):
             raise CheckpointMismatch(
                 name.removeprefix("preset."), wanted.get(name), found.get(name)
             )
+
+
+def _completed(stored: object, kind: type[Preset]) -> object:
+    """Return a stored configuration with all fields; as it is where it is none of a kind."""
+    try:
+        return json.loads(read_config(kind, stored, "preset").model_dump_json())
+    except InvalidInput:
+        return stored
 
 
 def _leaves(tree: Mapping[str, Any], path: str = "") -> Iterator[tuple[str, Any]]:

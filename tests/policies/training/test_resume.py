@@ -318,6 +318,16 @@ def test_state_of_another_configuration_is_refused_by_field(
         stopped.run()
 
 
+def test_state_from_before_a_field_was_added_has_its_default(stopped: Training) -> None:
+    state, cell = stopped.states.newest(), load_cell(stopped.preset.cell)
+    assert state is not None
+    del state.manifest["preset"]["learning"]["max_grad_norm"]
+    states.require_origin(state, stopped.preset, SEED, cell)
+    changed = small("DQN", **{"learning.max_grad_norm": 3.0})
+    with pytest.raises(CheckpointMismatch, match=r"learning\.max_grad_norm is .*, expected 3"):
+        states.require_origin(state, changed, SEED, cell)
+
+
 def test_state_of_another_seed_or_cell_is_refused(stopped: Training) -> None:
     state, cell = stopped.states.newest(), load_cell(stopped.preset.cell)
     assert state is not None
