@@ -171,7 +171,7 @@ def open_page(browser: Browser, server: str) -> Iterator[OpenPage]:
     yield open_it
     for page in pages:
         page.close()
-    commands = f"{server}/v1/worlds/main/commands"
+    commands = f"{server.rstrip('/')}/v1/worlds/main/commands"
     patient_http.post(commands, json={"tag": "resume"}).raise_for_status()
 
 

@@ -55,8 +55,8 @@ def test_visitor_opens_the_cell_sees_it_reach_and_obstructs_it(
     expect(page.locator('[data-role="override"]')).to_contain_text("disabled")
     page.click('[data-choice="safety:measured"]')
     page.click('[data-action="remove-person"]')
+    until(server, lambda one: one["people"] == [], LIMIT_S)
     expect(page.locator('[data-role="override"]')).to_have_attribute("data-override", "1.000")
-    assert state(server)["people"] == []
     assert page.problems == []  # type: ignore[attr-defined]
     page.locator('[data-role="cell"]').select_option(load_cell().name)
     page.wait_for_selector("[data-candidate]")
