@@ -105,9 +105,9 @@ def require_origin(state: TrainingState, preset: Preset, seed: int, cell: Cell) 
 
 
 def _completed(stored: object, kind: type[Preset]) -> object:
-    """Return a stored configuration with all fields; as it is where it is none of a kind."""
+    """Return a stored configuration with all fields of its kind; unchanged if it is invalid."""
     try:
-        return json.loads(read_config(kind, stored, "preset").model_dump_json())
+        return read_config(kind, stored, "preset").model_dump(mode="json")
     except InvalidInput:
         return stored
 
