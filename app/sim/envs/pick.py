@@ -56,17 +56,25 @@ class PickEnv(SingleEnv):
     | group | size | content |
     |-------|------|---------|
     | q, qd, sin_q, cos_q | 4 x 5 | controlled joints: angle / pi, speed / limit, sine, cosine |
-    | human_q, human_qd | 2 x 18 | the person's joints [m, rad] and half their speeds |
-    | tcp, goal_minus_tcp, tcp_velocity, tool_axis | 4 x 3 | tool and target [m, m/s] |
+    | human_q | 18 | the person's joints: x, y - 1.25 [m], yaw + pi / 2 and 15 more [rad] |
+    | human_qd | 18 | half their speeds [m/s, rad/s] |
+    | tcp, tool_axis | 2 x 3 | [m], unit vector |
+    | goal_minus_tcp, tcp_velocity | 2 x 3 | twice the offset of the target [m], speed [m/s] |
     | hands_and_elbows | 36 | hands and elbows from tcp, target, robot's elbow [m] |
     | hand_velocities | 6 | [m/s] |
-    | goal_posture_minus_q, base | 2 x 5 | offset of the target's q [rad], base motion |
-    | distance_tilt_clearance_time | 4 | distance, tilt, clearance to the person, time left |
-    | nearest_by_group | 16 | distance and direction of the person, four groups of links |
-    | look_ahead_still, look_ahead_base | 2 x 3 | clearances in 0.25, 0.5 and 1 s |
-    | goal_clearance | 4 | clearance of the configuration at the object, now and then |
-    | phase, closing, near_clearance | 3 + 2 | phase, closing time, clearance up to 0.1 m |
-    | second_... | 45 | presence, position, arms and clearances of a second person |
+    | goal_posture_minus_q, base | 2 x 5 | offset of the target's q [rad]; base motion |
+    | distance_tilt_clearance_time | 4 | twice the distance of tcp and target [m], tilt [rad], |
+    | | | clearance to the person [0.5 m], time left [10 s] |
+    | nearest_by_group | 4 x 4 | distance [0.5 m] and direction of the person, by links |
+    | look_ahead_still, look_ahead_base | 2 x 3 | clearance in 0.25, 0.5, 1 s [0.5 m]: robot |
+    | | | at rest, along the base motion |
+    | goal_clearance | 4 | clearance of the configuration at the object [0.5 m], now and in |
+    | | | 0.25, 0.5, 1 s |
+    | phase, closing | 3 + 1 | one-hot; share of the closing time |
+    | near_clearance | 1 | clearance [0.1 m], at most 1 |
+    | second_... | 44 | pelvis, hands, elbows and clearances of a second person |
+
+    Values marked [0.5 m] are in units of 0.5 m and at most 3.
 
     The person nearest to the robot is observed, and of the others the one nearest to the
     target; a cylinder as a person standing in it, an empty cell as a person far away.
@@ -75,9 +83,8 @@ class PickEnv(SingleEnv):
     numbers: q, qd of the robot (2 x 6) and the person (2 x 18) [rad, rad/s, m, m/s], and the
     target [m].
     ``PickSettings(observation="body")`` adds the body dimensions of the observed person, 12
-    numbers: ``app.sim.human.anthropometry.NAMES`` [m], the present height of the pelvis, and
-    the girth;
-    in total ``N_WITH_BODY``, groups as in ``features.BODY_SIZES``.
+    numbers: the lengths of ``app.sim.human.anthropometry.NAMES`` [m], with the present height
+    of the pelvis, and the girth; ``N_WITH_BODY`` in total.
 
     ## Reward
     ``c_d (d_old - gamma d) + c_th (th_old - gamma th) - c_c [collision] - c_step
@@ -85,14 +92,14 @@ class PickEnv(SingleEnv):
 
     ## Start
     The robot rests at home, a cube or a dock in equal shares; the target is another station,
-    drawn uniformly; a worker is at a random time of a random script of reaches, a cylinder
+    drawn uniformly; a worker is at a random time of a random script of primitives, a cylinder
     anywhere in its area. Starts nearer to a person than ``start_clearance_m`` (0.05 m) are
     drawn again, unless ``settings.start`` is ``uniform``.
 
     ## End
     Success, collision and timeout (12 s) *terminate*: the time left is observed, so a timeout
     is part of the task. Without it (``observation="state"``) a timeout *truncates*.
-    ``info["outcome"]`` names the outcome; myopic bounds add *unfeasible*.
+    ``info["outcome"]`` names the outcome; one-step bounds add *unfeasible*.
 
     ## Randomness
     Target, start and the people's motion. Episode ``k`` after ``reset(seed=s)`` depends only on

@@ -102,8 +102,8 @@ class ReachEnv(SingleEnv):
     ## Reward
     ``c_p (d_old - gamma d) - c_d d - c_a |c| - c_step - c_c [collision] + c_s [success]``, with
     ``d`` the distance of tcp and goal [m], ``c`` the cycle's second coefficients [rad/s^2].
-    Coefficients in ``ReachSettings.weights``: ``THESIS_WEIGHTS`` (c_d 1, c_a 0.1, c_c 5, c_s
-    20) or, for training, ``PROGRESS_WEIGHTS`` (c_p 1, c_step 0.004, c_c 4, c_s 4).
+    Coefficients in ``ReachSettings.weights``: by default those of thesis table 4.1 (c_d 1, c_a
+    0.1, c_c 5, c_s 20, others 0); presets have their own (``policies/configs/reach.py``).
 
     ## Start
     The robot rests at home; the goal is one of the 54 points of the cell's grid, one of the
@@ -117,7 +117,7 @@ class ReachEnv(SingleEnv):
     Success and collision *terminate*; so does a timeout (5 s) if the time left is observed;
     otherwise (``observation="state"``) it *truncates*. With ``collision_ends=False`` an episode
     continues after a collision and counts as a collision at its end. ``info["outcome"]`` names
-    the outcome; myopic bounds add *unfeasible*.
+    the outcome; one-step bounds add *unfeasible*.
 
     ## Randomness
     Goal, start and the people's motion. Episode ``k`` after ``reset(seed=s)`` depends only on

@@ -117,9 +117,9 @@ class SortingEnv(SingleEnv):
 
     ## Reward
     ``-0.05`` for an attempt, ``-0.3`` for an empty pick, ``-0.3`` for putting an object back
-    where it was or where there is no room, ``-0.05`` for a failure, ``-0.05`` for sending an
-    object from a tower to the clutter, ``-0.1 d / K`` for the ``d`` levels that differ from the
-    goal afterwards (a wrong colour or a wrong size counts half), ``+1`` for the goal.
+    where it was or where there is no room, ``-0.01`` for a failure, ``-0.01`` for sending an
+    object from a tower to the clutter, ``-0.01 d / K`` for the ``d`` levels that differ from
+    the goal afterwards (a wrong colour or a wrong size counts half), ``+1`` for the goal.
     ``settings.weights`` holds the coefficients.
 
     ## Start
