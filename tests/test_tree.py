@@ -1,8 +1,14 @@
-"""Modules and folders stay short; the limits of CONTRIBUTING.md."""
+"""Modules and folders stay short, as CONTRIBUTING.md asks; maps of packages are complete."""
 
+import ast
+import re
 import subprocess
 from collections import Counter
 from pathlib import Path, PurePath
+
+import pytest
+
+from app.sim.core.kernel_cache import kernel_sources
 
 ROOT = Path(__file__).resolve().parent.parent
 FILES = subprocess.run(
@@ -33,3 +39,37 @@ def test_folders_have_at_most_20_modules() -> None:
     modules.pop(CHAIN)
     assert len(modules) > 50
     assert {folder: n for folder, n in modules.items() if n > MAX_MODULES} == {}
+
+
+ENTRY = re.compile(r"^([a-z_0-9]+/?)(?:  +\S|$)", re.MULTILINE)
+PACKAGES = [
+    path
+    for path in SOURCES
+    if path.name == "__init__.py"
+    and path.parts[0] != "tests"
+    and ROOT / path not in kernel_sources()  # a new map would compile all kernels again
+]
+
+
+def mapped(package: PurePath) -> set[str]:
+    """Entries of a package's docstring: modules, and packages with a slash."""
+    return set(ENTRY.findall(ast.get_docstring(ast.parse((ROOT / package).read_text())) or ""))
+
+
+def content(package: PurePath) -> set[str]:
+    """Modules and packages in a package."""
+    inside = [path for path in SOURCES if path.is_relative_to(package.parent)]
+    parts = [path.relative_to(package.parent).parts for path in inside]
+    found = {f"{one[0]}/" for one in parts if len(one) > 1}
+    return found | {one[0][:-3] for one in parts if len(one) == 1} - {"__init__"}
+
+
+@pytest.mark.parametrize(
+    "package", [path for path in PACKAGES if mapped(path)], ids=lambda path: str(path.parent)
+)
+def test_the_map_of_a_package_is_complete(package: PurePath) -> None:
+    assert mapped(package) ^ content(package) == set()
+
+
+def test_most_packages_have_a_map() -> None:
+    assert len([path for path in PACKAGES if mapped(path)]) > 40

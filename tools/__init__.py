@@ -9,6 +9,7 @@ distance_fields         Smooth surfaces from a handful of round cones: how the p
                         modelled
 fit_capsules            Fit capsules that contain the UR10's collision meshes; run ``python -m
                         tools.fit_capsules``
+generate_client         Writes ``app/client/operations/`` from the OpenAPI document
 import_contracts        Import-linter contract: compiled kernels import only kernels, ``core``
                         and ``geometry``
 make_primitives         Generate the shipped task primitives: ``python -m

@@ -1,1 +1,5 @@
-"""What a person sees: the live loop, the 3D scene, panels and the page."""
+"""The browser page and the 3D scene.
+
+page/    Page: static files, without a build step
+viewer/  The 3D scene on viser
+"""

@@ -1,12 +1,5 @@
 """The command line, ``python -m app COMMAND``.
 
-* ``entry``: the Typer application and ``main``
-* ``serve``: ``serve`` and ``setup``; ``preflight`` checks port and database beforehand,
-  ``uvicorn_server`` runs the application
-* ``backup`` (and ``restore``), ``train``, ``evaluate`` (and ``bench``), ``cells``,
-  ``recordings``: the other commands
-* ``options``, ``output``, ``database``: shared options, printing, access to the database
-
 A command imports the modules it needs when it runs, so that ``--help`` is quick.
 
 backup          The commands ``backup`` and ``restore``
@@ -24,6 +17,7 @@ preflight       Checks before the server loads anything else: its port and its d
                 unused
 recordings      The command group ``recordings``: import, list, show and remove recorded human
                 motion
+report          The command ``report``: tables and figures of the thesis beside the results
 serve           The commands ``serve`` and ``setup``
 train           The command ``train``: train a policy in this process, without a server
 uvicorn_server  The application on uvicorn: one process, one worker, a quick end

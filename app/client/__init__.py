@@ -1,7 +1,7 @@
 """Python client of a running server; ``pip install tandem[client]``.
 
-operations  One method per operation of the OpenAPI document; written by ``make client``
-transport   Requests, problems and event streams over HTTP
+transport    Requests, problems and event streams over HTTP
+operations/  One method per operation of the OpenAPI document; written by ``make client``
 """
 
 from app.client.operations import Client

@@ -6,6 +6,8 @@ attempts     Writes of a running attempt: its claim, heartbeats, progress, check
 cells        Work cells of the user's own, as JSON under a name; the store never opens them
 checkpoints  Trained policies and their aliases
 completion   Ends of attempts: succeeded, cancelled, failed, crashed, interrupted, orphaned
+composed_jobs
+             Jobs made of jobs: sweeps and reports
 cursors      Cursors of lists: opaque text with the number of the last item of a page
 events       Events of jobs, the source of event streams
 fencing      Fencing of writes about a running job by its attempt number

@@ -2,13 +2,11 @@
 
 capsules_view  The shapes the simulator sees, translucent over what is drawn; red where they
                touched
-loop           The live cell: one thread that owns world and scene, and a door for everybody
-               else
-poses          Rotations on their way to viser and back: the one place that knows its
-               quaternion order
+loop           Live cell: the thread that owns a live world and draws its scene
+poses          Conversion of rotations to and from viser's order of quaternions
 server         Viser's server behind a Unix socket, which no browser and no other user can
                reach
-view_settings  What each visitor may show or hide over the scene, each for himself
+view_settings  What each visitor shows or hides in the scene, for that browser only
 people/        People in the scene
 robot/         The robot in the scene
 scene/         The work cell in the scene

@@ -6,8 +6,6 @@ exploration         Exploration in parallel environments: noise with a scale per
 parameter_noise     Parameter-space noise: each episode is acted by a perturbed copy of the
                     actor
 prioritized_replay  Replay buffer with priorities and n-step returns
-quantiles           Truncated quantile critics: distributional critics without the highest
-                    quantiles in targets
 td3                 TD3 on Stable-Baselines3, extended at its extension points
 vecenv              A batch as Stable-Baselines3's ``VecEnv``, for every scenario
 """

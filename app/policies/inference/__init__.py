@@ -6,6 +6,7 @@ motion_decision       Next trajectory segment toward a goal beside people
 moved_person          People of a cell with one of them in other postures
 onnx_export           Export of a pick or reach policy as an ONNX model (extra ``onnx``)
 reach_policy          A trained policy of the reach scenario, for inference
+recalibration         Recalibration of outcome probabilities by outcomes observed in one cell
 rollout               Rollout policy improvement of a trained reach policy
 sorting_plan          Next move of a sorting task together with its motion (docs/method.md 3.1)
 sorting_policy        A trained sorting network, for inference

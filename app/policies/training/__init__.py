@@ -3,6 +3,7 @@
 file_store    Stores of files that are named by their SHA-256; a folder is one
 memory_files  Replay memory on disk: files of transitions named by their SHA-256, written
               incrementally
+outcome       Fit of outcome probabilities to episodes of the finished policy
 pick          Training on the pick scenario: settings, networks, exploration and learning curve
 progress      What a training tells while it runs, and how it ended
 reach         Training on the reach scenario: settings, networks, exploration and learning curve

@@ -11,6 +11,7 @@ curriculum_batch
               (docs/method.md 3.5)
 monitored_batch
               The pick scenario under speed and separation monitoring
+person_grid   Postures of a person at the positions of a grid, for maps of choice and risk
 raw_state     The raw state of (5.8) from the features that contain it
 resting_people
               Planned motion beside people at rest, in place of a pick policy's

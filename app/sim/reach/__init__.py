@@ -2,6 +2,7 @@
 
 batch          The reach scenario of thesis chapter 4: a robot reaches goals beside people who
                walk about
+blocked_batch  Reach environments of the authors' recipe, in which a contact blocks the arm
 crossings      People who cross between the robot and its goal: the episodes of ``reach-ssm``
 goal_sets      Training targets in a box of goals, and interpolation between them
 mixed_batch    Reach environments with different numbers of people, stepped together
@@ -10,6 +11,7 @@ oracle_search  Oracle search: what is possible with knowledge of the future moti
 query_state    One state that a client sends, observed as the reach scenario's policies observe
                it
 reach_actor    Interface of a policy that brings the tcp to a goal
+recipe_rules   Rules of the recipes of the thesis: blocked arms and joint limits
 kernels/       Compiled reach episodes
 monitored/     The reach scenario under speed and separation monitoring
 rollout/       Rollout policy improvement for reaching
