@@ -209,7 +209,8 @@ Measured on {found["legs"]:,} random segments between random keyframe postures o
 {swing[0]:.2f}, {swing[1]:.2f}, {swing[2]:.2f} |
 | mean speed of the farther palm: p5, median, p95 [m/s] | \
 {pace[0]:.2f}, {pace[1]:.2f}, {pace[2]:.2f} |
-| largest entry of a gain K | {found["gain_max"]:.2f} |
+| largest entry of a gain G ([method](method.md#34-human-model-and-motion)) | \
+{found["gain_max"]:.2f} |
 
 Duration of a segment: median of the demonstrations and range of one standard deviation of the
 logarithm; equal in both directions.
