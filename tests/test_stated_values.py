@@ -1,0 +1,70 @@
+"""Pages state the constants and fields that the code has."""
+
+import re
+from pathlib import Path
+
+from app.policies.configs.pick import PICK
+from app.policies.configs.presets import PRESETS
+from app.policies.configs.sorting import SORTING_PRESETS
+from app.policies.inference.task_selection import HYSTERESIS
+from app.sim.sorting.near_optimal_moves import MARGIN
+
+DOCS = Path(__file__).resolve().parent.parent / "docs"
+PAGES = [page for page in sorted(DOCS.glob("**/*.md")) if "notebook" not in page.parts]
+FIELD = re.compile(
+    r"\b((?:learning|networks|exploration|episode|people|action|reward|expert)\.[a-z_]+)\s*="
+)
+
+
+def section(page: str, number: str) -> str:
+    """Text of a section of a page, without those below it."""
+    return re.split(rf"^#+ {re.escape(number)} .*\n", page, flags=re.MULTILINE)[1].split(
+        "\n## "
+    )[0]
+
+
+def rows(text: str) -> dict[str, list[str]]:
+    """Cells of the tables of a text by the first cell."""
+    found = re.findall(r"^\| (.+) \|$", text, re.MULTILINE)
+    return {line.split(" | ")[0]: line.split(" | ")[1:] for line in found}
+
+
+METHOD = (DOCS / "method.md").read_text("utf-8")
+
+
+def test_the_glossary_states_the_margins_of_selections() -> None:
+    glossary = rows((DOCS / "glossary.md").read_text("utf-8"))
+    assert float(glossary["hysteresis"][1]) == HYSTERESIS
+    assert f" {MARGIN:g} " in glossary["near-optimal move"][0]
+
+
+def test_the_method_states_the_reward_of_sorting() -> None:
+    stated = rows(section(METHOD, "1.3"))
+    presets = {preset.name: preset.reward for preset in SORTING_PRESETS}
+    for column, name in enumerate(("sorting-e0-dqn", "sorting-e0-thesis"), start=1):
+        for term, field in (("empty", "empty"), ("fail", "fail"), ("back", "back")):
+            cell = stated[f"$r_{{{term}}}$"][column]
+            assert float(cell) == -getattr(presets[name], f"c_{field}")
+        assert float(stated["$w_{dist}$"][column]) == presets[name].c_distance
+
+
+def test_the_method_states_the_reward_of_picks() -> None:
+    stated, reward = rows(section(METHOD, "3.3")), PICK.reward
+    assert float(stated["$c_d$"][1]) == reward.c_d
+    assert float(stated["$c_\\theta$"][1]) == reward.c_th
+    assert stated["$c_c$"][1].startswith(f"{reward.c_c:g}, growing to {reward.c_c_end:g} ")
+    assert float(stated["$c_{step}$"][1]) == reward.c_step
+    assert float(stated["$c_s$"][1]) == reward.c_s
+
+
+def test_fields_of_presets_that_pages_name_exist() -> None:
+    known = {
+        f"{group}.{name}"
+        for preset in PRESETS.values()
+        for group, fields in preset.model_dump().items()
+        if isinstance(fields, dict)
+        for name in fields
+    }
+    named = {(page.name, found) for page in PAGES for found in FIELD.findall(page.read_text())}
+    assert len(named) > 10
+    assert {one for one in named if one[1] not in known} == set()
