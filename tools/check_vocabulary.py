@@ -55,7 +55,7 @@ KEPT = re.compile(
 """Names of others: of English, matplotlib (`dashes=`), Canvas 2D, SVG and CSS."""
 CLAUSE = "of by for to with beside than from at near and or as".replace(" ", "|")
 PHRASES = re.compile(
-    r"\bfor want of\b|\bheld against\b"
+    r"\bfor want of\b|\bheld against\b|\bthe source's\b"
     r"|(?:(?<=[.!?:] )|(?<=^)|(?<=\"\"\"))Who (?=[a-z])(?![^.?]*\?)"
     rf"|\b(?:{CLAUSE}) who (?:was|has|\w+s)\b(?![^.]*\?)"
 )

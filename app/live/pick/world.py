@@ -99,7 +99,7 @@ class LivePickWorld(BaseWorld[LiveWorkers]):
 
     def _start_case(self, case: Case) -> None:
         self._case, self.paused = case, False
-        self.safety.suspended = True  # the source has no safety layer
+        self.safety.suspended = True  # the thesis has no safety layer
         self._selected = tuple(n for n in self.cell.station_ids if n in case.goals)
         self.people.only_first()
         self._reset()

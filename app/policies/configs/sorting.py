@@ -1,7 +1,7 @@
 """Training configurations of the sorting task: DQN (docs/method.md 1.4).
 
-Double, dueling and prioritised as in the source. Deviates: network, action mask, n-step
-returns, disturbed starts, people in the training and expert labels are ours; the source's
+Double, dueling and prioritised as in the thesis. Deviates: network, action mask, n-step
+returns, disturbed starts, people in the training and expert labels are ours; the thesis'
 recipe has its own presets.
 """
 

@@ -77,7 +77,7 @@ class ActionConfig(FieldGroup):
         2, 2, 3, "", "Degree of a segment: 2 limits acceleration, 3 also jerk"
     )
     bounds: Literal["viable", "one-step"] = choice(
-        "viable", "Bounds: viable ones keep every limit; one-step are the source's (degree 2)"
+        "viable", "Bounds: viable ones keep every limit; one-step are the thesis' (degree 2)"
     )
     meaning: Literal["speed", "coefficient"] = choice(
         "speed", "Meaning: a joint speed, or a place in the interval of the coefficient"

@@ -5,7 +5,7 @@ with the greatest value is selected. With hysteresis the previous target is kept
 one is better by a margin, which prevents oscillation. HTTP route, live cell and evaluations use
 the same networks.
 
-Source: thesis eq. (5.1)-(5.7). Deviates: hysteresis is ours; 0 gives the source's rule.
+Source: thesis eq. (5.1)-(5.7). Deviates: hysteresis is ours; 0 gives the thesis' rule.
 """
 
 import math
@@ -79,7 +79,7 @@ def select(
     Args:
         values: Value of each candidate, shape (..., n); -inf where there is none.
         previous: Index selected last, shape (...,); None: none.
-        hysteresis: Margin by which another candidate must be better; 0 is the source's rule.
+        hysteresis: Margin by which another candidate must be better; 0 is the thesis' rule.
     """
     best: NDArray[np.int64] = values.argmax(axis=-1)
     if previous is None:

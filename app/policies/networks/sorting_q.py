@@ -6,7 +6,7 @@ down) and what must go on (from the next level up). A pick fails and leaves ever
 was, so the true value of a pick is linear in the failure probability of its cell; the network
 says value and slope per type and tower, and never prefers the riskier of two duplicates.
 
-:class:`PrintedNetwork` is the source's: one-hot numbers, two layers of 128 (table 3.1) in each
+:class:`PrintedNetwork` is the thesis': one-hot numbers, two layers of 128 (table 3.1) in each
 of two streams; :class:`InformedNetwork` also observes failure probabilities.
 
 Both are dueling: ``Q = V + A - mean A``; ours takes the mean over the moves that are valid and

@@ -5,7 +5,7 @@ Frame: the robot's base, x right, y toward the person, z up, table top at z = 0.
 radians.
 
 Source: docs/method.md 2.1 and 2.3 (``shared-workspace``), 3.2 (``pick-and-place``), 1.1
-(``sorting-*``); coordinates that the source does not print are ours.
+(``sorting-*``); coordinates that the thesis does not print are ours.
 """
 
 import hashlib

@@ -71,7 +71,7 @@ the person's body dimensions; features and the phase of a pick; that and a secon
 DEFAULT_WEIGHTS = RewardWeights(
     c_d=0.5, c_th=0.5, c_c=1.0, c_step=0.02, c_v=1.0, d_v=0.1, c_s=1.0, gamma=1.0
 )
-"""Coefficients of table 5.1 with corrected signs; the source does not print d_v."""
+"""Coefficients of table 5.1 with corrected signs; the thesis does not print d_v."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -2,7 +2,7 @@
 
 A query requests a path of straight joint motions from one configuration to any of several.
 Planners: RRT-Connect (the first path found), RRT* (Karaman and Frazzoli 2011; shortest path
-within the time, as in the source's comparison) and AORRTC (Wilson et al. 2025; almost-surely
+within the time, as in the thesis' comparison) and AORRTC (Wilson et al. 2025; almost-surely
 optimal RRT-Connect). Path length is Euclidean in joint space [rad]. OMPL is used only if the
 straight motion to the nearest goal, the shortest path, is not free (AORRTC of 2.0.1 returns
 paths that do not begin at the start in that case). The result is a :class:`MotionPlan` with a

@@ -21,7 +21,7 @@ Autonomous Robots 42, 2018, sections 3.1-3.3.
 Deviates: lambda is per sample, so that it means the same for long and short demonstrations. The
 floor ``floor^2 (I x exp(-(c_i - c_k)^2 / (2 l^2)))`` is added to Sigma: n demonstrations span
 n - 1 directions only, and without it an observation off their span could not be met at all. The
-covariance is in the Joseph form, which is the source's and stays positive semidefinite.
+covariance is in the Joseph form, which is the thesis' and stays positive semidefinite.
 """
 
 from collections.abc import Sequence

@@ -35,7 +35,7 @@ from app.sim.reach.kernels.interpolation_weights import (
 )
 
 N_HALTON = 54
-"""Targets of a Halton set, as many as in the source's grid."""
+"""Targets of a Halton set, as many as in the thesis' grid."""
 MOST_HALTON = 2000
 """Largest number of targets of a Halton set."""
 AXES = ("x", "y", "z")

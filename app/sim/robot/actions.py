@@ -4,10 +4,10 @@ degree 2   acceleration-limited, closed form           robot/kernels/acceleratio
 degree 3   jerk-limited, ends by bisection             robot/kernels/jerk_bounds.py
 
 viable     recursively feasible: never empty, nothing is ever exceeded
-one-step   the source's bounds of one period; they can become empty: *unfeasible*
+one-step   the thesis' bounds of one period; they can become empty: *unfeasible*
 
 speed        a in [-1, 1] is a share of the speed limit, met as nearly as is admissible
-coefficient  a in [-1, 1] is a place in the interval, the source's map (4.23)
+coefficient  a in [-1, 1] is a place in the interval, the thesis' map (4.23)
 """
 
 from dataclasses import dataclass

@@ -136,7 +136,7 @@ def test_plain_environment_gives_the_same_transitions_and_rewards(
     shape = shape_of(cell)
     # A pick that succeeds for sure, and, as 1 is not allowed, one that fails as good as surely.
     fail = np.full(shape.n_cells, 0.99 if fails else 0.0)
-    # The plain environment has the reward of the source's presets.
+    # The plain environment has the reward of the thesis' presets.
     weights = SortingWeights(fail=0.05, back=0.05, distance=0.1)
     settings = SortingSettings(disturbed_share=0.5, weights=weights)
     batch = SortingBatch(shape, fail, 8, 4, settings)

@@ -45,7 +45,7 @@ class CurvePoint:
 
 
 def curve_episodes(shape: SortingShape) -> int:
-    """Return the source's number of episodes per pair for one point of its curves."""
+    """Return the thesis' number of episodes per pair for one point of its curves."""
     return 500 if shape.n_cells <= SMALL else 100
 
 
@@ -62,7 +62,7 @@ def curve_point(
         values: Q of every move, from observations.
         shape: Size of the task.
         fail: Failure probabilities of the clutter cells, shape (K,).
-        episodes_per_pair: Episodes of each pair; :func:`curve_episodes` gives the source's.
+        episodes_per_pair: Episodes of each pair; :func:`curve_episodes` gives the thesis'.
         seed: Seed of the episodes.
     """
     batches = grid_batches(shape, fail, episodes_per_pair, seed, 0.0)

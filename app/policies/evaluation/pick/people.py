@@ -7,7 +7,7 @@ share the table and do not avoid one another, so they may overlap.
 ``pick-people``: no person; one to four people of the library's sizes; one and three people of
 the 5th and of the 95th percentile; a worker and a pedestrian; synthetic reaches.
 ``pick-mocap``: recorded motion placed at the table, each recording alone and all together.
-``pick-yielding``: people that yield to the arm, from strength 0 (the source's people) to 1.
+``pick-yielding``: people that yield to the arm, from strength 0 (the thesis' people) to 1.
 
 Each row also states how often the same people touch a robot that never moves.
 

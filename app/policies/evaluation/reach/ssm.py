@@ -3,7 +3,7 @@
 A person crosses between the robot at home and its goal (``app/sim/reach/crossings.py``: 200
 crossings fixed before any tuning, and as many recorded crossings as are given). All rows have
 the same joint limits and the same speed and separation monitoring, with the protective distance
-of the source's comparison.
+of the thesis' comparison.
 
 ``policy``
     The checkpoint, queried every 20 ms.
@@ -15,7 +15,7 @@ of the source's comparison.
 ``policy-trained-without-ssm``
     The shipped policy trained without the layer, if the checkpoint was trained under it.
 ``rrtstar-once``
-    Planned once around people at their start positions, as in the source.
+    Planned once around people at their start positions, as in the thesis.
 ``rrtconnect-blocked``, ``aorrtc-blocked``
     Replanned when the path is blocked.
 ``replan-every-cycle``

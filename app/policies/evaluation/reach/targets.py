@@ -1,4 +1,4 @@
-"""Protocol ``reach-targets``: every training target of the source, beside one pedestrian.
+"""Protocol ``reach-targets``: every training target of the thesis, beside one pedestrian.
 
 54 targets x 100 episodes in each row, with the same people and goals and different start rules:
 
@@ -14,7 +14,7 @@ Rows ``-rollout`` use rollout policy improvement (``rollout.py``), where the pol
 An episode with a contact is no success in any row; ``reached_after_contact`` is the share that
 reached the goal afterwards.
 
-Source: thesis 4.4.3, figs 4.5 and 4.6; docs/method.md 2.6. Deviates: the source does not state
+Source: thesis 4.4.3, figs 4.5 and 4.6; docs/method.md 2.6. Deviates: the thesis does not state
 the start rule of its people.
 """
 

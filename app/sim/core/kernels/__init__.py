@@ -1,5 +1,6 @@
-"""Compiled random numbers and trigonometry.
+"""Compiled bounds, random numbers and trigonometry.
 
-rng   Counter-based random numbers: a stream per (seed, environment, episode)
-trig  Sines and cosines without branches, compiled to vector instructions
+bounds  Bounds of several variables
+rng     Counter-based random numbers: a stream per (seed, environment, episode)
+trig    Sines and cosines without branches, compiled to vector instructions
 """

@@ -5,7 +5,7 @@ D_STOP)`` in [0, 1]. A person of yielding ``k`` works at ``1 - k u`` of its pace
 trunk away from the tool by ``k u LEAN`` with a first-order lag of ``LAG``. Yielding 0 is the
 source's person, without reaction; a person of yielding 1 stops at ``D_STOP``.
 
-Source: docs/method.md 4 (reacting people), future work in the source; form and constants are
+Source: docs/method.md 4 (reacting people), future work in the thesis; form and constants are
 ours. LAG lies between a simple visual reaction (0.15 to 0.25 s) and the motion time of a trunk.
 """
 

@@ -8,5 +8,6 @@ observation            State of robot, people and target as features
 observation_layout     Groups of features and their units
 observation_workspace  Query and work space of observations
 reward                 Reward (docs/method.md 3.3)
+second_person          The second person of an observation
 starts                 Targets, candidates and starts of episodes
 """

@@ -3,7 +3,7 @@
 ``r = c_p (d_old - gamma d) - c_d d - c_a |c| - c_step - c_c [collision] + c_s [success]``, with
 ``d`` the distance of tcp and goal and ``|c|`` the Euclidean norm of the control cycle's second
 coefficients; speed and separation monitoring subtracts ``c_o`` in each cycle that it stops.
-``c_p = c_step = 0`` is the source's reward; ``c_d = c_a = 0`` rewards progress, which learned
+``c_p = c_step = 0`` is the thesis' reward; ``c_d = c_a = 0`` rewards progress, which learned
 far better where a collision ends the episode: a cost of distance alone rewards an early end.
 """
 

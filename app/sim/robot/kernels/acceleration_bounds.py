@@ -24,7 +24,7 @@ Full braking from a viable state satisfies these bounds, so the interval is neve
 limit is ever exceeded, also inside the period: a joint that reverses inside a period covers
 less than ``qd dt/2`` beyond ``q``, which viability keeps free.
 
-*Myopic* (the source's): only the limits of this period::
+*One-step* (the thesis'): only the limits of this period::
 
     c <= (q_max - qd dt - q)/dt^2                      position at the end, or in its place
     c <= -qd^2/(4 (q_max - q))                         at the turning point x* = -qd/(2c),
@@ -33,12 +33,13 @@ less than ``qd dt/2`` beyond ``q``, which viability keeps free.
     c >= qd^2/(4 (q - q_min))                          where q - q_min < -qd dt/2 and qd < 0
 
 The interval may be empty one period later: a joint at full speed close to its limit cannot
-stop any more. The source ends such an episode as *unfeasible*.
+stop any more. The thesis ends such an episode as *unfeasible*.
 
 Source: thesis eq. (4.17)-(4.23).
-Deviates: three misprints are corrected; as printed, each exceeds limits (see the tests).
-(4.17) and (4.21) have ``q^2 - 2 qd^2`` in place of ``qd^2`` at the turning point; (4.21) and
-(4.22) swap max and min: the greatest of the upper bounds and the least of the lower ones.
+Deviates: misprints are corrected (docs/method.md 5); the tests show that limits are exceeded
+otherwise. At the turning point (4.17), (4.21) and (4.22) have the numerator ``q^2 - 2 qd^2`` in
+place of ``-qd^2``, and take the upper bound for a lower one and the reverse. (4.22) swaps max
+and min and drops the condition of the turning point.
 """
 
 import math
@@ -83,7 +84,7 @@ def coefficient_interval(q: float, qd: float, limits: AxisLimits) -> tuple[float
 
 
 @kernel(error_model="numpy")
-def myopic_position_bound(clearance: float, qd: float, dt: float) -> float:
+def one_step_position_bound(clearance: float, qd: float, dt: float) -> float:
     """Return the greatest coefficient toward a limit that keeps it for one period [rad/s^2].
 
     Args:
@@ -97,8 +98,8 @@ def myopic_position_bound(clearance: float, qd: float, dt: float) -> float:
 
 
 @kernel(error_model="numpy")
-def myopic_interval(q: float, qd: float, limits: AxisLimits) -> tuple[float, float]:
-    """Return the source's least and greatest coefficient [rad/s^2]; empty is *unfeasible*.
+def one_step_interval(q: float, qd: float, limits: AxisLimits) -> tuple[float, float]:
+    """Return the thesis' least and greatest coefficient [rad/s^2]; empty is *unfeasible*.
 
     Args:
         q: Joint position [rad].
@@ -109,9 +110,9 @@ def myopic_interval(q: float, qd: float, limits: AxisLimits) -> tuple[float, flo
     """
     acc, dt = limits.qdd_max, limits.dt
     end = min(0.5 * acc, (limits.qd_max - qd) / (2.0 * dt))
-    c_max = min(end, myopic_position_bound(limits.q_max - q, qd, dt))
+    c_max = min(end, one_step_position_bound(limits.q_max - q, qd, dt))
     start = max(-0.5 * acc, (-limits.qd_max - qd) / (2.0 * dt))
-    c_min = max(start, -myopic_position_bound(q - limits.q_min, -qd, dt))
+    c_min = max(start, -one_step_position_bound(q - limits.q_min, -qd, dt))
     return c_min, c_max
 
 

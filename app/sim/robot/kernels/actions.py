@@ -18,7 +18,7 @@ from app.sim.robot.kernels.joints import AxisLimits, AxisState, JointLimits, Joi
 Action = NDArray[np.floating]
 
 VIABLE, MYOPIC = range(2)
-"""Bounds: recursively feasible, or the source's for one period only (degree 2)."""
+"""Bounds: recursively feasible, or the thesis' for one period only (degree 2)."""
 SPEED, COEFFICIENT = range(2)
 """Meanings: a share of the speed limit to approach, or a place in the interval (4.23)."""
 N_JOINTS = 6
@@ -73,7 +73,7 @@ def quadratic_by_interval(
         The coefficient [rad/s^2] and whether the interval is empty; the joint then brakes.
     """
     if rule.bounds == MYOPIC:
-        c_min, c_max = polynomial.myopic_interval(q, qd, limits)
+        c_min, c_max = polynomial.one_step_interval(q, qd, limits)
     else:
         c_min, c_max = polynomial.coefficient_interval(q, qd, limits)
     if c_min > c_max:

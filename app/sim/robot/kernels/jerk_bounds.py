@@ -30,7 +30,7 @@ a stop that swings back from it would be shorter.
 Source: docs/method.md 2.2; the law is the sampled time-optimal one of R. Zanasi, C. Guarino
 Lo Bianco and A. Tonielli, "Nonlinear filters for the generation of smooth trajectories",
 Automatica 36, 2000, with a limit on acceleration.
-Deviates: the source of docs/method.md 2.2 names degrees up to 5 and bounds only degree 2.
+Deviates: the thesis (docs/method.md 2.2) names degrees up to 5 and bounds only degree 2.
 """
 
 import math

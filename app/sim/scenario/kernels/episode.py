@@ -34,7 +34,7 @@ Indices = NDArray[np.int64]
 RUNNING, SUCCESS, COLLISION, TIMEOUT, UNFEASIBLE = range(5)
 """Outcomes of an episode."""
 PLAIN, FEATURES, FORECAST, PEOPLE_SET = range(4)
-"""Contents of observations: the source's raw state; the raw state and features; those and the
+"""Contents of observations: the thesis' raw state; the raw state and features; those and the
 option features; all that and the people as a set."""
 SUCCESS_DISTANCE = 0.1
 """tcp to target [m], thesis 4.3 and 5.3.1."""

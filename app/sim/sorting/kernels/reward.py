@@ -1,7 +1,7 @@
 """Terms of the sorting reward (docs/method.md 1.3, compiled).
 
 ``R = r_move + r_empty + r_stuck + r_fail + r_back + r_dist + r_succ``. All but the last are
-costs. The source does not state coefficients; with those of :class:`SortingWeights` the plan of
+costs. The thesis does not state coefficients; with those of :class:`SortingWeights` the plan of
 fewest moves and least risk is optimal, as value iteration verifies on small instances
 (``tests/sim/test_sorting_reward.py``).
 

@@ -4,7 +4,7 @@ Codes, positions and the numbering of actions are those of ``state.py``; episode
 drawn by ``initial_states.py`` and the people's interference by ``interference.py``.
 
 Source: thesis eq. (3.13)-(3.19). Deviates: placing into an occupied clutter cell, not covered
-by the source, returns the object.
+by the thesis, returns the object.
 """
 
 from typing import NamedTuple

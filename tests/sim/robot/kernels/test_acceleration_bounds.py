@@ -1,4 +1,4 @@
-"""Intervals of degree 2 by hand, by brute force, and as the source prints them."""
+"""Intervals of degree 2 by hand, by brute force, and as the thesis prints them."""
 
 import numpy as np
 import pytest
@@ -34,7 +34,7 @@ def keeps_limits(q: float, qd: float, c: np.ndarray) -> np.ndarray:
 def test_free_joint_is_bound_by_acceleration_and_speed_alone() -> None:
     for interval in (
         polynomial.coefficient_interval,
-        polynomial.myopic_interval,
+        polynomial.one_step_interval,
     ):
         assert interval(0.0, 0.0, LIMITS) == (-2.5, 2.5)
         assert interval(0.0, 0.96, LIMITS) == pytest.approx((-2.5, 1.0))
@@ -50,8 +50,8 @@ def test_viable_end_is_the_greatest_speed_from_which_full_braking_stops_in_time(
     assert -2.5 < c < 2.5
 
 
-def test_myopic_bounds_by_hand() -> None:
-    bound = polynomial.myopic_position_bound
+def test_one_step_bounds_by_hand() -> None:
+    bound = polynomial.one_step_position_bound
     assert bound(0.03, 1.0, DT) == pytest.approx((0.03 - 0.02) / 0.0004)  # at the end
     assert bound(0.01, 1.0, DT) == pytest.approx(-25.0)  # where both bounds meet
     assert bound(0.005, 1.0, DT) == pytest.approx(-50.0)  # at the turning point
@@ -59,11 +59,11 @@ def test_myopic_bounds_by_hand() -> None:
     assert bound(0.0, 0.0, DT) == 0.0
 
 
-def test_myopic_interval_is_all_that_brute_force_admits() -> None:
+def test_one_step_interval_is_all_that_brute_force_admits() -> None:
     c = np.linspace(-A / 2, A / 2, 2001)
     checked = empty = 0
     for q, qd in random_states(400, 11):
-        low, high = polynomial.myopic_interval(q, qd, LIMITS)
+        low, high = polynomial.one_step_interval(q, qd, LIMITS)
         kept = keeps_limits(q, qd, c)
         clear = (abs(c - low) > 1e-3) & (abs(c - high) > 1e-3)
         np.testing.assert_array_equal(kept[clear], ((c > low) & (c < high))[clear])
@@ -72,7 +72,7 @@ def test_myopic_interval_is_all_that_brute_force_admits() -> None:
     assert empty > 10
 
 
-def test_viable_interval_lies_within_the_myopic_interval() -> None:
+def test_viable_interval_lies_within_the_one_step_interval() -> None:
     n_viable = 0
     for q, qd in random_states(5_000, 12):
         clearance = Q_MAX - q if qd > 0 else q - Q_MIN
@@ -80,7 +80,7 @@ def test_viable_interval_lies_within_the_myopic_interval() -> None:
             n_viable += 1
             low, high = polynomial.coefficient_interval(q, qd, LIMITS)
             assert low <= high + 1e-9
-            low1, high1 = polynomial.myopic_interval(q, qd, LIMITS)
+            low1, high1 = polynomial.one_step_interval(q, qd, LIMITS)
             assert low1 <= low + 1e-9
             assert high <= high1 + 1e-9
     assert n_viable > 3_000
@@ -111,14 +111,14 @@ def test_turning_point_as_printed_exceeds_the_position_limit(side: float) -> Non
     """(4.17) and (4.21) with ``q^2 - 2 qd^2`` in place of ``qd^2``."""
     q, qd, clearance = 0.0, 0.1, 0.0006  # clearance < qd dt/2 = 0.001
     printed = -(q**2 - 2 * qd**2) / (4 * clearance)
-    mended = polynomial.myopic_position_bound(clearance, qd, DT)
+    mended = polynomial.one_step_position_bound(clearance, qd, DT)
     highest = {}
     for name, c in (("printed", min(A / 2, printed)), ("mended", mended)):
         x = np.linspace(0, DT, 10_001)
         highest[name] = (q + qd * x + c * x**2).max()
     assert highest["printed"] > clearance + 1e-3
     assert highest["mended"] == pytest.approx(clearance, abs=1e-9)
-    low, high = polynomial.myopic_interval(
+    low, high = polynomial.one_step_interval(
         q, side * qd, AxisLimits(-clearance, clearance, V, 100.0, np.inf, DT)
     )
     assert (high if side > 0 else -low) == pytest.approx(mended)
