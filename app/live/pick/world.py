@@ -122,6 +122,8 @@ class LivePickWorld(BaseWorld[LiveWorkers]):
     def _refresh(self) -> None:
         if self.status == "case done":
             self._begin()
+        elif self.status == "picking":
+            self._decide()
         else:
             super()._refresh()
 
@@ -210,6 +212,8 @@ class LivePickWorld(BaseWorld[LiveWorkers]):
     def _decide(self) -> None:
         left = self.query(self._candidates())
         if self.decision is None:
+            if self.status == "picking":  # Policy or candidates are gone.
+                self.enter("moving")
             return
         self._run = self._run.choose(self.t, self.decision.chosen)
         if self.status == "picking" and self.progress.phase == APPROACH:

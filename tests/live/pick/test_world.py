@@ -4,6 +4,7 @@ from pydantic import ValidationError
 
 from app.errors import InvalidInput
 from app.live import commands
+from app.live.command_checks import Command
 from app.live.pick.world import LivePickWorld
 from app.live.snapshot import PICK_PHASES, WorldSnapshot
 from app.sim.cells.cell import Cell, load_cell
@@ -311,6 +312,34 @@ def test_without_policy_or_candidates_the_robot_rests_and_says_why(cell: Cell) -
     after = run(world, 20)
     assert after.status == "no candidates"
     assert np.allclose(after.robot_q, cell.robot.home_q)
+
+
+@pytest.mark.parametrize(
+    ("command", "status"),
+    [
+        (commands.SetPolicy(checkpoint=None), "no policy"),
+        (commands.SetCandidates(ids=()), "no candidates"),
+    ],
+)
+def test_pick_ends_when_its_policy_or_all_candidates_are_removed(
+    world: LivePickWorld, command: Command, status: str
+) -> None:
+    until(world, "picking")
+    world.apply(command)
+    after = run(world, 20)
+    assert after.status == status
+    assert (after.chosen, after.counters.reached) == (None, 0)
+    assert np.abs(after.robot_qd).max() < 1e-9
+
+
+def test_target_removed_in_its_pick_is_left_at_once(world: LivePickWorld) -> None:
+    chosen = until(world, "picking").chosen
+    assert chosen is not None
+    world.apply(commands.PauseClock())
+    world.apply(commands.ToggleCandidate(id=chosen))
+    after = world.snapshot()
+    assert after.status == "moving"
+    assert after.chosen != chosen
 
 
 def test_toggling_adds_and_removes_a_candidate_in_the_cells_order(world: LivePickWorld) -> None:
