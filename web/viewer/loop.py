@@ -99,7 +99,7 @@ class LiveCell:
         rich.get_console().quiet = True  # viser would print its own address
         self._server = ViewerServer()
         views = ViewSettings(self._server, self._cell)
-        scene = CellScene(self._server, self._cell, self.handle.submit)
+        scene = CellScene(self._server, self._cell, self._submit)
         scene.draw(self.handle.snapshot(), 0.0)
         draw = partial(self._draw, self._server, scene, views)
         self._thread = threading.Thread(
@@ -138,6 +138,10 @@ class LiveCell:
             except ServiceError as error:
                 self._refused = RefusedCommand(number=self._done, reason=error.message)
                 logger.warning("command %s was refused: %s", command.tag, error.message)
+            except Exception as error:  # The commands after it are carried out all the same.
+                reason = f"{command.tag} failed: {error}"
+                self._refused = RefusedCommand(number=self._done, reason=reason)
+                logger.exception("command %s failed", command.tag)
         for _ in range(self._speed):
             self._world.step()
         snapshot = replace(
@@ -175,6 +179,13 @@ class LiveCell:
             return None
         self._risk.offer(self._world.risk_query)
         return self._risk.newest
+
+    def _submit(self, command: Command) -> None:
+        """Queue a command of the scene, unless what it is about has left meanwhile."""
+        try:
+            self.handle.submit(command)
+        except ServiceError as error:
+            logger.debug("command %s of the scene is left out: %s", command.tag, error.message)
 
     def _apply(self, command: Command) -> None:
         """Apply a command; the speed of the clock belongs to the loop."""

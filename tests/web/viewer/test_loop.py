@@ -1,6 +1,7 @@
 import stat
 import time
 from collections.abc import Callable, Iterator
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from app.live import commands
 from app.live.sorting import commands as commands_of_sorting
 from app.sim.cells.cell import load_cell
 from app.sim.human import model as human
+from app.sim.pick.task_policy import Decision
 from tests.support.listening_ports import listening_ports
 from tests.support.straight_policy import StraightPolicy
 from tests.web.viewer_client import ViewerClient
@@ -138,6 +140,60 @@ def test_drag_of_a_hand_moves_the_person(live: LiveCell) -> None:
     with ViewerClient(live.viewer_address) as visitor:
         visitor.drag("/gizmos/0/right", [(-0.1, 0.95, 0.3), (-0.15, 0.9, 0.25)])
         wait_for(lambda: away() < 0.03)
+
+
+def test_drag_beyond_the_hall_takes_the_person_as_far_as_it_may_walk(live: LiveCell) -> None:
+    live.handle.submit(commands.SetMode(mode="manual"))
+    live.handle.submit(commands.MovePerson(pelvis=(0.0, 1.3, -1.5708)))
+    farthest = live.cell.human.y_max
+    with ViewerClient(live.viewer_address) as visitor:
+        visitor.drag("/gizmos/0/pelvis", [(0.0, 1e4, 0.9)])
+        wait_for(lambda: live.handle.snapshot().people[0].q[1] > farthest)
+
+
+def test_drag_of_a_person_who_leaves_meanwhile_is_no_error(
+    live: LiveCell, capsys: pytest.CaptureFixture[str]
+) -> None:
+    live.handle.submit(commands.AddPerson())
+    live.handle.submit(commands.SetMode(person=1, mode="manual"))
+    wait_for(lambda: len(live.handle.snapshot().people) == 2)
+    server = live._server
+    assert server is not None
+    with ViewerClient(live.viewer_address) as visitor:
+        visitor.wait_for("TransformControlsMessage", "/gizmos/1/pelvis")
+        visitor.send(
+            type="TransformControlsDragStartMessage", name="/gizmos/1/pelvis", owner=""
+        )
+        visitor.wait_until_heard(server)
+        live.handle.submit(commands.RemovePerson(person=1))
+        visitor.drag("/gizmos/1/pelvis", [(0.0, 1.5, 0.9)])
+        visitor.wait_until_heard(server)
+    wait_for(lambda: len(live.handle.snapshot().people) == 1)
+    assert capsys.readouterr().err == ""  # viser prints what callbacks raise
+
+
+class FailingPolicy(StraightPolicy):
+    """Fails as soon as there is a person but the first one."""
+
+    def decide(self, q: Any, qd: Any, people: Any, *state: Any, **terms: Any) -> Decision:
+        if len(people) > 1:
+            raise RuntimeError("two people")
+        return super().decide(q, qd, people, *state, **terms)
+
+
+def test_command_that_fails_is_named_and_the_next_ones_are_carried_out() -> None:
+    cell = load_cell()
+    live = LiveCell(cell, FailingPolicy(cell))
+    number = live.handle.submit(commands.AddPerson())
+    live.handle.submit(commands.RemovePerson(person=1))
+    last = live.handle.submit(commands.SetMode(mode="still"))
+    live.start()
+    wait_for(lambda: live.handle.snapshot().commands == last)
+    now = live.handle.snapshot()
+    live.stop()
+    assert now.refused is not None
+    assert (now.refused.number, now.refused.reason) == (number, "add-person failed: two people")
+    assert (len(now.people), now.mode) == (1, "still")
 
 
 def test_nothing_is_drawn_without_a_viewer_but_the_first_one_sees_the_present() -> None:

@@ -13,6 +13,7 @@ import viser
 from app.live.commands import MovePerson
 from app.live.snapshot import PersonSnapshot
 from app.sim.human import model as human
+from app.sim.perception.keypoints import FARTHEST_M
 from web.viewer.poses import Vec, upright, yaw_of
 
 HANDS = {"right": "hand_r", "left": "hand_l"}
@@ -72,7 +73,7 @@ class Gizmos:
         @self._pelvis.on_update
         async def _(event: viser.TransformControlsEvent) -> None:
             self._hold("pelvis", event.phase)
-            x, y, _ = (float(value) for value in self._pelvis.position)
+            x, y, _ = _within_range(self._pelvis.position)
             self._submit(
                 MovePerson(person=self._person, pelvis=(x, y, yaw_of(self._pelvis.wxyz)))
             )
@@ -84,11 +85,11 @@ class Gizmos:
         @gizmo.on_update
         async def _(event: viser.TransformControlsEvent) -> None:
             self._hold(name, event.phase)
-            x, y, z = (float(value) for value in gizmo.position)
+            point = _within_range(gizmo.position)
             if name == "right":
-                self._submit(MovePerson(person=self._person, right=(x, y, z)))
+                self._submit(MovePerson(person=self._person, right=point))
             else:
-                self._submit(MovePerson(person=self._person, left=(x, y, z)))
+                self._submit(MovePerson(person=self._person, left=point))
 
     def _hold(self, name: str, phase: str) -> None:
         self._released[name] = time.monotonic() + (SETTLE_S if phase == "end" else HOLD_S)
@@ -115,6 +116,14 @@ class Gizmos:
         for name, gizmo in self._hands.items():
             if self._free(name):
                 _move(gizmo, points[HANDS[name]])
+
+
+def _within_range(position: Vec) -> tuple[float, float, float]:
+    """Return the nearest position that a command takes [m]: dragged toward the horizon, a gizmo
+    goes kilometres away.
+    """
+    x, y, z = np.clip(position, -FARTHEST_M, FARTHEST_M).tolist()
+    return x, y, z
 
 
 def _move(gizmo: viser.TransformControlsHandle, position: Vec, wxyz: Vec | None = None) -> None:
