@@ -3,6 +3,7 @@ import { useCallback, useEffect, useRef, useState } from "../vendor/htm-preact-s
 import { follow, get, post, put, Unreachable } from "../api.js";
 import { Unconfirmed } from "../confirm.js";
 import { History } from "./history.js";
+import { hidden, seen } from "../visibility.js";
 
 export const WORLD = "main";
 const RETRY_MS = 1000;
@@ -31,6 +32,8 @@ export function useCell() {
   const [pending, setPending] = useState(0);
   const unconfirmed = useRef(new Unconfirmed());
   const history = useRef(new History());
+  const shown = useRef(null);
+  shown.current = error;
 
   useEffect(() => {
     const stop = new AbortController();
@@ -39,10 +42,11 @@ export function useCell() {
   }, []);
 
   const report = useCallback(async (request) => {
+    const before = shown.current;
     setPending((n) => n + 1);
     try {
       await request;
-      setError(null);
+      setError((now) => (now === before ? null : now)); // that of another command stays
     } catch (problem) {
       setError(problem);
     }
@@ -73,11 +77,13 @@ async function carryOut(command, unconfirmed) {
   }
 }
 
-/** Wait until ready, then follow the world; for ever. */
+/** Wait until ready, then follow the world while the page is seen; for ever. */
 async function watch(signal, history, unconfirmed, setState, setEpoch) {
   const merge = (more) => !signal.aborted && setState((now) => ({ ...now, ...more }));
+  let isBack = false; // seen again: the scene has its own connection
   while (!signal.aborted) {
-    await ready(signal, merge);
+    await seen(signal);
+    isBack = (await ready(signal, merge)) && isBack;
     try {
       const [world, cells] = await Promise.all([get(`v1/worlds/${WORLD}`), get("v1/cells")]);
       const list = cells.items;
@@ -86,8 +92,11 @@ async function watch(signal, history, unconfirmed, setState, setEpoch) {
       let link = "lost";
       history.add(world);
       merge({ world, cell, cells: list, link: "live", reason: "", heardAt: performance.now() });
-      setEpoch((n) => n + 1);
+      if (!isBack) setEpoch((n) => n + 1);
+      isBack = false;
       await until(signal, (lost) => {
+        const left = new AbortController();
+        hidden(left.signal).then(() => left.signal.aborted || lost((isBack = true)));
         const silence = listen((quiet) => {
           merge({ link: "stale" });
           if (quiet > AGAIN_MS) lost((link = "stale"));
@@ -106,12 +115,13 @@ async function watch(signal, history, unconfirmed, setState, setEpoch) {
           },
           onDown: lost,
         });
-        return () => (silence.stop(), leave());
+        return () => (left.abort(), silence.stop(), leave());
       });
       unconfirmed.drop();
-      if (replaced) continue;
+      if (replaced || isBack) continue;
       merge({ link });
     } catch (error) {
+      isBack = false;
       if (error.status === 401) return merge({ link: "signin" });
       merge({ link: error.silent ? "stale" : "lost", reason: error.message });
     }
@@ -119,20 +129,22 @@ async function watch(signal, history, unconfirmed, setState, setEpoch) {
   }
 }
 
+/** Wait until the server is ready; whether it was at the first question. */
 async function ready(signal, merge) {
-  while (!signal.aborted) {
+  for (let first = true; !signal.aborted; first = false) {
     try {
       const late = AbortSignal.any([signal, AbortSignal.timeout(ASK_MS)]);
       const response = await fetch("readyz", { signal: late, cache: "no-store" });
-      if (response.ok) return;
+      if (response.ok) return first;
       const body = await response.json().catch(() => null);
       merge({ link: "warming", reason: body?.detail ?? "" });
     } catch (error) {
-      if (signal.aborted) return;
+      if (signal.aborted) return false;
       merge({ link: error.name === "TimeoutError" ? "stale" : "lost", reason: "" });
     }
     await pause(signal);
   }
+  return false;
 }
 
 /**

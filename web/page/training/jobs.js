@@ -10,6 +10,7 @@ import { JobActions, Labels, isActive } from "./jobactions.js";
 import { Follow } from "./follow.js";
 import { ReportDetail } from "./report.js";
 import { SweepDetail } from "./sweep.js";
+import { whileSeen } from "../visibility.js";
 
 const POLL_MS = 2000;
 const TONES = { queued: "quiet", running: "accent", cancelling: "warn", succeeded: "good",
@@ -28,8 +29,8 @@ export function useJobs(link) {
   const refresh = useRef(() => {});
   useEffect(() => {
     if (link !== "live") return undefined;
-    let over = false;
-    refresh.current = async () => {
+    let [over, asking, again] = [false, false, false];
+    const ask = async () => {
       try {
         const [own, all] = await Promise.all([get("v1/jobs?part_of=none"), get("v1/jobs")]);
         const items = [...own.items, ...all.items.filter((one) => one.part_of)];
@@ -38,8 +39,18 @@ export function useJobs(link) {
         if (!over) setState((now) => ({ ...now, error }));
       }
     };
+    // One question at a time: a slow server is not asked again, and no answer is overtaken.
+    refresh.current = async () => {
+      again = true;
+      if (asking) return;
+      for (asking = true; again && !over;) {
+        again = false;
+        await ask();
+      }
+      asking = false;
+    };
     refresh.current();
-    const timer = setInterval(() => document.hidden || refresh.current(), POLL_MS);
+    const timer = setInterval(() => document.hidden || asking || refresh.current(), POLL_MS);
     return () => {
       over = true;
       clearInterval(timer);
@@ -55,7 +66,8 @@ export function useOpened(jobs, id) {
   useEffect(() => {
     if (!missing) return undefined;
     const stop = new AbortController();
-    get(`v1/jobs/${id}`, { signal: stop.signal }).then(setFound, () => {});
+    get(`v1/jobs/${id}`, { signal: stop.signal }).then(setFound,
+      (error) => error.status === 404 && setFound(null));
     return () => stop.abort();
   }, [missing, id, jobs]);
   return missing && found?.id === id ? [...jobs, found].sort(byNumber) : jobs;
@@ -110,7 +122,7 @@ function Job({ job, jobs, open, chosen, onChoose, ...rest }) {
     <button type="button" class="job-head" aria-expanded=${String(open)}
       onClick=${() => rest.onOpen(open ? null : job.id)}>
       <${Icon} name="chevron" />
-      <span class="job-name">${title(job)}</span>
+      <span class="job-name" title=${title(job)}>${title(job)}</span>
       <span class=${`chip chip-${job.waiting ? "warn" : TONES[job.state] ?? "quiet"}`}>${
         job.waiting ? `waiting: ${job.waiting}` : stateOf(job)}</span>
       <span class="job-sub">${subtitle(job, jobs)}</span>
@@ -323,12 +335,12 @@ function useCurve(job, onChanged) {
         show();
       });
     };
-    const stop = follow(`v1/jobs/${job.id}/events`, {
+    const stop = whileSeen(() => follow(`v1/jobs/${job.id}/events`, {
       onEvent,
       onUp: schedule,
       onDown: () => show(true),
       lastId: known.current.lastId,
-    });
+    }));
     return () => {
       stop();
       cancelAnimationFrame(frame);

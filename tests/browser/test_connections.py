@@ -1,0 +1,76 @@
+"""Pages of one browser share six connections to a server: none is kept that nobody needs."""
+
+from collections.abc import Callable
+
+import pytest
+from playwright.sync_api import Page, Route, expect
+
+from tests.browser.test_drag import tell
+
+pytestmark = pytest.mark.browser
+
+UP = '{ from: "tandem-scene", state: "up", reason: "" }'
+EVENTS = "**/v1/worlds/main/events"
+SEE = """hidden => {
+  Object.defineProperty(document, "hidden", { configurable: true, get: () => hidden });
+  document.dispatchEvent(new Event("visibilitychange"));
+}"""
+"""Headless Chromium hides no page: the browser's own notice is given by hand."""
+
+
+def test_hidden_page_closes_its_stream_and_is_present_again_when_seen(
+    open_page: Callable[..., Page], server: str
+) -> None:
+    page = open_page(scene=False)
+    frame = page.locator('[data-role="viewer"]').element_handle()
+    inside = frame.content_frame()
+    assert inside is not None
+    inside.evaluate(f"parent.postMessage({UP}, location.origin)")
+    expect(page.locator('[data-role="viewer"]')).to_have_attribute("data-state", "up")
+    with page.expect_event("requestfailed", lambda one: one.url.endswith("/main/events")):
+        page.evaluate(SEE, True)
+    expect(page.locator("[data-link]")).to_have_attribute("data-link", "live")
+    tell(server, {"tag": "set-candidates", "ids": ["cube2"]})
+    with page.expect_request(EVENTS):
+        page.evaluate(SEE, False)
+    expect(page.locator('[data-goal="cube2"]')).to_have_attribute("aria-pressed", "true")
+    expect(page.locator('[data-goal="cube1"]')).to_have_attribute("aria-pressed", "false")
+    assert frame.evaluate("one => one.isConnected"), "the scene was loaded again"
+    tell(server, {"tag": "set-candidates", "ids": ["cube1", "cube2"]})
+    expect(page.locator('[data-goal="cube1"]')).to_have_attribute("aria-pressed", "true")
+
+
+def test_slow_server_is_asked_for_jobs_once_at_a_time(open_page: Callable[..., Page]) -> None:
+    page = open_page(scene=False)
+    held: list[Route] = []
+    page.route("**/v1/jobs?part_of=none", lambda route: held.append(route))
+    page.wait_for_timeout(6500)
+    assert len(held) == 1
+    page.unroute("**/v1/jobs?part_of=none")
+    held[0].continue_()
+    with page.expect_response("**/v1/jobs?part_of=none"):
+        pass
+
+
+def test_refusal_stays_when_another_command_succeeds(open_page: Callable[..., Page]) -> None:
+    page = open_page(scene=False)
+    refusals = iter([{"detail": "cube1 is refused"}])
+
+    def answer(route: Route) -> None:
+        body = next(refusals, None)
+        if body is None:
+            route.continue_()
+        else:
+            route.fulfill(status=422, json=body)
+
+    page.route("**/v1/worlds/main/commands", answer)
+    page.evaluate(
+        """() => ["cube1", "dock1"].forEach((id) =>
+          document.querySelector(`[data-goal=${id}]`).click())"""
+    )
+    pressed = page.locator('[data-goal="dock1"]').get_attribute("aria-pressed")
+    expect(page.locator('[data-role="link"]')).to_have_attribute("data-pending", "0")
+    expect(page.locator(".banner.bad")).to_contain_text("cube1 is refused")
+    page.click('[data-goal="dock1"]')
+    expect(page.locator('[data-goal="dock1"]')).to_have_attribute("aria-pressed", str(pressed))
+    expect(page.locator(".banner.bad")).to_have_count(0)
