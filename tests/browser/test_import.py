@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Page, expect
+from playwright.sync_api import Page, Route, expect
 
 from tests.sim.recorded_person import csv_text, working
 from tests.sim.recorded_skeleton import Person, skeleton
@@ -43,6 +43,24 @@ def test_visitor_states_the_unit_that_a_file_leaves_open(
     )
     expect(page.locator('[data-role="motion"]')).to_contain_text("mixed")
     expect(page.locator('[data-role="import-error"]')).to_have_count(0)
+
+
+def test_no_other_file_is_chosen_while_one_is_read(
+    open_page: Callable[..., Page], tmp_path: Path
+) -> None:
+    clip = tmp_path / "empty.csv"
+    clip.write_text("time\n", encoding="utf-8")
+    page = open_page(scene=False)
+    held: list[Route] = []
+    page.route("**/v1/recordings?*", lambda route: held.append(route))
+    page.click('[data-mode="recorded"]')
+    chooser = page.locator('[data-role="import-file"]')
+    chooser.set_input_files(clip)
+    page.click('[data-action="import"]')
+    expect(chooser).to_be_disabled()
+    held[0].continue_()
+    expect(page.locator('[data-role="import-error"]')).to_be_visible()
+    expect(chooser).to_be_enabled()
 
 
 @pytest.mark.usefixtures("emptied")

@@ -71,6 +71,38 @@ def test_training_ends_at_its_budget_and_goes_on_with_a_larger_one(
     assert len(page.problems) == 2  # type: ignore[attr-defined]  # two refusals
 
 
+def test_number_beyond_those_of_json_is_refused(open_page: Callable[..., Page]) -> None:
+    page = open_page((1280, 900), scene=False)
+    open_form(page)
+    page.fill("#train-learning-total_steps", "1e999")
+    page.fill("#train-step_budget", "1e999")
+    page.fill("#train-time_budget_s", "1e308")
+    page.click("form.train [type=submit]")
+    for name in ("step_budget", "time_budget_s"):
+        expect(page.locator(f"#train-{name}-error")).to_be_visible()
+
+
+def test_phone_offers_letters_for_a_name_and_digits_for_a_number(
+    open_page: Callable[..., Page],
+) -> None:
+    page = open_page((1280, 900), scene=False)
+    open_form(page)
+    expect(page.locator("#train-name")).to_have_attribute("inputmode", "text")
+    expect(page.locator("#train-seed")).to_have_attribute("inputmode", "decimal")
+
+
+def test_kind_of_job_obeys_the_arrow_keys(open_page: Callable[..., Page]) -> None:
+    page = open_page((1280, 900), scene=False)
+    open_form(page)
+    page.focus('[data-kind="train"]')
+    page.keyboard.press("ArrowRight")
+    expect(page.locator('[data-kind="evaluate"]')).to_be_focused()
+    expect(page.locator("#evaluate-protocol")).to_be_visible()
+    page.keyboard.press("ArrowLeft")
+    expect(page.locator('[data-kind="train"]')).to_be_focused()
+    expect(page.locator("#train-seed")).to_be_visible()
+
+
 def test_evaluation_is_started_with_choices_of_the_server(
     open_page: Callable[..., Page], server: str
 ) -> None:

@@ -163,7 +163,11 @@ def test_ended_job_is_retried_cloned_and_named(
     row.locator(".job-head").click()
     retry.click()
     expect(row.locator(".job-actions .field-error")).to_contain_text("wait for it")
-    row.locator('[data-action="delete"]').click()
+    row.locator('[data-action="delete"]').press("Enter")
+    expect(row.get_by_text("Keep it")).to_be_focused()
+    page.keyboard.press("Escape")
+    expect(row.locator('[data-action="delete"]')).to_be_focused()
+    page.keyboard.press("Enter")
     row.locator('[data-action="delete-yes"]').click()
     expect(row).to_have_count(0)
     assert patient_http.get(f"{server}/v1/jobs/{ended['id']}").status_code == 404

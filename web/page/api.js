@@ -26,7 +26,12 @@ const FILE_MS = 180000;
 export function request(path, { body, headers = {}, ...options } = {}) {
   if (body === undefined) return send(path, { headers, ...options });
   headers = { "Content-Type": "application/json", ...headers };
-  return send(path, { headers, body: JSON.stringify(body), ...options });
+  return send(path, { headers, body: JSON.stringify(body, asText), ...options });
+}
+
+/** Numbers beyond those of JSON go as text, so that the service refuses them: null is a value. */
+function asText(_, value) {
+  return typeof value === "number" && !Number.isFinite(value) ? String(value) : value;
 }
 
 async function send(path, { method = "GET", body, headers, signal, patience = ANSWER_MS }) {

@@ -4,8 +4,9 @@ import { Icon } from "./icons.js";
 
 const STEPS = { ArrowRight: 1, ArrowDown: 1, ArrowLeft: -1, ArrowUp: -1 };
 
-/** `items` are [value, label, title, icon?]; `mark` gives a button's data attributes. */
-export function Segmented({ labelledby, value, items, onPick, mark }) {
+/** `items` are [value, label, title, icon?]; `mark` gives a button's data attributes; its name is
+ * `label`, or the text of the element `labelledby`. */
+export function Segmented({ label, labelledby, value, items, onPick, mark }) {
   const at = items.findIndex(([one]) => one === value);
   const move = (event) => {
     const to = next(event.key, event.currentTarget, items.length);
@@ -14,12 +15,12 @@ export function Segmented({ labelledby, value, items, onPick, mark }) {
     event.currentTarget.children[to].focus();
     onPick(items[to][0]);
   };
-  return html`<div class="segmented" role="radiogroup" aria-labelledby=${labelledby}
+  return html`<div class="segmented" role="radiogroup" aria-label=${label} aria-labelledby=${labelledby}
     onKeyDown=${move}>
-    ${items.map(([one, label, title, icon], i) => html`<button key=${String(one)} type="button"
+    ${items.map(([one, text, title, icon], i) => html`<button key=${String(one)} type="button"
       role="radio" aria-checked=${String(i === at)} tabindex=${i === Math.max(at, 0) ? 0 : -1}
       title=${title} ...${mark(one)} onClick=${() => onPick(one)}>
-      ${icon && html`<${Icon} name=${icon} />`}${label}</button>`)}
+      ${icon && html`<${Icon} name=${icon} />`}${text}</button>`)}
   </div>`;
 }
 

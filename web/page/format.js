@@ -1,6 +1,7 @@
 // Numbers and names as people read them. SI units come in; cm, percent and minutes go out.
 
 const MINUS = "\u2212";
+const DAY_S = 24 * 3600;
 
 /** A critic's value with two decimals and a true minus sign. */
 export function value(v) {
@@ -63,6 +64,7 @@ export function duration(seconds) {
 export function ago(iso, now = Date.now()) {
   if (!iso) return "";
   const seconds = (now - Date.parse(iso)) / 1000;
+  if (seconds >= 2 * DAY_S) return `${Math.floor(seconds / DAY_S)} days ago`;
   return seconds < 5 ? "just now" : `${duration(seconds).replace(/ \d\d s$/, "")} ago`;
 }
 

@@ -44,8 +44,9 @@ export function ImportForm({ onDone }) {
   return html`<form class="dock-row import" onSubmit=${send} aria-label="Import a recording">
     <span class="dock-label">Import</span>
     <label class="tool" title="BVH, OpenSim or CSV, at most 32 MB">
-      <input class="sr" type="file" accept=${FORMATS} data-role="import-file" onChange=${choose} />
-      <${Icon} name="plus" />${file ? file.name : "Choose a file"}</label>
+      <input class="sr" type="file" accept=${FORMATS} data-role="import-file"
+        disabled=${Boolean(answer.busy)} onChange=${choose} />
+      <${Icon} name="plus" /><span>${file ? file.name : "Choose a file"}</span></label>
     ${skeleton && html`
       <datalist id="import-units">${UNITS.map((one) => html`<option key=${one} value=${one} />`)}
       </datalist>

@@ -82,7 +82,7 @@ export function SmallPrint({ world }) {
         ["switches", "Target switches"]].map(([key, label]) => html`<div key=${key}>
           <dt>${label}</dt><dd data-counter=${key}>${counters[key] ?? 0}</dd></div>`)}
     </dl>
-    ${world.checkpoint && outside.length === 0 && html`<p class="range good"><${Icon} name="check" />
+    ${Number.isFinite(world.elapsed_ms) && outside.length === 0 && html`<p class="range good"><${Icon} name="check" />
           In distribution: all inputs within the training range.</p>`}
     ${outside.length > 0 && html`<div class="range warn"><${Icon} name="alert" /><div>
           Out of distribution: inputs outside the training range
@@ -90,10 +90,15 @@ export function SmallPrint({ world }) {
             <b>${name}</b> ${text}</li>`)}
             ${outside.length > 4 && html`<li>and ${outside.length - 4} more</li>`}
           </ul></div></div>`}
-    ${world.checkpoint && html`<p class="provenance">Decided in
-      ${` ${format.number(world.elapsed_ms, 2)} ms by checkpoint `}
-      <code title=${world.checkpoint}>${format.short(world.checkpoint)}</code></p>`}
+    <${Provenance} world=${world} />
   </section>`;
+}
+
+/** Checkpoint of the policy, and how long its decision took where there is one. */
+export function Provenance({ world: { checkpoint, elapsed_ms: ms } }) {
+  return checkpoint && html`<p class="provenance">
+    ${Number.isFinite(ms) ? `Decided in ${format.number(ms, 2)} ms by checkpoint ` : "Checkpoint "}
+    <code title=${checkpoint}>${format.short(checkpoint)}</code></p>`;
 }
 
 /** "people[0].q.elbow_r" = 2.7 -> "right elbow 155°, training range 0° to 149°". */

@@ -1,9 +1,8 @@
 // Panel of a reach cell: status, safety layer, outcomes.
 import { html } from "../vendor/htm-preact-standalone.module.js";
-import * as format from "../format.js";
 import { Icon } from "../icons.js";
 import { Safety } from "../live/safety.js";
-import { StatusPanel } from "../live/status.js";
+import { Provenance, StatusPanel } from "../live/status.js";
 
 export function ReachDecision({ world }) {
   return html`<${StatusPanel} world=${world} />
@@ -35,8 +34,6 @@ function Outcomes({ world }) {
     </dl>
     <p class="range"><${Icon} name="alert" /><span>Contact at standstill: a person touched the robot
       while it stood still. People in this cell do not avoid the robot.</span></p>
-    ${world.checkpoint && html`<p class="provenance">Decided in
-      ${` ${format.number(world.elapsed_ms, 2)} ms by checkpoint `}
-      <code title=${world.checkpoint}>${format.short(world.checkpoint)}</code></p>`}
+    <${Provenance} world=${world} />
   </section>`;
 }

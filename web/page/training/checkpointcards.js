@@ -44,7 +44,7 @@ function Card({ one, open, chosen, acting, jobs, onOpen, onChoose, onChanged }) 
     <button type="button" class="job-head" aria-expanded=${String(open)}
       onClick=${() => onOpen(open ? null : one.sha256)}>
       <${Icon} name="chevron" />
-      <span class="job-name">${nameOf(one)}</span>
+      <span class="job-name" title=${nameOf(one)}>${nameOf(one)}</span>
       ${acts ? html`<span class="chip chip-good">acts</span>`
         : html`<span class="chip">${PURPOSES[one.purpose] ?? one.purpose}</span>`}
       <span class="job-sub">${subtitle(one)}</span>

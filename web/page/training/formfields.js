@@ -63,7 +63,7 @@ export function Loading({ what, error }) {
 
 export const OWN = [
   { name: "seed", default: 1, help: "Runs are reproducible for a given seed." },
-  { name: "name", default: "", help: "For the list of jobs; may be empty." },
+  { name: "name", type: "text", default: "", help: "For the list of jobs; may be empty." },
 ];
 
 /** The frame of a form that starts a job: title, faults of the whole, button and a note. */
@@ -97,7 +97,7 @@ export function Field({ field, text, fault, onText, prefix }) {
           aria-describedby=${described} aria-invalid=${String(Boolean(fault))}
           onChange=${(e) => onText(e.target.value)}>
           ${choices(field).map((c) => html`<option key=${c} value=${c}>${field.labels?.[c] ?? c}</option>`)}</select>`
-      : html`<input id=${id} name=${field.name} type="text" inputmode="decimal" spellcheck="false"
+      : html`<input id=${id} name=${field.name} type="text" inputmode=${keyboard(field)} spellcheck="false"
           autocomplete="off" value=${text ?? show(field.default)} aria-describedby=${described}
           aria-invalid=${String(Boolean(fault))} onInput=${(e) => onText(e.target.value)} />`}
     ${fault && html`<p class="field-error" id=${`${id}-error`} role="alert">${fault}</p>`}
@@ -117,6 +117,11 @@ function rangeText({ minimum, maximum }) {
   if (low !== null && high !== null) return `${low} to ${high}.`;
   if (low !== null) return `At least ${low}.`;
   return high !== null ? `At most ${high}.` : "";
+}
+
+/** The keyboard of a phone: that of decimal numbers lacks letters and, on some, a minus sign. */
+function keyboard({ type, minimum }) {
+  return type === "text" || minimum < 0 ? "text" : "decimal";
 }
 
 function isChoice(field) {

@@ -1,5 +1,5 @@
 // What can be done with a job: cancel, resume, retry, clone, delete, name, notes, priority.
-import { html, useRef, useState } from "../vendor/htm-preact-standalone.module.js";
+import { html, useEffect, useRef, useState } from "../vendor/htm-preact-standalone.module.js";
 import { patch, post, remove } from "../api.js";
 import * as format from "../format.js";
 import { Icon } from "../icons.js";
@@ -8,7 +8,7 @@ import { parsed, useForm } from "./formfields.js";
 
 const FINAL = new Set(["succeeded", "failed", "cancelled"]);
 const LABELS = [
-  { name: "name", default: "", help: "For the list of jobs; may be empty." },
+  { name: "name", type: "text", default: "", help: "For the list of jobs; may be empty." },
   { name: "priority", default: 0, help: "Waiting jobs of a higher priority start first",
     minimum: -100, maximum: 100 },
 ];
@@ -83,14 +83,25 @@ function Delete({ job, onChanged }) {
 /** A button that asks before it acts. */
 export function Ask({ name, label, question, yes, no, action, onYes }) {
   const [asking, setAsking] = useState(false);
-  return html`<div class="confirm">
+  const box = useRef(null);
+  const turned = useRef(false);
+  const turn = (to) => {
+    turned.current = true;
+    setAsking(to);
+  };
+  // The button that had the focus is gone: it goes to the one that changes nothing.
+  useEffect(() => {
+    if (turned.current) box.current.querySelector("button:last-of-type").focus();
+  }, [asking]);
+  return html`<div class="confirm" ref=${box}
+    onKeyDown=${(event) => asking && event.key === "Escape" && turn(false)}>
     ${asking
       ? html`<span>${question}</span>
           <button type="button" class="danger" data-action=${`${name}-yes`} disabled=${action.busy}
             onClick=${() => action.run(onYes)}>${yes}</button>
-          <button type="button" class="tool" onClick=${() => setAsking(false)}>${no}</button>`
+          <button type="button" class="tool" onClick=${() => turn(false)}>${no}</button>`
       : html`<button type="button" class="tool" data-action=${name}
-          onClick=${() => setAsking(true)}>${label}</button>`}
+          onClick=${() => turn(true)}>${label}</button>`}
     <${Fault} error=${action.error} />
   </div>`;
 }

@@ -99,7 +99,7 @@ function RangeRow({ one, preset, free, fault, onChange, onRemove }) {
   const input = (name, label, limit) => html`<input type="text" inputmode="decimal" value=${one[name] ?? ""}
     data-range=${name} placeholder=${String(limit)} aria-label=${`${label} of ${field.title}`}
     aria-invalid=${String(Boolean(fault))} onInput=${(e) => onChange({ [name]: e.target.value })} />`;
-  return html`<div class="range" data-path=${one.path}>
+  return html`<div class="drawn" data-path=${one.path}>
     <select value=${one.path} aria-label="Drawn field"
       onChange=${(e) => onChange({ path: e.target.value, low: "", high: "", choices: undefined })}>
       ${[field, ...free].map((f) => html`<option key=${f.name} value=${f.name}>${f.name}${

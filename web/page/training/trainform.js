@@ -20,7 +20,10 @@ export function TrainForm({ presets: { items: presets, error }, cell, from, onSt
     names: ["preset", ...[...OWN, ...BUDGETS, ...fields].map((field) => field.name)],
     onDone: onStarted,
   });
-  useEffect(() => form.ref.current?.querySelector("select:enabled, input")?.focus(), [presets !== null]);
+  useEffect(() => {
+    if (document.activeElement?.role === "radio") return; // the kind of job is being chosen
+    form.ref.current?.querySelector("select:enabled, input")?.focus();
+  }, [presets !== null]);
   const values = from ? form.typed : { ...shownCell(preset, cell), ...form.typed };
   const send = (key) => {
     const own = overrides(preset, values);

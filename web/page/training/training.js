@@ -1,5 +1,6 @@
 // The training side: jobs with their curves, and the form that starts one.
 import { html, useEffect, useState } from "../vendor/htm-preact-standalone.module.js";
+import { Segmented } from "../choice.js";
 import { Icon } from "../icons.js";
 import { Comparison, MAX_JOBS } from "./compare.js";
 import { CheckpointCards } from "./checkpointcards.js";
@@ -67,9 +68,8 @@ function NewJob({ from, ...rest }) {
   const [kind, setKind] = useState(from?.kind ?? "train");
   const [, Form] = KINDS[kind];
   return html`<section class="card" aria-label="New job">
-    ${!from && html`<div class="segmented" role="radiogroup" aria-label="Kind of job">
-      ${Object.entries(KINDS).map(([name, [label]]) => html`<button type="button" key=${name}
-        role="radio" data-kind=${name} aria-checked=${String(name === kind)} onClick=${() => setKind(name)}>
-        ${label}</button>`)}</div>`}
+    ${!from && html`<${Segmented} label="Kind of job" value=${kind} onPick=${setKind}
+      items=${Object.entries(KINDS).map(([name, [label]]) => [name, label])}
+      mark=${(name) => ({ "data-kind": name })} />`}
     <${Form} from=${from} ...${rest} /></section>`;
 }
