@@ -26,10 +26,17 @@ _HEADERS_KEY = "tandem.headers"
 """Key of the decoded headers in the scope of a request."""
 
 
-@lru_cache(maxsize=1)
-def _sign_in_page(root_path: str) -> str:
+@lru_cache(maxsize=2)
+def sign_in_page(root_path: str, fault: str = "") -> str:
+    """Return the page that asks for the token.
+
+    Args:
+        root_path: Path under which a reverse proxy shows the service.
+        fault: What was wrong with the token that was given, as HTML.
+    """
     page = (resources.files("app.api") / "signin.html").read_text("utf-8")
-    return page.replace('action="/', f'action="{root_path}/')
+    page = page.replace('action="/', f'action="{root_path}/')
+    return page.replace("<!-- fault -->", fault and f'<p role="alert">{fault}</p>')
 
 
 def path_of(scope: Scope) -> str:
@@ -103,7 +110,7 @@ class Guard:
             status, detail, kind=kind, instance=scope["path"], data=data, headers=headers
         )
         if status == 401 and "text/html" in headers_of(scope).get("accept", ""):
-            answer = HTMLResponse(_sign_in_page(scope.get("root_path", "")), 401, headers)
+            answer = HTMLResponse(sign_in_page(scope.get("root_path", "")), 401, headers)
         await answer(scope, receive, send)
 
     def refusal(

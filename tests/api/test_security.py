@@ -239,6 +239,9 @@ def test_browser_gets_a_page_to_sign_in_and_then_a_cookie(guarded: TestClient) -
     assert 'action="/session"' in page.text
     wrong = guarded.post("/session", data={"token": "wrong"}, follow_redirects=False)
     assert wrong.status_code == 422
+    assert wrong.headers["content-type"] == "text/html; charset=utf-8"
+    assert 'role="alert"' in wrong.text and 'action="/session"' in wrong.text
+    assert "set-cookie" not in wrong.headers
     signed = guarded.post("/session", data={"token": TOKEN}, follow_redirects=False)
     assert signed.headers["location"] == "/"
     assert "HttpOnly" in signed.headers["set-cookie"]

@@ -2,18 +2,14 @@
 import { html, useState } from "./vendor/htm-preact-standalone.module.js";
 import { post } from "./api.js";
 import { Logo } from "./icons.js";
+import { useAction } from "./training/jobactions.js";
 
 export function SignIn() {
   const [token, setToken] = useState("");
-  const [error, setError] = useState(null);
-  const submit = async (event) => {
+  const { busy, error, run } = useAction(() => location.reload());
+  const submit = (event) => {
     event.preventDefault();
-    try {
-      await post("session", { token });
-      location.reload();
-    } catch (problem) {
-      setError(problem);
-    }
+    run(() => post("session", { token }));
   };
   return html`<main class="signin"><form class="card" onSubmit=${submit}>
     <h1 class="brand"><${Logo} />Tandem</h1>
@@ -24,6 +20,6 @@ export function SignIn() {
         aria-invalid=${String(Boolean(error))} onInput=${(e) => setToken(e.target.value)} />
       ${error && html`<p class="field-error" role="alert">${error.message}</p>`}
     </div>
-    <button type="submit" class="primary wide">Open the cell</button>
+    <button type="submit" class="primary wide" disabled=${busy}>Open the cell</button>
   </form></main>`;
 }

@@ -5,12 +5,13 @@ import json
 from urllib.parse import parse_qs
 
 from fastapi import APIRouter, Request
-from starlette.responses import RedirectResponse, Response
+from starlette.responses import HTMLResponse, RedirectResponse, Response
 
-from app.api.security import COOKIE, SESSION_PATH, session_value
+from app.api.security import COOKIE, SESSION_PATH, session_value, sign_in_page
 from app.errors import InvalidInput
 
 COOKIE_AGE_S = 30 * 24 * 3600
+WRONG = "This is not the token of this server."
 
 router = APIRouter(include_in_schema=False)
 
@@ -26,6 +27,9 @@ async def sign_in(request: Request) -> Response:
     given = _from_form(body) if is_form else _from_json(body)
     proof = given.encode("utf-8", "replace")
     if token is not None and not hmac.compare_digest(proof, token.encode()):
+        if is_form:  # A browser shows the answer as it is.
+            page = sign_in_page(request.scope.get("root_path", ""), WRONG)
+            return HTMLResponse(page, 422)
         raise InvalidInput("token", "***", "is not the token of this server")
     answer = RedirectResponse("/", 303) if is_form else Response(status_code=204)
     if token is not None:

@@ -119,8 +119,9 @@ class Gizmos:
 
 
 def _within_range(position: Vec) -> tuple[float, float, float]:
-    """Return the nearest position that a command takes [m]: dragged toward the horizon, a gizmo
-    goes kilometres away.
+    """Return the nearest position that a command takes [m].
+
+    A gizmo that is dragged toward the horizon goes kilometres away.
     """
     x, y, z = np.clip(position, -FARTHEST_M, FARTHEST_M).tolist()
     return x, y, z
