@@ -6,7 +6,7 @@ of its canonical manifest followed by its tensors. Both state what was learned a
 trainings: equal trainings give equal ids.
 """
 
-import math
+import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -24,6 +24,10 @@ from app.errors import CheckpointMismatch, InvalidInput
 FORMAT = "tandem-checkpoint/1"
 MAX_BYTES = 16 * 1024 * 1024
 """Maximum size of the tensors of a policy [bytes], stored in one database row."""
+MAX_WEIGHT = float(np.finfo(np.float32).max)
+"""Largest absolute value of a tensor: networks compute in single precision."""
+REAL = ("F16", "F32", "F64")
+"""Types of tensors, as safetensors names them."""
 CHOOSING, REACHING, SORTING = "choosing tasks", "reaching goals", "sorting"
 """Purposes of policies."""
 REQUIRED = {
@@ -60,12 +64,15 @@ class TensorFile:
         """Return the tensors by name.
 
         Raises:
-            InvalidInput: The bytes are no safetensors file.
+            InvalidInput: The bytes are no safetensors file, or hold a type that numpy lacks.
         """
         try:
             return load_tensors(self.tensors)
         except SafetensorError as error:
             raise InvalidInput("tensors", str(error), "must be a safetensors file") from error
+        except KeyError as error:  # bfloat16 and types of 8 bits
+            kind = str(error.args[0])
+            raise InvalidInput("tensors", kind, "is a type that is not read", REAL) from None
 
 
 def check_file(
@@ -105,12 +112,20 @@ class Checkpoint(TensorFile):
         """Return the tensors by name.
 
         Raises:
-            InvalidInput: The bytes are no safetensors file, or contain non-finite numbers.
+            InvalidInput: The bytes are no safetensors file, or contain other numbers than
+                finite ones of single precision.
         """
         arrays = super().arrays()
         for name, array in arrays.items():
-            if not np.isfinite(array).all():
+            if array.dtype.kind != "f":
+                rule = "must be real floating-point numbers"
+                raise InvalidInput(f"tensors.{name}", str(array.dtype), rule, REAL)
+            largest = np.abs(array.astype(np.float64)).max(initial=0.0)
+            if not np.isfinite(largest):
                 raise InvalidInput(f"tensors.{name}", "non-finite", "must be finite")
+            if largest > MAX_WEIGHT:
+                rule = f"must be at most {MAX_WEIGHT:.4g}, the bound of single precision"
+                raise InvalidInput(f"tensors.{name}", float(largest), rule)
         return arrays
 
 
@@ -144,7 +159,7 @@ def _check_ranges(ranges: dict[str, Any]) -> None:
             and isinstance(entry["high"], list)
             and len(entry["low"]) == len(entry["high"])
             and all(
-                isinstance(value, int | float) and math.isfinite(value)
+                isinstance(value, int | float) and abs(value) <= sys.float_info.max
                 for value in entry["low"] + entry["high"]
             )
         )

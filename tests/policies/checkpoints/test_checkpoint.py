@@ -59,6 +59,37 @@ def test_non_finite_weights_are_refused(shipped):
         formats.pack(shipped.manifest, arrays).arrays()
 
 
+@pytest.mark.parametrize(
+    ("values", "text"),
+    [
+        (np.float64([1e300]), r"= 1e\+300 must be at most 3.403e\+38"),
+        (np.array([1 + 1j], dtype=np.complex64), "= 'complex64' must be real floating-point"),
+        (np.int64([1]), "= 'int64' must be real floating-point numbers; choices: F16, F32"),
+        (np.array([True]), "= 'bool' must be real"),
+    ],
+)
+def test_weights_that_no_network_has_are_refused(shipped, values, text):
+    arrays = {**shipped.arrays(), "critic.q1.0.bias": values}
+    with pytest.raises(InvalidInput, match=rf"tensors\.critic\.q1\.0\.bias {text}"):
+        formats.pack(shipped.manifest, arrays).arrays()
+
+
+@pytest.mark.parametrize("kind", ["BF16", "F8_E4M3"])
+def test_a_type_that_numpy_lacks_is_named(shipped, kind):
+    size = 8 if kind == "BF16" else 4
+    tensor = {"dtype": kind, "shape": [4], "data_offsets": [0, size]}
+    head = json.dumps({"actor.net.0.bias": tensor}).encode()
+    content = len(head).to_bytes(8, "little") + head + bytes(size)
+    checkpoint = formats.load(shipped.manifest, content)
+    with pytest.raises(InvalidInput, match=f"tensors = '{kind}' is a type that is not read"):
+        checkpoint.arrays()
+
+
+def test_empty_tensors_and_half_precision_are_read(shipped):
+    arrays = {"a": np.zeros(0, np.float32), "b": np.array([65504.0], np.float16)}
+    assert formats.pack(shipped.manifest, arrays).arrays()["b"][0] == 65504.0
+
+
 def test_checkpoint_of_another_kind_or_too_large_is_refused(shipped):
     with pytest.raises(InvalidInput, match=r"manifest\.kind = 'resume' must be policy"):
         formats.load({**shipped.manifest, "kind": "resume"}, shipped.tensors)
@@ -67,8 +98,9 @@ def test_checkpoint_of_another_kind_or_too_large_is_refused(shipped):
         formats.load(shipped.manifest, large)
 
 
-def test_a_range_with_a_word_in_it_is_refused(shipped):
-    ranges = {"q": {"low": [0.0], "high": ["much"]}}
+@pytest.mark.parametrize("value", ["much", 10**400, float("nan"), float("inf"), None])
+def test_a_range_of_other_than_finite_numbers_is_refused(shipped, value):
+    ranges = {"q": {"low": [0.0], "high": [value]}}
     with pytest.raises(InvalidInput, match="trained_range.q"):
         formats.load({**shipped.manifest, "trained_range": ranges}, shipped.tensors)
 
