@@ -2,9 +2,10 @@
 
 Results go to standard output (``--json``: one object), logs and errors to standard error.
 Exit status: 0 whatever the result, 1 where this machine is in the way (port taken, database
-in use), 2 for a wrong call.
+in use, disk full, folder read-only), 2 for a wrong call.
 """
 
+import io
 import os
 import sys
 from collections.abc import Sequence
@@ -46,6 +47,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         The exit status.
     """
     logs.set_up("text")
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="backslashreplace")  # names of files may be any bytes
     try:
         app(arguments, prog_name="python -m app")
     except SystemExit as end:
@@ -55,4 +58,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 2 if isinstance(error, InvalidInput | NotFound) else 1
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    except OSError as error:
+        place = "" if error.filename is None else f"{error.filename}: "
+        print(f"tandem: {place}{error.strerror or error}", file=sys.stderr)
+        return 1
     return 0

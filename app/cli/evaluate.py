@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from app.cli.cells import file_content
 from app.cli.options import Json, Map, RootUnit, Unit, Up, prepared_settings, read_options
 from app.cli.output import every_fault_printed, print_result, table
 from app.errors import InvalidInput, NotFound
@@ -71,19 +72,19 @@ def find_checkpoint(reference: str, settings: "Settings") -> "Checkpoint":
 
     Raises:
         NotFound: No checkpoint has that name.
+        InvalidInput: Its file or the manifest beside it cannot be read.
         Damaged: It is damaged.
     """
     from app.cli.database import has_database, opened
     from app.policies.checkpoints import pretrained
-    from app.policies.checkpoints.checkpoint import load
+    from app.policies.checkpoints.checkpoint import MAX_BYTES, load
     from jobs.checkpoints import read_sound
 
     path = Path(reference)
     if path.suffix == ".safetensors":
         if not path.is_file():
             raise NotFound("checkpoint file", reference)
-        manifest = json.loads(path.with_suffix(".json").read_text(encoding="utf-8"))
-        return load(manifest, path.read_bytes())
+        return load(_manifest(path.with_suffix(".json")), file_content(path, MAX_BYTES))
     if reference in pretrained.ALIASES:
         return pretrained.load(reference)
     if not has_database(settings):
@@ -91,6 +92,22 @@ def find_checkpoint(reference: str, settings: "Settings") -> "Checkpoint":
     with opened(settings, "checkpoint") as store:
         record, tensors = read_sound(store, reference)
         return load(record.manifest, tensors)
+
+
+def _manifest(path: Path) -> object:
+    """Return the manifest in the file beside a checkpoint's tensors.
+
+    Raises:
+        InvalidInput: It cannot be read.
+    """
+    from app.policies.checkpoints.upload import MAX_MANIFEST
+
+    content = file_content(path, MAX_MANIFEST)
+    try:
+        return json.loads(content)
+    except (ValueError, RecursionError) as error:
+        rule = f"must be the checkpoint's manifest, JSON of at most {MAX_MANIFEST} bytes"
+        raise InvalidInput("FILE", str(path), f"{rule}: {error}") from error
 
 
 def bench(

@@ -8,7 +8,7 @@ import typer
 
 from app.cli.evaluate import find_checkpoint
 from app.cli.options import Json, prepared_settings
-from app.cli.output import print_result
+from app.cli.output import print_result, write_output
 from app.errors import MissingPackage
 
 
@@ -32,7 +32,7 @@ def export(
         raise MissingPackage("onnx", "the export", remedy) from None
     content = onnx_export.export(find_checkpoint(checkpoint, settings))
     path = output or Path(f"{Path(checkpoint).stem}.onnx")
-    path.write_bytes(content)
+    write_output(path, content)
     text = f"wrote {path}\n{onnx_export.LIMITS}"
     data = {"file": str(path), "bytes": len(content), "limits": onnx_export.LIMITS}
     print_result(text, data, as_json=as_json)

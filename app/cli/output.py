@@ -5,16 +5,30 @@ import sys
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict
+from pathlib import Path
 from typing import Any
 
 import typer
 
-from app.errors import BadCell, BadRecording
+from app.errors import BadCell, BadRecording, InvalidInput
 
 
 def print_result(text: str, data: Mapping[str, Any], *, as_json: bool) -> None:
     """Print a result for people or as JSON."""
     print(json.dumps(data) if as_json else text)
+
+
+def write_output(path: Path, content: bytes) -> None:
+    """Write the file of the option ``--output``, in a folder that exists.
+
+    Raises:
+        InvalidInput: It cannot be written.
+    """
+    try:
+        path.write_bytes(content)
+    except OSError as error:
+        rule = f"cannot be written: {error.strerror}"
+        raise InvalidInput("--output", str(path), rule) from error
 
 
 @contextmanager

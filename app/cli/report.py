@@ -6,7 +6,7 @@ from typing import Annotated
 import typer
 
 from app.cli.options import Json, prepared_settings
-from app.cli.output import print_result
+from app.cli.output import print_result, write_output
 from app.errors import InvalidInput
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
@@ -26,6 +26,6 @@ def report(
 
     text, missing = page(results)
     output.parent.mkdir(parents=True, exist_ok=True)
-    output.write_text(text, encoding="utf-8")
+    write_output(output, text.encode())
     said = f"wrote {output}; {len(missing)} measures have no result file"
     print_result(said, {"page": str(output), "missing": missing}, as_json=as_json)

@@ -34,7 +34,7 @@ INTERRUPTED = 130
 
 def train(
     preset: Annotated[str, typer.Argument(show_default=False)],
-    seed: int = 0,
+    seed: Annotated[int, typer.Option(min=0, max=2**31 - 1)] = 0,
     sets: Annotated[
         list[str] | None,
         typer.Option("--set", metavar="FIELD=VALUE", help="Override a field; may be repeated."),

@@ -183,6 +183,52 @@ def test_sorting_of_a_policy_file_prints_one_json_object_and_a_table_without_pai
     assert "pairs_below" in table(result) and "'n_goal'" not in table(result)
 
 
+@pytest.mark.parametrize("manifest", [None, "", "{bad", "\udc80", "[" * 100_000])
+def test_policy_file_without_a_manifest_beside_it_is_refused_with_the_path(
+    manifest: str | None,
+    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.setenv("TANDEM_DATA", str(tmp_path))
+    path = tmp_path / "policy.safetensors"
+    path.write_bytes(untrained().tensors)
+    if manifest is not None:
+        path.with_suffix(".json").write_bytes(manifest.encode(errors="surrogateescape"))
+    assert main(["evaluate", "sorting-grid", "--checkpoint", str(path)]) == 2
+    rule = "cannot be read: No such file" if manifest is None else "must be the checkpoint's"
+    assert f"FILE = '{tmp_path}/policy.json' {rule}" in capsys.readouterr().err
+
+
+def test_folder_that_cannot_be_made_is_named_without_a_traceback(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "file").write_text("")
+    monkeypatch.setenv("TANDEM_DATA", str(tmp_path / "file" / "data"))
+    (tmp_path / "clip.csv").write_text(csv_text(working(100)))
+    assert main(["recordings", "import", str(tmp_path / "clip.csv"), "--keep"]) == 1
+    assert capsys.readouterr().err == f"tandem: {tmp_path}/file/data: Not a directory\n"
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "ascii"])
+def test_file_whose_name_cannot_be_printed_is_imported(tmp_path: Path, encoding: str) -> None:
+    path = os.fsencode(tmp_path) + b"/B\xe4r \xc3\xa4.csv"
+    Path(os.fsdecode(path)).write_text(csv_text(working(100)))
+    name = os.fsdecode(path)
+    done = run("recordings", "import", name, data=tmp_path, PYTHONIOENCODING=encoding)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.startswith("B\\udce4r ") and "1 clean runs" in done.stdout
+
+
+@pytest.mark.parametrize("seed", ["-1", str(2**31)])
+def test_training_with_a_seed_out_of_range_is_refused_before_it_starts(
+    seed: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["train", "pick-td3", "--seed", seed, "--output", str(tmp_path / "a")]) == 2
+    assert "Invalid value for '--seed'" in capsys.readouterr().err
+    assert not (tmp_path / "a").exists()
+
+
 def test_the_table_shows_nested_values_as_text() -> None:
     rate = {"mean": 0.5, "low": 0.25, "high": 0.75}
     row = {"expected": {"first": None, "switches": [1, None]}, "beside": {"nearest": rate}}

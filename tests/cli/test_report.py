@@ -4,6 +4,8 @@ import json
 import re
 from pathlib import Path
 
+import pytest
+
 from app.__main__ import main
 from app.cli.report import PAGE, RESULTS
 from app.policies.report.numbers import curve_end, preset_value, reach_setting, stored_value
@@ -64,6 +66,20 @@ def test_the_command_writes_the_page_and_says_what_is_missing(tmp_path: Path, ca
 def test_a_folder_that_is_not_there_is_refused(tmp_path: Path, capsys):
     assert main(["report", "--results", str(tmp_path / "none")]) == 2
     assert "must be a folder of result files" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("content", ["", "{bad", "[]", "\udc80"])
+def test_a_file_that_holds_no_result_is_named(tmp_path: Path, content: str, capsys):
+    path = tmp_path / "pick-single.json"
+    path.write_bytes(content.encode(errors="surrogateescape"))
+    assert main(["report", "--results", str(tmp_path), "--output", str(tmp_path / "a")]) == 2
+    said = capsys.readouterr().err
+    assert f"results = '{path}' is no result file" in said and "Traceback" not in said
+
+
+def test_a_page_that_cannot_be_written_is_refused(tmp_path: Path, capsys):
+    assert main(["report", "--output", str(tmp_path)]) == 2
+    assert f"--output = '{tmp_path}' cannot be written: Is a dir" in capsys.readouterr().err
 
 
 def test_numbers_are_written_with_interval_deviation_or_unit():

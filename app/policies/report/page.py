@@ -19,6 +19,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from app.errors import InvalidInput
 from app.policies.evaluation.registry import PROTOCOLS, default_checkpoint
 from app.policies.report.numbers import curve_end, preset_value, reach_setting, stored_value
 
@@ -114,7 +115,12 @@ def _find(results: Path, measured: Mapping[str, Json], file: str) -> Json | None
     path = results / f"{file}.json"
     if file in measured or not path.exists():
         return measured.get(file)
-    found: Json = json.loads(path.read_text(encoding="utf-8"))
+    try:
+        found = json.loads(path.read_bytes())
+    except ValueError as error:
+        raise InvalidInput("results", str(path), f"is no result file: {error}") from error
+    if not isinstance(found, dict):
+        raise InvalidInput("results", str(path), "is no result file: must be a JSON object")
     return found
 
 
