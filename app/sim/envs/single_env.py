@@ -40,13 +40,16 @@ class SingleEnv(gymnasium.Env[NDArray[Any], Any]):
         Args:
             seed: Seed of this and the following episodes.
             options: ``{"episode": k}`` starts episode ``k`` instead.
+
+        Raises:
+            InvalidInput: The seed or the number of the episode is out of range.
         """
         super().reset(seed=seed)
         if seed is None and not self._seeded:
             seed = int(self.np_random.integers(2**31))
-        self._seeded = self._running = True
         batch = self._task.batch
         next_episode(batch, ROW, seed, (options or {}).get("episode"))
+        self._seeded = self._running = True
         return batch.obs[0].copy(), self._info()
 
     def step(self, action: Any) -> tuple[NDArray[Any], float, bool, bool, dict[str, Any]]:
@@ -55,7 +58,7 @@ class SingleEnv(gymnasium.Env[NDArray[Any], Any]):
         Raises:
             ResetNeeded: The episode has ended.
             SimulationError: The action is NaN or infinite.
-            InvalidInput: The action does not exist.
+            InvalidInput: The action does not exist, or has another shape.
         """
         if not self._running:
             raise ResetNeeded("the episode has ended: call reset() before the next step()")

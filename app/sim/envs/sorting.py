@@ -7,6 +7,7 @@ from gymnasium import spaces
 from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
+from app.errors import InvalidInput
 from app.sim.cells.cell import Cell
 from app.sim.envs.raycast import Image
 from app.sim.envs.rendering import block_solids, picture, standing_workers
@@ -34,8 +35,17 @@ class SortingTask:
         self.observation_space = _obs_space(batch.shape)
 
     def actions(self, given: Any) -> NDArray[np.int64]:
-        """Return actions as the batch takes them, shape (n_envs,)."""
-        return np.asarray(given).reshape(-1)
+        """Return actions as the batch takes them, shape (n_envs,).
+
+        Raises:
+            InvalidInput: An action is no whole number.
+        """
+        act = np.asarray(given).reshape(-1)
+        if act.dtype.kind not in "iu" and not (
+            act.dtype.kind == "f" and (act == np.trunc(act)).all()
+        ):
+            raise InvalidInput("act", act.tolist(), "must be whole numbers, the moves")
+        return act
 
     def cut(self, ended: Rows) -> Mask:
         """Return whether outcomes truncate an episode, shape (n_envs,)."""

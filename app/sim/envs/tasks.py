@@ -23,6 +23,8 @@ Mask = NDArray[np.bool_]
 Infos = dict[str, NDArray[Any]]
 Settings = TypeVar("Settings", PickSettings, ReachSettings)
 
+MAX_NUMBER = int(np.iinfo(np.int64).max)
+"""Greatest seed and number of an episode."""
 OBS_BOUND = 100.0
 """Bound of the observation spaces; nothing observed comes near it."""
 RENDER_MODES = ("rgb_array",)
@@ -118,9 +120,13 @@ class ArmTask:
         return self._stepped
 
     def actions(self, given: Any) -> NDArray[np.float32]:
-        """Return actions as the batch takes them, shape (n_envs, n_act)."""
-        shape = self._stepped.n_envs, self._stepped.n_act
-        return np.asarray(given, dtype=np.float32).reshape(shape)
+        """Return actions as the batch takes them, shape (n_envs, n_act).
+
+        Those of one environment may lack the first axis. Another shape is kept, and refused by
+        the batch: reshaped, it would give joints the actions of others.
+        """
+        act = np.asarray(given, dtype=np.float32)
+        return act[None] if act.ndim == 1 and self._stepped.n_envs == 1 else act
 
     def cut(self, ended: Rows) -> Mask:
         """Return whether outcomes truncate an episode, shape (n_envs,)."""
@@ -187,17 +193,34 @@ def check_render_mode(mode: str | None) -> str | None:
     return mode
 
 
-def next_episode(batch: Batch, rows: Rows, seed: int | None, episode: int | None) -> None:
+def next_episode(batch: Batch, rows: Rows, seed: int | None, episode: object = None) -> None:
     """Number and start the next episodes of some rows.
 
     Args:
         batch: Batch of the rows.
         rows: Numbers of the rows.
         seed: Seed of episode 0; None for the next episode of the present seed.
-        episode: Number of the episode instead of these.
+        episode: Number of the episode instead of these, or one for each row.
+
+    Raises:
+        InvalidInput: The seed or a number of an episode is out of range; nothing is changed.
     """
-    if seed is not None:
-        batch.seed = seed
-    after = batch.episode[rows] + 1 if seed is None else 0
-    batch.episode[rows] = after if episode is None else episode
+    if seed is not None and not 0 <= seed <= MAX_NUMBER:
+        raise InvalidInput("seed", seed, "must lie in [0, 2^63)")
+    if episode is None:
+        after = batch.episode[rows] + 1 if seed is None else np.zeros_like(rows)
+    else:
+        after = _episodes(episode, len(rows))
+    batch.seed = batch.seed if seed is None else seed
+    batch.episode[rows] = after
     batch.start(rows)
+
+
+def _episodes(given: object, n_rows: int) -> Rows:
+    """Return stated numbers of episodes, shape (n_rows,)."""
+    found = np.asarray(given)
+    is_whole = found.dtype.kind in "iu" and found.shape in ((), (n_rows,))
+    if not is_whole or not ((found >= 0) & (found <= MAX_NUMBER)).all():
+        rule = f"must be a whole number in [0, 2^63), or a list of {n_rows} of them"
+        raise InvalidInput("options.episode", given, rule)
+    return np.full(n_rows, found, dtype=np.int64)

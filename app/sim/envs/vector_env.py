@@ -84,7 +84,8 @@ class BatchVectorEnv(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
 
         Raises:
             InvalidInput: The mask has another shape or type, is false everywhere, or is
-                combined with a seed although it is not true everywhere.
+                combined with a seed although it is not true everywhere; the seed or the number
+                of an episode is out of range.
             ResetNeeded: The first reset is partial.
         """
         options = options or {}
@@ -92,8 +93,8 @@ class BatchVectorEnv(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
         super().reset(seed=seed)
         if seed is None and not self._seeded:
             seed = int(self.np_random.integers(2**31))
-        self._seeded = True
         self._begin(chosen, seed, options.get("episode"))
+        self._seeded = True
         return self._task.batch.obs.copy(), _marked(self._task.infos(), chosen)
 
     def _chosen(self, mask: Any, seed: int | None) -> Mask:
@@ -115,10 +116,10 @@ class BatchVectorEnv(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
                 raise ResetNeeded("call reset() without reset_mask first")
         return found.copy()
 
-    def _begin(self, chosen: Mask, seed: int | None = None, episode: int | None = None) -> None:
+    def _begin(self, chosen: Mask, seed: int | None = None, episode: object = None) -> None:
         """Start episodes in the marked environments."""
-        self._steps[chosen], self._over[chosen] = 0, False
         next_episode(self._task.batch, np.flatnonzero(chosen), seed, episode)
+        self._steps[chosen], self._over[chosen] = 0, False
 
     def step(self, actions: NDArray[Any]) -> Steps:
         """Execute one control cycle, or one attempt of the sorting task, in every environment.
@@ -126,7 +127,7 @@ class BatchVectorEnv(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
         Raises:
             ResetNeeded: ``reset`` was never called, or, with ``Disabled``, not after an end.
             SimulationError: An action is NaN or infinite.
-            InvalidInput: There is no such action.
+            InvalidInput: There is no such action, or the actions have another shape.
         """
         waiting = self._over.copy()
         self._require_running(waiting)

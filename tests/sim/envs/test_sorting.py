@@ -117,6 +117,47 @@ def test_unknown_cells_cells_without_towers_and_unknown_actions_are_refused() ->
         env.step(np.int64(44))
 
 
+@pytest.mark.parametrize(
+    "act", [2.5, float("nan"), 10**30, None, "3", True, [2.0, 3.0], [1j]], ids=repr
+)
+def test_action_that_is_no_move_is_refused_and_changes_nothing(act: object) -> None:
+    env, other = SortingEnv(), SortingEnv()
+    env.reset(seed=1), other.reset(seed=1)
+    with pytest.raises(InvalidInput, match="act = .* must"):
+        env.step(act)
+    np.testing.assert_array_equal(env.step(3.0)[0], other.step(np.int64(3))[0])
+
+
+@pytest.mark.parametrize(
+    ("reset", "text"),
+    [
+        ({"seed": 2**63}, r"seed = 9223372036854775808 must lie in \[0, 2\^63\)"),
+        ({"seed": 2**127}, "seed = .* must lie"),
+        ({"options": {"episode": -1}}, r"options.episode = -1 must be a whole number in \[0"),
+        ({"options": {"episode": 1.5}}, "options.episode = 1.5 must"),
+        ({"options": {"episode": 2**70}}, "options.episode = .* must"),
+        ({"options": {"episode": np.uint64(2**63)}}, "options.episode = .* must"),
+        ({"options": {"episode": "2"}}, "options.episode = '2' must"),
+        ({"options": {"episode": [1, 2, 3, 4]}}, "options.episode = .* a list of . of them"),
+    ],
+    ids=repr,
+)
+@pytest.mark.parametrize("kind", [SortingEnv, SortingVectorEnv])
+def test_seeds_and_episodes_out_of_range_are_refused_and_start_nothing(
+    kind: type[SortingEnv] | type[SortingVectorEnv], reset: dict[str, object], text: str
+) -> None:
+    env = kind()
+    with pytest.raises(InvalidInput, match=text):
+        env.reset(**reset)
+    with pytest.raises(ResetNeeded):
+        env.step(np.zeros(1, dtype=np.int64))
+
+
+def test_every_row_of_a_vector_environment_starts_its_own_episode() -> None:
+    _, infos = SortingVectorEnv(3).reset(seed=1, options={"episode": [4, 0, 2]})
+    assert infos["episode_number"].tolist() == [4, 0, 2]
+
+
 def plain_as(state: SortingState, fail: float) -> PlainSorting:
     """A plain environment in a state, whose picks from the clutter fail as given."""
     k, c = state.clutter.size, len(state.towers)

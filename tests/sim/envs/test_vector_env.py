@@ -8,7 +8,7 @@ from gymnasium.vector import AutoresetMode
 from gymnasium.wrappers.vector import DictInfoToList, RecordEpisodeStatistics
 
 import app.sim.envs  # noqa: F401  (registers the ids)
-from app.errors import SimulationError
+from app.errors import InvalidInput, SimulationError
 from app.sim.envs.reach import ReachVectorEnv
 from app.sim.reach.batch import ReachSettings
 
@@ -94,6 +94,22 @@ def test_step_before_reset_and_nan_are_refused() -> None:
     env.reset(seed=1)
     with pytest.raises(SimulationError, match="finite"):
         env.step(np.full((4, 6), np.nan, dtype=np.float32))
+
+
+@pytest.mark.parametrize("shape", [(6, 4), (24,), (4, 3, 2), (3, 6), (6,), ()])
+def test_actions_of_another_shape_are_refused_even_with_as_many_numbers(
+    shape: tuple[int, ...],
+) -> None:
+    env = ReachVectorEnv(4)
+    env.reset(seed=1)
+    with pytest.raises(InvalidInput, match=r"act = .* must have the shape \(4, 6\)"):
+        env.step(np.zeros(shape, dtype=np.float32))
+
+
+def test_action_of_one_environment_needs_no_first_axis() -> None:
+    env = ReachVectorEnv(1)
+    env.reset(seed=1)
+    assert env.step(np.zeros(6, dtype=np.float32))[1].shape == (1,)
 
 
 def test_a_list_of_seeds_is_refused() -> None:
