@@ -8,6 +8,7 @@ prevent the checks of the rest.
 import copy
 import difflib
 import json
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
@@ -138,9 +139,9 @@ def _cut(raw: dict[str, Any]) -> Iterator[Fault]:
 
 def _pairs(pairs: list[tuple[str, Any]]) -> _Object:
     made = _Object(pairs)
-    names = [name for name, _ in pairs]
-    if len(made) < len(names):
-        made.twice = tuple(name for name in made if names.count(name) > 1)
+    if len(made) < len(pairs):
+        counts = Counter(name for name, _ in pairs)
+        made.twice = tuple(name for name, count in counts.items() if count > 1)
     return made
 
 

@@ -5,6 +5,7 @@ from typing import Any
 import pytest
 
 from app.errors import BadCell
+from app.sim.cell_validation import reader
 from app.sim.cell_validation.reader import MAX_BYTES, MAX_FAULTS, read_cell
 from app.sim.cells.cell import cell_names, load_cell
 
@@ -20,6 +21,24 @@ def faults_of(content: bytes) -> dict[str, str]:
     with pytest.raises(BadCell) as caught:
         read_cell(content)
     return {fault.place: fault.text for fault in caught.value.faults}
+
+
+class CountedName(str):
+    """A name that counts how often it is compared."""
+
+    __slots__ = ()
+    comparisons = 0
+    __hash__ = str.__hash__
+
+    def __eq__(self, other: object) -> bool:
+        CountedName.comparisons += 1
+        return str.__eq__(self, other)
+
+
+def test_effort_to_find_repeated_keys_grows_with_their_number_only() -> None:
+    names = [CountedName(k) for k in (*range(2000), 7, 7)]
+    assert reader._pairs([(name, 0) for name in names]).twice == ("7",)
+    assert CountedName.comparisons < 10 * len(names)
 
 
 @pytest.mark.parametrize("name", cell_names())
