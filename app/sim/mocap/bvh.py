@@ -244,8 +244,9 @@ def check_dt(dt: float, place: str) -> float:
     if MIN_DT <= dt <= MAX_DT:
         return dt
     guesses = []
-    if MIN_DT <= dt / 1000.0 <= MAX_DT:
-        guesses.append(f"milliseconds: in s that is {dt / 1000.0:g}")
+    for unit, per_second in (("milli", 1e3), ("micro", 1e6), ("nano", 1e9)):
+        if MIN_DT <= dt / per_second <= MAX_DT:
+            guesses.append(f"{unit}seconds: in s that is {dt / per_second:g}")
     if dt > 0.0 and MIN_DT <= 1.0 / dt <= MAX_DT:
         guesses.append(f"frames per second: in s that is {1.0 / dt:g}")
     hint = f"looks like {' or '.join(guesses)}" if guesses else ""

@@ -32,6 +32,9 @@ MAX_OTHERS = 12
 MAX_PAIRS = 6
 """Largest number of pairs of similar names in a hint."""
 
+MAX_STAMP = 1e19
+"""Largest number in a column of times: nanoseconds since 1970, whose unit is then named."""
+
 MISSING = frozenset(
     ("", "-", "--", "–", "—", ".", "?", "nan", "na", "n/a", "null", "none", "missing")
     + ("#n/a", "#na", "#value!", "#div/0!", "#num!", "#null!", "#ref!")
@@ -96,6 +99,7 @@ class TextTable:
             BadRecording: A row has a wrong number of cells, or a cell is not a number.
         """
         found = np.empty((len(self.rows), len(columns)))
+        most = np.array([_most(name) for name in columns])
         pick = itemgetter(*columns.values())
         faults: list[Fault] = []
         for k, (line, text) in enumerate(self.rows):
@@ -105,7 +109,7 @@ class TextTable:
             else:
                 chosen = pick(cells)
                 found[k] = self._numbers(chosen, text)
-                if not (np.abs(found[k]) <= MAX_NUMBER).all():
+                if not (np.abs(found[k]) <= most).all():
                     faults.extend(self._bad_cells(line, columns, chosen))
             if len(faults) >= MAX_FAULTS:
                 break
@@ -180,11 +184,11 @@ class TextTable:
     ) -> Iterable[Fault]:
         for name, cell in zip(columns, cells, strict=True):
             value = number(cell, self.decimal)
-            if np.isnan(value) or abs(value) <= MAX_NUMBER:
+            if np.isnan(value) or abs(value) <= _most(name):
                 continue
             rule, hint = "must be a number", ""
             if _number(cell) is not None:
-                rule = f"must be a finite number of at most {digits(MAX_NUMBER)}"
+                rule = f"must be a finite number of at most {digits(_most(name))}"
             if _THOUSANDS.fullmatch(cell.strip()[:MAX_NAME]) or (
                 self.decimal == "," and "." in cell
             ):
@@ -306,6 +310,11 @@ def missing_values(columns: Mapping[str, Vec], good: NDArray[np.bool_]) -> tuple
         first, last = int(group[0]), int(group[-1])
         found.append(Artifact(first=first, last=last, parts=parts, speed=0.0, reason=reason))
     return tuple(found)
+
+
+def _most(name: str) -> float:
+    """Return the largest number of a column, by our name."""
+    return MAX_STAMP if name == "time" else MAX_NUMBER
 
 
 def _likeness(one: str, other: str) -> float:

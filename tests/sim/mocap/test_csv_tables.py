@@ -68,8 +68,28 @@ def test_pelvis_in_millimetres_is_refused() -> None:
     assert "looks like millimetres" in message
 
 
-def test_times_in_milliseconds_are_refused() -> None:
-    assert "looks like milliseconds" in fault(csv_text(Q, dt=20.0))
+@pytest.mark.parametrize(
+    ("unit", "dt"), [("milliseconds", 20.0), ("microseconds", 2e4), ("nanoseconds", 2e7)]
+)
+def test_times_in_another_unit_are_refused(unit: str, dt: float) -> None:
+    assert f"looks like {unit}: in s that is 0.02" in fault(csv_text(Q, dt=dt))
+
+
+def since_1970(text: str, per_second: float = 1.0) -> str:
+    head, rows = text.splitlines()[:2], text.splitlines()[2:]
+    cells = [row.split(",", 1) for row in rows]
+    times = [f"{per_second * (1732650000.0 + float(time)):.6f}" for time, _ in cells]
+    stamped = (f"{time},{rest}" for time, (_, rest) in zip(times, cells, strict=True))
+    return "\n".join([*head, *stamped])
+
+
+def test_times_that_count_from_1970_are_read() -> None:
+    track = read_csv(since_1970(TEXT))
+    np.testing.assert_allclose(track.times - track.times[0], 0.02 * np.arange(30), atol=1e-6)
+
+
+def test_times_that_count_nanoseconds_from_1970_are_refused_with_the_unit() -> None:
+    assert "looks like nanoseconds: in s that is 0.02" in fault(since_1970(TEXT, 1e9))
 
 
 @pytest.mark.parametrize(
