@@ -7,7 +7,7 @@ trainings: equal trainings give equal ids.
 """
 
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -146,8 +146,18 @@ def load(manifest: object, tensors: bytes) -> Checkpoint:
         raise InvalidInput("manifest.kind", fields["kind"], "must be policy")
     if not 1 <= fields["width"] <= 4096:
         raise InvalidInput("manifest.width", fields["width"], "must lie in [1, 4096] units")
+    _check_layout(fields["layout"])
     _check_ranges(fields["trained_range"])
     return Checkpoint(fields, bytes(tensors))
+
+
+def _check_layout(layout: Sequence[Any]) -> None:
+    for k, group in enumerate(layout):
+        is_pair = isinstance(group, list | tuple) and len(group) == 2
+        name, size = group if is_pair else (None, None)
+        if not isinstance(name, str) or not isinstance(size, int) or size < 1:
+            rule = "must be a name and a number of values, at least 1"
+            raise InvalidInput(f"manifest.layout[{k}]", group, rule)
 
 
 def _check_ranges(ranges: dict[str, Any]) -> None:

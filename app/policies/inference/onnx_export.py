@@ -20,6 +20,7 @@ from app.policies.checkpoints.checkpoint import CHOOSING, REACHING, Checkpoint, 
 from app.policies.inference.reach_policy import PEOPLE_SET, ReachPolicy
 from app.policies.inference.value_networks import ValueNetworks, pick_preset_of
 from app.policies.networks.actor_critic import BASE_WEIGHT, ResidualActor
+from app.policies.networks.ddpg import CLIP
 from app.policies.networks.forward import EPSILON
 from app.policies.networks.pick import NormedActor, actor_of
 from app.sim.envs.pick import PickEnv
@@ -182,8 +183,11 @@ def _reach(graph: Graph, checkpoint: Checkpoint, obs: str) -> list[onnx.ValueInf
     policy, seen = ReachPolicy(checkpoint), obs
     if policy.view == "people-set":
         seen = _with_crowd(graph, obs, policy.n_obs)
+    if policy.moments is not None:
+        mean, spread = (graph.constant(one) for one in policy.moments)
+        seen = graph.clip(graph.add("Div", graph.add("Sub", obs, mean), spread), -CLIP, CLIP)
     net = graph.layers(seen, "actor.net")
-    if checkpoint.manifest["preset"].get("networks", {}).get("actor") == "residual":
+    if policy.is_residual:
         base = graph.clip(graph.columns(obs, BASE_START, BASE_START + N_ACT), -1.0, 1.0)
         act = graph.residual(net, base)
     else:

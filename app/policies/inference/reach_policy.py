@@ -116,13 +116,12 @@ class ReachPolicy(TrainedPolicy):
             self._crowd = _layers_of(arrays, CROWD_LAYERS, PEOPLE_SET.n_block, CROWD_WIDTH)
             n_seen = PEOPLE_SET.first + CROWD_WIDTH
         self._layers = _layers_of(arrays, ACTOR_LAYERS, n_seen, N_ACT)
-        self._moments: tuple[Floats, Floats] | None = None
+        self.moments: tuple[Floats, Floats] | None = None
+        """Mean and deviation that normalise observations, shape (n_obs,) each; None: none."""
         if preset.networks.normalisation == "running":
-            norm = RunningNormalisation(self.n_obs)
-            norm.load_state_dict(under(arrays, NORMALISATION))
-            mean, spread = norm.moments()
-            self._moments = mean.numpy(), spread.numpy()
-        self._residual = preset.networks.actor == "residual"
+            self.moments = _moments_of(arrays, self.n_obs)
+        self.is_residual = preset.networks.actor == "residual"
+        """Whether the network adds to the action of the base controller."""
         self._few = self.kernel_network
         self._actor: CompiledActor | None = None
         self._answers: Callable[..., None] | None = None
@@ -138,7 +137,7 @@ class ReachPolicy(TrainedPolicy):
     @property
     def kernel_network(self) -> Network | None:
         """The network as kernels play it; None where it is of another kind."""
-        if self.view != "forecast" or not self._residual or len(self._layers) != 3:
+        if self.view != "forecast" or not self.is_residual or len(self._layers) != 3:
             return None
         if len(self._layers[0][1]) != len(self._layers[1][1]):
             return None
@@ -157,14 +156,14 @@ class ReachPolicy(TrainedPolicy):
         if self._few is not None and len(obs) <= FEW:
             return self._compiled_acts(self._few, obs)
         seen = self._with_crowd(obs)
-        if self._moments is not None:
-            mean, spread = self._moments
+        if self.moments is not None:
+            mean, spread = self.moments
             seen = ((obs - mean) / spread).clip(-CLIP, CLIP)
         rows = _hidden(seen, self._layers[:-1])
         weight, bias = self._layers[-1]
         rows = rows @ weight
         rows += bias
-        if self._residual:
+        if self.is_residual:
             base = obs[:, BASE_START : BASE_START + N_ACT].clip(-1.0, 1.0)
             rows += np.arctanh(np.float32(BASE_WEIGHT) * base)
         return cast(NDArray[np.float32], np.tanh(rows, out=rows))
@@ -228,4 +227,23 @@ def _layers_of(
         layers.append((rows, bias.astype(np.float32)))
     if not layers or n_in != n_out:
         raise CheckpointMismatch("tensors", f"{name} of {n_out} numbers", "none such")
+    used = {f"{name}.{2 * k}.{part}" for k in range(len(layers)) for part in ("weight", "bias")}
+    rest = sorted(one for one in arrays if one.startswith(f"{name}.") and one not in used)
+    if rest:
+        raise CheckpointMismatch("tensors", f"{name} of {len(layers)} layers only", rest[0])
     return tuple(layers)
+
+
+def _moments_of(arrays: Mapping[str, NDArray[Any]], n_obs: int) -> tuple[Floats, Floats]:
+    """Return mean and deviation of the observations in training, shape (n_obs,) each.
+
+    Raises:
+        CheckpointMismatch: Their tensors are missing or have another shape.
+    """
+    norm = RunningNormalisation(n_obs)
+    try:
+        norm.load_state_dict(under(arrays, NORMALISATION))
+    except RuntimeError as error:
+        raise CheckpointMismatch("tensors", "those of its normalisation", str(error)) from None
+    mean, spread = norm.moments()
+    return mean.numpy(), spread.numpy()

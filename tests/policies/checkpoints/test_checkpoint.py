@@ -98,6 +98,15 @@ def test_checkpoint_of_another_kind_or_too_large_is_refused(shipped):
         formats.load(shipped.manifest, large)
 
 
+@pytest.mark.parametrize(
+    "group", [1, "q", [], ["q"], ["q", "5"], ["q", 0], ["q", 1.0], ["q", 5, 5], [["q"], 5]]
+)
+def test_a_layout_without_names_and_sizes_is_refused(shipped, group):
+    layout = [*shipped.manifest["layout"], group]
+    with pytest.raises(InvalidInput, match=rf"manifest\.layout\[{len(layout) - 1}\] = "):
+        formats.load({**shipped.manifest, "layout": layout}, shipped.tensors)
+
+
 @pytest.mark.parametrize("value", ["much", 10**400, float("nan"), float("inf"), None])
 def test_a_range_of_other_than_finite_numbers_is_refused(shipped, value):
     ranges = {"q": {"low": [0.0], "high": [value]}}

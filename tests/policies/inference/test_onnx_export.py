@@ -9,18 +9,20 @@ import torch
 from app.errors import InvalidInput
 from app.policies.algorithms.td3 import critics_of
 from app.policies.checkpoints import pretrained
-from app.policies.checkpoints.checkpoint import Checkpoint, pack
-from app.policies.checkpoints.model_state import weights_of
+from app.policies.checkpoints.checkpoint import Checkpoint, load, pack
+from app.policies.checkpoints.model_state import under, weights_of
 from app.policies.configs.pick import PICK, THESIS, PickPreset
 from app.policies.inference.onnx_export import LIMITS, export
 from app.policies.inference.reach_policy import LAYOUTS, PEOPLE_SET, ReachPolicy
 from app.policies.inference.value_networks import ValueNetworks
 from app.policies.networks.actor_critic import ResidualActor
 from app.policies.training.pick import start
+from app.policies.training.reach import networks_of
 from app.sim.cells.cell import load_cell
 from app.sim.core.arrays import Vec
 from app.sim.reach.batch import N_ACT
 from app.sim.reach.kernels.observation import BASE_START
+from tests.policies.untrained import reach_preset, untrained_reach
 
 TOLERANCE = 1e-5
 
@@ -56,6 +58,19 @@ def with_people_set() -> Checkpoint:
     return pack(manifest, weights_of({"actor": actor}))
 
 
+NORMALISED = {"width": 24, "actor": "ddpg", "critic": "ddpg", "normalisation": "running"}
+
+
+def normalised_reach(obs: Vec) -> Checkpoint:
+    """Return an untrained reach policy that normalises by given observations."""
+    checkpoint = untrained_reach(seed=4, **NORMALISED)
+    actor = networks_of(reach_preset(**NORMALISED), obs.shape[1]).actor()
+    actor.load_state_dict(under(checkpoint.arrays(), "actor"))
+    actor.norm.update(torch.as_tensor(obs))
+    tensors = {**checkpoint.arrays(), **weights_of({"actor": actor})}
+    return pack(checkpoint.manifest, tensors)
+
+
 def test_exported_pick_policy_acts_and_values_as_the_checkpoint() -> None:
     checkpoint = pretrained.load("pick")
     obs = observations(checkpoint)
@@ -86,6 +101,25 @@ def test_exported_reach_policy_acts_as_the_checkpoint() -> None:
         obs = observations(checkpoint)
         (act,) = played(checkpoint, obs)
         np.testing.assert_allclose(act, ReachPolicy(checkpoint).acts(obs), atol=TOLERANCE)
+
+
+def test_exported_reach_policy_with_normalised_observations_acts_as_the_checkpoint() -> None:
+    checkpoint = normalised_reach(3.0 + 2.0 * observations(untrained_reach(**NORMALISED)))
+    obs = 3.0 + 2.0 * observations(checkpoint)
+    (act,) = played(checkpoint, obs)
+    np.testing.assert_allclose(act, ReachPolicy(checkpoint).acts(obs), atol=TOLERANCE)
+    assert np.abs(act - ReachPolicy(untrained_reach(**NORMALISED)).acts(obs)).max() > 0.001
+
+
+def test_exported_reach_policy_whose_manifest_leaves_out_defaults_acts_as_the_checkpoint() -> (
+    None
+):
+    shipped = pretrained.load("reach")
+    preset = {**shipped.manifest["preset"], "networks": {}}
+    checkpoint = load({**shipped.manifest, "preset": preset}, shipped.tensors)
+    obs = observations(checkpoint)
+    (act,) = played(checkpoint, obs)
+    np.testing.assert_allclose(act, ReachPolicy(checkpoint).acts(obs), atol=TOLERANCE)
 
 
 @pytest.mark.parametrize("alias", ["pick", "reach"])

@@ -163,6 +163,23 @@ def test_tensors_that_make_no_network_are_refused(checkpoint, drop):
         ReachPolicy(formats.pack(checkpoint.manifest, arrays))
 
 
+@pytest.mark.parametrize("extra", ["actor.net.8.weight", "actor.net.3.bias", "actor.net.x"])
+def test_tensors_of_the_actor_that_no_layer_uses_are_refused(checkpoint, extra):
+    arrays = {**checkpoint.arrays(), extra: np.zeros((6, 6), dtype=np.float32)}
+    with pytest.raises(CheckpointMismatch, match=f"tensors is '{extra}'"):
+        ReachPolicy(formats.pack(checkpoint.manifest, arrays))
+
+
+@pytest.mark.parametrize("values", [None, np.zeros(3)])
+def test_normalisation_without_its_tensors_is_refused(values):
+    overrides = {"actor": "ddpg", "critic": "ddpg", "normalisation": "running"}
+    checkpoint = untrained_reach(width=24, **overrides)
+    arrays = {**checkpoint.arrays(), "actor.norm.total": values}
+    arrays = {name: array for name, array in arrays.items() if array is not None}
+    with pytest.raises(CheckpointMismatch, match="checkpoint tensors"):
+        ReachPolicy(formats.pack(checkpoint.manifest, arrays))
+
+
 def test_layers_that_do_not_fit_each_other_are_refused(checkpoint):
     arrays = dict(checkpoint.arrays())
     arrays["actor.net.2.weight"] = np.zeros((64, 63), dtype=np.float32)
