@@ -46,6 +46,27 @@ def test_one_database_has_one_server_even_from_two_folders(
     first.release()
 
 
+@SQLITE_ONLY
+@pytest.mark.parametrize("by_link", [False, True])
+def test_database_in_the_folder_of_one_server_has_no_second_one(
+    store: Store, tmp_path: Path, by_link: bool
+) -> None:
+    assert store.sqlite_path is not None
+    url = store.url
+    if by_link:
+        link = tmp_path / "links" / "same.db"
+        link.parent.mkdir()
+        link.symlink_to(store.sqlite_path)
+        url = f"sqlite:///{link}"
+    first = ServerLock(store, store.sqlite_path.parent)
+    second = ServerLock(Store(url), tmp_path / "b")
+    for held, refused in ((first, second), (second, first)):
+        held.acquire()
+        with pytest.raises(Conflict, match="already uses"):
+            refused.acquire()
+        held.release()
+
+
 def test_lock_ends_with_the_process_that_held_it(store: Store, tmp_path: Path) -> None:
     arguments = [sys.executable, "-c", HOLDER, store.url, str(tmp_path)]
     with subprocess.Popen(arguments, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as holder:

@@ -34,7 +34,7 @@ FORMAT = 1
 NOT_KEPT = (
     "kernels",
     "logs",
-    "server.lock",
+    "*.lock",
     ".backup-*",
     "*.db",
     "*.db-*",

@@ -20,8 +20,9 @@ class ServerLock:
 
     def __init__(self, store: Store, data_dir: Path) -> None:
         paths = [data_dir.absolute() / "server.lock"]
-        if store.sqlite_path is not None and store.sqlite_path.parent != data_dir.absolute():
-            paths.append(store.sqlite_path.with_name(store.sqlite_path.name + ".lock"))
+        if store.sqlite_path is not None:  # beside the file itself: folders differ, links too
+            file = store.sqlite_path.resolve()
+            paths.append(file.with_name(file.name + ".lock"))
         self._paths = tuple(paths)
         self._files: list[int] = []
         self._is_sqlite = store.sqlite_path is not None
