@@ -66,6 +66,8 @@ _PRAGMAS = (
 )
 
 
+_SECRETS = ("password", "sslpassword")
+"""Parameters of a URL that no message contains."""
 _FULL = ("disk is full", "no space left", "disk full", "quota exceeded")
 _NO_RIGHTS = "42501"
 _LOST = ("25P03", "25006")
@@ -113,7 +115,7 @@ class Store:
     @property
     def shown_url(self) -> str:
         """The URL without its password, for messages and logs."""
-        return self._url.render_as_string(hide_password=True)
+        return _shown(self._url)
 
     @property
     def sqlite_path(self) -> Path | None:
@@ -221,16 +223,23 @@ class Store:
         self.engine.dispose()
 
 
+def _shown(url: sa.URL) -> str:
+    return url.difference_update_query(_SECRETS).render_as_string(hide_password=True)
+
+
 def _checked_url(database_url: str) -> sa.URL:
     try:
         url = make_url(database_url)
-    except ArgumentError as error:
-        rule = "must be a database URL, such as sqlite:////data/tandem.db"
-        raise InvalidInput("database_url", database_url, rule) from error
+    except (ArgumentError, ValueError):  # their texts have parts of the URL
+        rule = (
+            "must be a database URL, such as sqlite:////data/tandem.db or "
+            "postgresql://tandem:PASSWORD@host/db, with %40 for @ and %2F for / in the password"
+        )
+        shown = "***" if set(database_url) & set("@=") else database_url
+        raise InvalidInput("database_url", shown, rule) from None
     if url.get_backend_name() not in ("sqlite", "postgresql"):
         rule = "must name a database that Tandem knows"
-        shown = url.render_as_string(hide_password=True)
-        raise InvalidInput("database_url", shown, rule, ("sqlite", "postgresql"))
+        raise InvalidInput("database_url", _shown(url), rule, ("sqlite", "postgresql"))
     if url.get_backend_name() == "sqlite":
         if not url.database or url.database == ":memory:" or url.database.startswith("file:"):
             rule = "must name a file, because workers open it from their own processes"

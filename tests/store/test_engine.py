@@ -65,10 +65,26 @@ def test_bad_database_url_says_what_is_wrong(url: str, rule: str) -> None:
         Store(url)
 
 
-def test_password_is_hidden_in_messages() -> None:
+@pytest.mark.parametrize(
+    "url",
+    [
+        "mysql://me:secret@host/x",
+        "mysql://me@host/x?password=secret",
+        "postgresql+pg8000://me@host/x?password=secret",
+        "postgres//me:secret@host/x",
+        "postgresql://me:a@b:secret@host/x",  # an @ that is not written %40
+    ],
+)
+def test_password_is_hidden_in_messages(url: str) -> None:
     with pytest.raises(InvalidInput) as caught:
-        Store("mysql://me:secret@host/x")
+        Store(url)
     assert "secret" not in str(caught.value)
+    assert caught.value.__cause__ is None or "secret" not in str(caught.value.__cause__)
+
+
+def test_password_is_hidden_in_the_shown_url() -> None:
+    store = Store("postgresql://me@host/x?sslmode=require&password=secret&sslpassword=secret")
+    assert store.shown_url == "postgresql://me@host/x?sslmode=require"
 
 
 def test_relative_path_is_made_absolute_for_workers(
