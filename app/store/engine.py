@@ -190,6 +190,9 @@ class Store:
                 connection = plain.execution_options(tandem_writes=writes)
                 with connection.begin():
                     yield connection
+        except sa.exc.TimeoutError as error:
+            reason = "all connections of this process wait for it"
+            raise StorageUnavailable(self.shown_url, reason) from error
         except DatabaseError as error:
             explained = self._explained(error)
             if explained is None:
@@ -256,13 +259,20 @@ def _create_engine(url: sa.URL) -> sa.Engine:
     as_json = {"json_serializer": _to_json, "json_deserializer": _from_json}
     if url.get_backend_name() == "sqlite":
         waits = {} if "timeout" in url.query else {"timeout": BUSY_TIMEOUT_S}
-        engine = sa.create_engine(url, **as_json, connect_args=waits)
+        longest = float(str(url.query.get("timeout", BUSY_TIMEOUT_S)))
+        engine = sa.create_engine(url, **as_json, connect_args=waits, pool_timeout=longest)
         event.listen(engine, "connect", _prepare_connection)
         event.listen(engine, "begin", _begin)
         return engine
     arguments = {k: v for k, v in _POSTGRESQL_ARGUMENTS.items() if k not in url.query}
     # Tested before use: a restarted database has ended the pooled connections.
-    engine = sa.create_engine(url, **as_json, connect_args=arguments, pool_pre_ping=True)
+    engine = sa.create_engine(
+        url,
+        **as_json,
+        connect_args=arguments,
+        pool_pre_ping=True,
+        pool_timeout=BUSY_TIMEOUT_S,
+    )
     event.listen(engine, "begin", _begin_postgresql)
     return engine
 

@@ -1,5 +1,6 @@
 import signal
 import threading
+from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
@@ -259,3 +260,17 @@ def test_nul_is_refused_by_name(store: Store) -> None:
 def test_error_with_a_nul_is_stored(store: Store, claim: Claim) -> None:
     completion.fail(store, claim, "output: \0\0.")
     assert jobs.get_job(store, claim.job_id).error == "output: ."
+
+
+@SQLITE_ONLY
+def test_transaction_beyond_the_connections_waits_no_longer_than_for_a_lock(
+    store: Store,
+) -> None:
+    short = Store(f"{store.url}?timeout=0.2")
+    with ExitStack() as held:
+        for _ in range(15):
+            held.enter_context(short.reading())
+        with pytest.raises(StorageUnavailable, match="all connections"), short.reading():
+            pass
+    with short.reading():
+        pass
