@@ -32,7 +32,7 @@ def resume_job(
 ) -> JobRecord:
     """Queue an ended job again; its next attempt resumes from its newest state.
 
-    Crashes before count no longer.
+    Crashes and kills before count no longer.
 
     Args:
         job_id: A job that is cancelled, has failed, or was ended by a budget.
@@ -63,6 +63,7 @@ def resume_job(
         changes = {
             **budgets,
             "failures": 0,
+            "kills": 0,
             "cancel_requested": False,
             "error": None,
             "ended_by": None,

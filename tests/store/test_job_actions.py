@@ -43,6 +43,20 @@ def test_resumed_job_continues_from_its_newest_state(
     assert resumed is not None and resumed.step == 10
 
 
+def test_kills_before_a_resume_count_no_longer(store: Store, claim: Claim) -> None:
+    save(store, claim, 10, policy(b"1"))
+    for kill in range(completion.MAX_KILLS):
+        if kill > 0:
+            attempts.claim_next(store)
+        completion.requeue_orphans(store)
+    assert jobs.get_job(store, claim.job_id).state == "failed"
+    assert job_actions.resume_job(store, claim.job_id).kills == 0
+    attempts.claim_next(store)
+    completion.requeue_orphans(store)
+    job = jobs.get_job(store, claim.job_id)
+    assert (job.state, job.kills) == ("queued", 1)
+
+
 def test_second_click_on_resume_is_refused_with_the_state(store: Store, claim: Claim) -> None:
     save(store, claim, 10, policy(b"10"))
     end(store, claim, "failed")
