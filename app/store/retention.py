@@ -5,17 +5,19 @@ from collections.abc import Mapping
 
 import sqlalchemy as sa
 
-from app.errors import WrongState
+from app.errors import NotFound, WrongState
 from app.store.checkpoints import drop_job_checkpoints, sole_checkpoints
 from app.store.database.reserve import write_with_reserve
 from app.store.database.tables import jobs, resume_states
 from app.store.engine import Store
 from app.store.jobs import job_from_row, read_job
-from app.store.records import FINAL_STATES, JobRecord
+from app.store.records import COMPOSED, FINAL_STATES, JobRecord
 
 logger = logging.getLogger(__name__)
 
 _ENDED = jobs.c.state.in_(FINAL_STATES)
+_OPEN = sa.select(jobs.c.id).where(sa.not_(_ENDED), jobs.c.kind.in_(COMPOSED))
+"""The sweeps and reports that still need their parts."""
 
 
 def delete_job(store: Store, job_id: str, acting: Mapping[str, str]) -> tuple[str, ...]:
@@ -32,7 +34,8 @@ def delete_job(store: Store, job_id: str, acting: Mapping[str, str]) -> tuple[st
 
     Raises:
         NotFound: There is no such job.
-        WrongState: It has not ended, or one of these checkpoints is in use.
+        WrongState: It has not ended, is part of a job that has not, or one of these checkpoints
+            is in use.
         StorageFull: No room is left.
     """
 
@@ -41,6 +44,7 @@ def delete_job(store: Store, job_id: str, acting: Mapping[str, str]) -> tuple[st
         if not job.is_final:
             rule = f"must be final to delete job {job.number}: cancel it first"
             raise WrongState("state", job.state, rule, FINAL_STATES)
+        _require_no_part(connection, job)
         removed = sole_checkpoints(connection, job_id)
         _require_unused(connection, job, removed, acting)
         drop_job_checkpoints(connection, job_id, beyond=-1)
@@ -57,7 +61,7 @@ def prune(
 ) -> tuple[str, ...]:
     """Delete ended jobs beyond the newest, and states to resume from beyond the newest.
 
-    A job with a checkpoint in use stays.
+    A job with a checkpoint in use stays, and so do the parts of a job that has not ended.
 
     Args:
         keep_states: Number of ended jobs whose states are kept.
@@ -74,6 +78,8 @@ def prune(
     with_state = newest.where(jobs.c.id.in_(sa.select(resume_states.c.job_id)))
     with store.reading() as connection:
         old = connection.execute(newest.offset(keep_jobs)).scalars().all()
+        needed = sa.select(jobs.c.id).where(jobs.c.part_of.in_(_OPEN))
+        parts = set(connection.execute(needed).scalars())
         stale = connection.execute(with_state.offset(keep_states)).scalars().all()
     if stale:
         ended = sa.select(jobs.c.id).where(_ENDED, jobs.c.id.in_(stale))
@@ -81,7 +87,8 @@ def prune(
             connection.execute(
                 sa.delete(resume_states).where(resume_states.c.job_id.in_(ended))
             )
-    return tuple(job_id for job_id in old if _deleted(store, job_id, acting))
+    unneeded = [job_id for job_id in old if job_id not in parts]
+    return tuple(job_id for job_id in unneeded if _deleted(store, job_id, acting))
 
 
 def _deleted(store: Store, job_id: str, acting: Mapping[str, str]) -> bool:
@@ -90,7 +97,22 @@ def _deleted(store: Store, job_id: str, acting: Mapping[str, str]) -> bool:
     except WrongState as error:
         logger.info("job %s is kept: %s", job_id, error.message)
         return False
+    except NotFound:
+        return False  # deleted by a request since
     return True
+
+
+def _require_no_part(connection: sa.Connection, job: JobRecord) -> None:
+    """Check that a job is no part of a sweep or report that has not ended."""
+    query = sa.select(jobs).where(jobs.c.id == job.part_of, jobs.c.id.in_(_OPEN))
+    row = connection.execute(query).mappings().first()
+    if row is not None:
+        whole = job_from_row(row)
+        rule = (
+            f"of job {job.number}: {whole.kind} {whole.number} has not ended and needs it; "
+            f"cancel {whole.number} first"
+        )
+        raise WrongState("part_of", job.part_of, rule)
 
 
 def _require_unused(

@@ -197,7 +197,8 @@ class Sweeps(Composer):
 
 def _start(store: Store, job: JobRecord, spec: SweepSpec, trials: Sequence[SweepTrial]) -> None:
     """Draw the fields of the next trial and queue its training."""
-    number = max((one.number for one in trials), default=0) + 1
+    parts = composed_jobs.parts_of(store, job.id)  # evaluations of deleted trainings, too
+    number = max((one.trial or 0 for one in parts), default=0) + 1
     overrides = _drawn(spec, trials, number)
     body = {"kind": "train", "preset": spec.preset, "seed": spec.seed, "overrides": overrides}
     _queue(store, job, number, body)

@@ -2,7 +2,16 @@ import pytest
 import sqlalchemy as sa
 
 from app.errors import NotFound, WrongState
-from app.store import attempts, checkpoints, completion, events, jobs, metrics, retention
+from app.store import (
+    attempts,
+    checkpoints,
+    completion,
+    composed_jobs,
+    events,
+    jobs,
+    metrics,
+    retention,
+)
 from app.store.engine import Store
 from app.store.records import Claim, NewJob, ResumeState
 from tests.store.test_checkpoints import policy, second_job
@@ -98,3 +107,21 @@ def test_curve_of_a_deleted_job_is_not_found(store: Store, claim: Claim) -> None
     retention.delete_job(store, claim.job_id, {})
     with pytest.raises(NotFound):
         metrics.list_metrics(store, claim.job_id)
+
+
+def test_parts_of_a_job_that_has_not_ended_are_kept(store: Store, claim: Claim) -> None:
+    completion.finish(store, claim)
+    sweep = jobs.create_job(store, NewJob(kind="sweep", spec={}))
+    composed_jobs.start(store, sweep.id)
+    part = jobs.create_job(store, NewJob(kind="count", spec={}, part_of=sweep.id, trial=1))
+    found = attempts.claim_next(store)
+    assert found is not None
+    completion.finish(store, found[0])
+    with pytest.raises(WrongState, match="sweep 2 has not ended and needs it; cancel 2 first"):
+        retention.delete_job(store, part.id, {})
+    newest = second_job(store)
+    completion.finish(store, newest)
+    assert retention.prune(store, keep_jobs=1, keep_states=1, acting={}) == (claim.job_id,)
+    composed_jobs.end(store, sweep.id, "cancelled")
+    gone = retention.prune(store, keep_jobs=2, keep_states=1, acting={})
+    assert gone == (part.id,)

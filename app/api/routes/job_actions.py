@@ -27,7 +27,10 @@ BUDGET = Body(
     openapi_examples=named({"larger": examples.BUDGET}),
 )
 DELETED: dict[int | str, dict[str, Any]] = {
-    409: {"description": "The job has not ended, or one of its checkpoints is in use"},
+    409: {
+        "description": "The job or the one that it is part of has not ended, or one of its "
+        "checkpoints is in use"
+    },
     507: {},
 }
 ENDED: dict[int | str, dict[str, Any]] = {

@@ -5,7 +5,15 @@ from typing import Any
 import pytest
 
 from app.errors import InvalidInput
-from app.store import attempts, completion, composed_jobs, job_actions, jobs, metrics
+from app.store import (
+    attempts,
+    completion,
+    composed_jobs,
+    job_actions,
+    jobs,
+    metrics,
+    retention,
+)
 from app.store.engine import Store
 from app.store.records import JobRecord
 from jobs.composed.sweeps import Sweeps, SweepTrial, trials_of
@@ -122,6 +130,28 @@ def test_cancelled_sweep_ends_with_its_trials_and_goes_on_when_resumed(store: St
     run_trial(store, sweep, 0.6)
     job, trials = look(store, sweep)
     assert (job.state, [one.number for one in trials]) == ("succeeded", [1, 2, 3])
+
+
+def test_sweep_ends_however_few_jobs_are_kept(store: Store) -> None:
+    sweep = post(store, trials=3)
+    for success in (0.2, 0.9, 0.4):
+        run_trial(store, sweep, success)
+        retention.prune(store, keep_jobs=1, keep_states=1, acting={})
+    job, trials = look(store, sweep)
+    assert (job.state, [one.number for one in trials]) == ("succeeded", [1, 2, 3])
+
+
+def test_evaluation_of_a_deleted_training_is_no_value_of_a_later_trial(store: Store) -> None:
+    sweep = post(store, trials=3)
+    run_trial(store, sweep, 0.9)
+    jobs.request_cancel(store, sweep.id)
+    _, trials = look(store, sweep)
+    retention.delete_job(store, trials[0].training.id, {})
+    job_actions.resume_job(store, sweep.id)
+    look(store, sweep)
+    run_one(store, 0.1)
+    _, trials = look(store, sweep)
+    assert [(one.number, one.state, one.value) for one in trials] == [(2, "evaluating", None)]
 
 
 def test_sweep_without_any_value_fails_with_the_reason(store: Store) -> None:
