@@ -5,7 +5,8 @@ import time
 from abc import ABC, abstractmethod
 from typing import ClassVar
 
-from app.errors import InvalidInput, NotFound
+from app.errors import ServiceError
+from app.storage_errors import LeaseLost, StorageFull, StorageUnavailable
 from app.store import composed_jobs
 from app.store.engine import Store
 from app.store.records import JobRecord
@@ -28,17 +29,26 @@ class Composer(ABC):
     def advance(self, store: Store) -> None:
         """Do what is due; at most once in a period.
 
+        A job that cannot go on fails, so that it keeps no other from its turn.
+
         Raises:
             StorageFull: No room is left.
             StorageUnavailable: The database does not answer.
+            LeaseLost: Another server runs the jobs.
         """
         if time.monotonic() < self._next:
             return
         for job in composed_jobs.open_jobs(store, self.kind):
             try:
                 self._advance(store, job)
-            except (InvalidInput, NotFound) as error:
+            except (StorageFull, StorageUnavailable, LeaseLost):
+                raise
+            except ServiceError as error:
                 self._fail(store, job, error.message)
+            except Exception as error:
+                logger.exception("the %s cannot go on", job.kind, extra={"job_id": job.id})
+                name = type(error).__name__
+                self._fail(store, job, f"it cannot go on ({name}); the log has the trace")
         self._next = time.monotonic() + PERIOD_S
 
     @abstractmethod

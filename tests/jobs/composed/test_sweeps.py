@@ -3,6 +3,7 @@
 from typing import Any
 
 import pytest
+import sqlalchemy as sa
 
 from app.errors import InvalidInput
 from app.store import (
@@ -14,8 +15,9 @@ from app.store import (
     metrics,
     retention,
 )
+from app.store.database import tables
 from app.store.engine import Store
-from app.store.records import JobRecord
+from app.store.records import JobRecord, NewJob
 from jobs.composed.sweeps import Sweeps, SweepTrial, trials_of
 from jobs.spec import parse_spec
 from tests.support.databases import SQLITE_ONLY
@@ -163,6 +165,19 @@ def test_sweep_without_any_value_fails_with_the_reason(store: Store) -> None:
         completion.fail(store, found[0], "out of memory")
     job, _ = look(store, sweep)
     assert (job.state, job.error) == ("failed", "no trial has a value; trial 2: out of memory")
+
+
+def test_sweep_that_cannot_go_on_fails_alone(store: Store) -> None:
+    damaged, taken, sound = (post(store) for _ in range(3))
+    other = NewJob(kind="count", spec={"kind": "count"})
+    jobs.create_job(store, other, idempotency_key=f"{taken.id}-1-train")
+    with store.writing() as connection:
+        mine = tables.jobs.c.id == damaged.id
+        connection.execute(sa.update(tables.jobs).where(mine).values(spec={}))
+    assert look(store, sound)[0].state == "running"
+    reasons = {one.id: jobs.get_job(store, one.id).error for one in (damaged, taken)}
+    assert "cannot go on" in str(reasons[damaged.id])
+    assert "was submitted with another body" in str(reasons[taken.id])
 
 
 @SQLITE_ONLY
