@@ -1,11 +1,14 @@
 """Log lines of server and workers: readable text or one JSON object per line.
 
 Lines written while a request is answered carry its id. Fields of ``extra=`` and fixed fields,
-such as the job of a worker, are members of the JSON object and ``name=value`` in text.
+such as the job of a worker, are members of the JSON object and ``name=value`` in text. Further
+lines of a text are indented and its control characters escaped, so that text of a request can
+imitate no other line.
 """
 
 import json
 import logging
+import re
 import sys
 import time
 from contextvars import ContextVar
@@ -15,6 +18,8 @@ Style = Literal["text", "json"]
 REQUEST_ID: ContextVar[str | None] = ContextVar("request_id", default=None)
 """Id of the request that is being answered; None outside one."""
 _STANDARD = {*vars(logging.makeLogRecord({})), "message", "asctime", "taskName"}
+_CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u2028\u2029]")
+_INDENT = "    "
 
 
 class LineFormatter(logging.Formatter):
@@ -36,8 +41,15 @@ class LineFormatter(logging.Formatter):
             fields["request_id"] = request_id
         if not self._json:
             text = "".join(f"{name}={value} " for name, value in fields.items())
-            shown = logging.makeLogRecord(vars(record) | {"name": text + record.name})
-            return super().format(shown)
+            changes: dict[str, object] = {
+                "name": _printable(text).replace("\n", "\\n") + record.name,
+                "msg": _printable(record.getMessage()).replace("\n", f"\n{_INDENT}"),
+                "args": None,
+            }
+            if record.exc_info:
+                trace = _printable(self.formatException(record.exc_info))
+                changes["exc_text"] = _INDENT + trace.replace("\n", f"\n{_INDENT}")
+            return super().format(logging.makeLogRecord(vars(record) | changes))
         line = {
             "time": self.formatTime(record),
             "level": record.levelname,
@@ -48,6 +60,11 @@ class LineFormatter(logging.Formatter):
         if record.exc_info:
             line["exception"] = self.formatException(record.exc_info)
         return json.dumps(line, default=str)
+
+
+def _printable(text: str) -> str:
+    """Return a text with its control characters escaped, line feeds and tabs excepted."""
+    return _CONTROL.sub(lambda found: ascii(found[0])[1:-1], text)
 
 
 def set_up(style: Style, **fields: object) -> None:

@@ -59,3 +59,18 @@ def test_json_line_keeps_any_text() -> None:
     line = LineFormatter("json").format(made)
     assert json.loads(line)["message"] == made.msg
     line.encode("utf-8", "strict")
+
+
+def test_text_of_a_request_makes_no_line_of_its_own() -> None:
+    made = record(path="/a\nb")
+    made.msg = "GET %s"
+    made.args = ("/v1/jobs/x\n2026-01-01T00:00:00.000Z ERROR app: forged\r\x1b[2K\u2028end",)
+    try:
+        raise ValueError("bad\n2026-01-01T00:00:00.000Z ERROR app: forged")
+    except ValueError:
+        made.exc_info = sys.exc_info()
+    first, *others = LineFormatter("text").format(made).split("\n")
+    assert first.endswith("GET /v1/jobs/x") and r"path=/a\nb" in first
+    assert others[0].endswith(r"ERROR app: forged\r\x1b[2K\u2028end")
+    assert others[1].strip() == "Traceback (most recent call last):"
+    assert all(line.startswith("    ") for line in others)
