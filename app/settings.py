@@ -5,6 +5,7 @@ Only ``app.main``, ``app.cli`` and ``jobs.run`` read them; every other part has 
 
 import ipaddress
 import os
+import re
 from pathlib import Path
 from typing import Literal
 
@@ -15,6 +16,8 @@ from app.errors import InvalidInput
 
 PREFIX = "TANDEM_"
 MIN_TOKEN_LENGTH = 16
+_TOKEN = re.compile(r"[!-~]([ -~]*[!-~])?")
+"""A token that arrives in a header as it was sent."""
 
 
 class Settings(BaseSettings):
@@ -106,7 +109,7 @@ def check_access(settings: Settings) -> None:
     """Check that the settings protect the service.
 
     Raises:
-        InvalidInput: A token is missing or too short.
+        InvalidInput: A token is missing, too short, or cannot be sent in a header.
     """
     token = settings.secret
     if token is None and not settings.is_loopback:
@@ -119,3 +122,6 @@ def check_access(settings: Settings) -> None:
         raise InvalidInput(
             "TANDEM_TOKEN", "***", f"must have at least {MIN_TOKEN_LENGTH} characters"
         )
+    if token is not None and not _TOKEN.fullmatch(token):
+        rule = "must consist of printable ASCII characters and not begin or end with a space"
+        raise InvalidInput("TANDEM_TOKEN", "***", rule)

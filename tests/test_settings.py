@@ -75,6 +75,15 @@ def test_short_token_is_refused_and_not_shown() -> None:
     assert "hunter2" not in str(refused.value)
 
 
+@pytest.mark.parametrize(
+    "token", ["schlüssel-schlüssel", " 0123456789abcdef", "0123456789abcdef\n"]
+)
+def test_token_that_no_header_carries_is_refused(token: str) -> None:
+    with pytest.raises(InvalidInput, match="printable ASCII") as refused:
+        check_access(Settings(token=token))
+    assert token not in str(refused.value)
+
+
 @pytest.mark.parametrize("path", ["", "/tandem", "/robots/cell-1"])
 def test_root_path_starts_with_a_slash_and_ends_without(path: str) -> None:
     assert load_settings(root_path=path).root_path == path
