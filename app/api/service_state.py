@@ -11,7 +11,9 @@ from app.api.motion.load import MAX_SOCKETS
 from app.api.services import MAX_VIEWERS, Services
 from app.live.snapshot import WorldSnapshot
 from app.storage_errors import StorageFull, StorageUnavailable
+from app.store.cursors import MAX_PAGE
 from app.store.jobs import count_jobs, list_jobs
+from app.store.records import JobRecord
 
 Labelled = Iterable[tuple[tuple[str, ...], float]]
 """Values with their labels."""
@@ -104,13 +106,23 @@ def _limits(_services: Services) -> Labelled:
     yield ("viewer",), MAX_VIEWERS
 
 
+def _running(services: Services) -> Iterator[JobRecord]:
+    """Yield all running jobs, page by page."""
+    cursor, more = None, True
+    while more:
+        page = list_jobs(services.store, state="running", cursor=cursor, limit=MAX_PAGE)
+        yield from page.items
+        cursor = page.next_cursor
+        more = cursor is not None
+
+
 def _steps(services: Services) -> Labelled:
-    for job in list_jobs(services.store, state="running").items:
+    for job in _running(services):
         yield (job.id, job.kind, job.preset or ""), job.step
 
 
 def _total_steps(services: Services) -> Labelled:
-    for job in list_jobs(services.store, state="running").items:
+    for job in _running(services):
         if job.total_steps is not None:
             yield (job.id, job.kind, job.preset or ""), job.total_steps
 
