@@ -143,7 +143,7 @@ RunTime = Annotated[Finite, Field(ge=0, description="run time of all attempts [s
 class AttemptHeartbeat(Body):
     """A heartbeat of a worker."""
 
-    waiting: Annotated[str, Field(pattern=r"^[^\x00-\x1f]+$", max_length=80)] | None = Field(
+    waiting: Annotated[str, Field(pattern=r"^[^\x00-\x1f]+$", max_length=64)] | None = Field(
         description="reason for which the worker cannot write; null if it runs"
     )
     run_s: RunTime

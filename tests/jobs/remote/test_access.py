@@ -13,6 +13,7 @@ from safetensors.numpy import save
 from app.errors import InvalidInput, ServiceError
 from app.storage_errors import ServerUnreachable, StaleAttempt
 from app.store import attempts, checkpoints, completion, jobs, metrics
+from app.store.database.tables import jobs as jobs_table
 from app.store.engine import Store
 from app.store.records import Claim, NewCheckpoint, ResumeState
 from jobs.access import EndOfAttempt
@@ -89,6 +90,13 @@ def test_numbers_of_the_curve_keep_their_bits_and_kinds(
     assert (access.has_point(128), access.has_point(129)) == (True, False)
     with pytest.raises(ServiceError, match="step = 128 must lie above the last recorded"):
         access.record_progress(128, values, None)
+
+
+def test_reason_that_the_column_cannot_hold_is_refused(access: ServiceAccess) -> None:
+    longest = jobs_table.c.waiting.type.length
+    assert access.heartbeat("w" * longest, 0.0).waiting == "w" * longest
+    with pytest.raises(ServiceError, match=f"waiting = .* at most {longest} characters"):
+        access.heartbeat("w" * (longest + 1), 0.0)
 
 
 def test_states_return_as_they_were_sent_and_the_one_before_an_unusable_one(
