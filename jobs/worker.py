@@ -219,6 +219,11 @@ class JobWorker:
                     logger.warning("no heartbeat for now: %s", error)
                 silent = True
                 continue
+            except Exception:  # a later one may pass; without any the supervisor ends this one
+                if not silent:
+                    logger.exception("no heartbeat for now")
+                silent = True
+                continue
             self._budgeted, silent = job, False
             if due:
                 next_heartbeat, recorded = time.monotonic() + HEARTBEAT_S, waiting

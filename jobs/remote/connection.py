@@ -23,8 +23,8 @@ BUSY_S = 60.0
 PAUSE_S = 1.0
 """Time until a request is repeated [s]."""
 PREFIX = "urn:tandem:problem:"
-GATEWAY = (502, 503, 504)
-"""Statuses of a server, or a proxy before it, that does not answer for now."""
+FOR_NOW = (408, 425, 429, 502, 503, 504)
+"""Statuses of a server, or a proxy before it, that did not take a request for now."""
 
 
 class ServiceConnection:
@@ -111,7 +111,7 @@ class ServiceConnection:
             raise StorageFull(str(problem.get("database", self._address)))
         if kind == "not-found":
             raise MissingAtServer(detail)
-        if answer.status_code in GATEWAY:
+        if answer.status_code in FOR_NOW:
             raise ServerUnreachable(self._address, f"{answer.status_code} {detail}")
         if answer.status_code >= 500:
             answer.raise_for_status()  # the attempt ends as a crash, and is repeated

@@ -24,10 +24,13 @@ from jobs.remote.connection import ServiceConnection
 from jobs.remote.inputs import ServiceFiles, ServiceInputs
 from jobs.remote.uploads import MAX_MEMORY_FILE, pack_upload
 from jobs.spec import parse_spec
+from jobs.worker import JobWorker
+from tests.jobs.machinery import wait_until
 from tests.jobs.remote.serving import TOKEN
 from tests.policies.evaluation.sorting_players import untrained
 from tests.sim.recorded_person import csv_text, working
 from tests.support.databases import SQLITE_ONLY
+from tests.support.failing_proxy import failing_proxy
 
 pytestmark = SQLITE_ONLY
 SPEC = {"kind": "train", "preset": "sorting-e0-dqn", "seed": 1}
@@ -269,6 +272,38 @@ def test_server_that_does_not_answer_may_answer_later(claim: Claim) -> None:
         with pytest.raises(ServerUnreachable) as found:
             ServiceAccess(service).job()
     assert found.value.short == "server unreachable"
+
+
+@pytest.mark.parametrize("status", [408, 429, 502])
+def test_request_that_failed_on_its_way_is_repeated(
+    address: str, claim: Claim, status: int
+) -> None:
+    with (
+        failing_proxy(address) as proxy,
+        closing(ServiceConnection(proxy.address, TOKEN, claim)) as service,
+    ):
+        proxy.failures = [status]
+        with pytest.raises(ServerUnreachable, match=str(status)):
+            ServiceAccess(service).record_progress(64, {"reward": 1.0}, None)
+        ServiceAccess(service).record_progress(64, {"reward": 1.0}, None)
+
+
+def test_worker_sees_a_cancel_after_a_heartbeat_that_failed(
+    store: Store, address: str, claim: Claim
+) -> None:
+    with (
+        failing_proxy(address) as proxy,
+        closing(ServiceConnection(proxy.address, TOKEN, claim)) as service,
+    ):
+
+        def run(worker: JobWorker) -> None:
+            proxy.failures = [500, 500]
+            wait_until(lambda: not proxy.failures)
+            jobs.request_cancel(store, claim.job_id)
+            wait_until(worker.should_stop)
+
+        assert JobWorker(ServiceAccess(service)).execute(run) == 0
+    assert jobs.get_job(store, claim.job_id).state == "cancelled"
 
 
 def test_file_beyond_the_limit_is_refused_unread(address: str, claim: Claim) -> None:
