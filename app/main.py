@@ -134,7 +134,7 @@ class Service:
             store,
             settings.data,
             max_running=settings.max_jobs,
-            executor=executor_of(settings),
+            executor=executor_of(settings, store.url),
             timeouts=Timeouts(shutdown_s=RAY_SHUTDOWN_S) if settings.ray else None,
             retention=retention,
             tracer=tracer,
@@ -231,8 +231,12 @@ class Service:
                 names.mark_damaged(damage)
 
 
-def executor_of(settings: Settings) -> Executor:
+def executor_of(settings: Settings, database_url: str) -> Executor:
     """Return the executor of jobs: a Ray cluster, or processes of this machine.
+
+    Args:
+        settings: Where and how the service runs.
+        database_url: The database, with an absolute path: workers have another folder.
 
     Raises:
         MissingPackage: Ray is not installed.
@@ -240,7 +244,7 @@ def executor_of(settings: Settings) -> Executor:
     """
     data = settings.data
     if settings.ray is None:
-        return LocalProcess(settings.database, data)
+        return LocalProcess(database_url, data)
     if importlib.util.find_spec("ray") is None:
         raise MissingPackage("ray", "TANDEM_RAY", "install the extra 'ray'")
     unknown = settings.host in ("0.0.0.0", "::") or settings.port == 0
@@ -250,7 +254,7 @@ def executor_of(settings: Settings) -> Executor:
     given = {"TANDEM_RAY": settings.ray, "TANDEM_WORKER_URL": settings.worker_address}
     if settings.secret is not None:
         given["TANDEM_TOKEN"] = settings.secret
-    return LocalProcess(settings.database, data, "jobs.remote.ray_driver", given)
+    return LocalProcess(database_url, data, "jobs.remote.ray_driver", given)
 
 
 def assemble(

@@ -114,4 +114,4 @@ def test_workers_find_the_server_by_host_and_port(host: str, expected: str) -> N
 def test_cluster_needs_an_address_of_the_server(host: str, port: int, tmp_path: Path) -> None:
     settings = load_settings(host=host, port=port, data=tmp_path, ray="10.0.0.5:6379")
     with pytest.raises(InvalidInput, match="TANDEM_WORKER_URL = None must be set for"):
-        executor_of(settings)
+        executor_of(settings, settings.database)

@@ -8,16 +8,25 @@ from pathlib import Path
 
 import pytest
 
+from app.main import executor_of
 from app.policies.checkpoints import pretrained
 from app.policies.checkpoints.trained_cell import is_for
+from app.settings import Settings
 from app.store import attempts, checkpoints, events, job_actions, jobs, metrics
 from app.store.engine import Store
-from app.store.records import NewCheckpoint
+from app.store.records import Claim, NewCheckpoint
 from jobs.cell_catalog import CellCatalog
 from jobs.recording_catalog import RecordingCatalog
 from jobs.spec import parse_spec
 from jobs.supervisor import Supervisor
-from tests.jobs.machinery import PATIENCE, WAIT_S, wait_for, wait_until_final, worker_pids
+from tests.jobs.machinery import (
+    PATIENCE,
+    WAIT_S,
+    wait_for,
+    wait_until,
+    wait_until_final,
+    worker_pids,
+)
 from tests.policies.evaluation.sorting_players import untrained
 from tests.sim.recorded_person import csv_text, working
 from tests.support import workshop
@@ -32,6 +41,20 @@ def supervisor(store: Store, tmp_path: Path) -> Iterator[Supervisor]:
     started.start()
     yield started
     started.stop()
+
+
+@SQLITE_ONLY
+def test_worker_finds_a_database_whose_path_is_relative_to_the_server(
+    store: Store, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert store.sqlite_path is not None
+    monkeypatch.chdir(store.sqlite_path.parent)
+    settings = Settings(data=tmp_path, database_url=f"sqlite:///{store.sqlite_path.name}")
+    executor = executor_of(settings, Store(settings.database).url)
+    started = executor.start(Claim(job_id="unknown", attempt=1))
+    wait_until(lambda: executor.poll(started) is not None)
+    ended = executor.poll(started)
+    assert ended is not None and "attempt 1 no longer holds job unknown" in ended.tail
 
 
 @pytest.mark.usefixtures("supervisor")
