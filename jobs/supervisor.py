@@ -59,7 +59,7 @@ class Timeouts:
     lock_s: float = 30.0
     """Time for the heartbeat of a silent worker once the database takes writes again [s]."""
     retry_s: float = 5.0
-    """Time until the next start after a worker that could not write [s]."""
+    """Time until the next start after a worker that could not start or write [s]."""
     max_failures: int = 3
     """A job fails with this number of crashes."""
 
@@ -67,6 +67,17 @@ class Timeouts:
 MIN_FREE_BYTES = 64 * 1024 * 1024
 """Free space of the disk below which no job starts [bytes]."""
 DISK_FULL = "disk full"
+NO_RESOURCES = "no free resources"
+"""No further process or file can be had on this machine."""
+_FOR_NOW = {
+    errno.ENOSPC: DISK_FULL,
+    errno.EDQUOT: DISK_FULL,
+    errno.EAGAIN: NO_RESOURCES,
+    errno.ENOMEM: NO_RESOURCES,
+    errno.EMFILE: NO_RESOURCES,
+    errno.ENFILE: NO_RESOURCES,
+}
+"""Errors that pass by themselves."""
 OTHER_SERVER = "another server runs the jobs"
 
 
@@ -234,7 +245,7 @@ class Supervisor:
         except (StorageFull, StorageUnavailable) as error:
             self._wait_for(error.short, error.message)
         except OSError as error:
-            self._wait_for(DISK_FULL if _is_full(error) else "disk error", str(error))
+            self._wait_for(_FOR_NOW.get(error.errno or 0, "disk error"), str(error))
         except Exception:
             logger.exception("unexpected error in the supervisor")
 
@@ -263,7 +274,8 @@ class Supervisor:
         try:
             handle = self._executor.start(claim)
         except OSError as error:
-            if _is_full(error):
+            if error.errno in _FOR_NOW:
+                self._not_before = time.monotonic() + self._timeouts.retry_s
                 self._give_back(claim)
                 raise
             reason = f"the worker could not be started: {error}"
@@ -364,10 +376,6 @@ class Supervisor:
             reserve.fill_reserve(self._store)
         except StorageFull as error:
             logger.error("%s", error)
-
-
-def _is_full(error: OSError) -> bool:
-    return error.errno in (errno.ENOSPC, errno.EDQUOT)
 
 
 def _end(span: Span, ended: Exit | None) -> None:

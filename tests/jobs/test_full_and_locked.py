@@ -1,6 +1,7 @@
 """A full disk, a lock and a broken disk cost no job a failure, and it goes on by itself."""
 
 import errno
+import os
 import sqlite3
 import threading
 import time
@@ -123,28 +124,40 @@ def test_queue_waits_while_the_disk_has_too_little_room(
     assert jobs.get_job(store, job_id).attempt == 0
 
 
-class NoRoomForLogs(LocalProcess):
-    """An executor whose first start meets a full disk."""
+class Exhausted(LocalProcess):
+    """An executor whose first starts meet a full disk, or a machine without free resources."""
 
-    left = 1
+    def __init__(self, store: Store, data_dir: Path, error: int) -> None:
+        super().__init__(store.url, data_dir, "tests.jobs.counting_worker")
+        self.left, self.error = 4, error
 
     def start(self, claim: Claim) -> Handle:
         if self.left:
             self.left -= 1
-            raise OSError(errno.ENOSPC, "No space left on device")
+            raise OSError(self.error, os.strerror(self.error))
         return super().start(claim)
 
 
-def test_worker_that_cannot_be_started_on_a_full_disk_is_started_later(
-    store: Store, tmp_path: Path
+@pytest.mark.parametrize(
+    ("error", "reason"),
+    [
+        (errno.ENOSPC, "disk full"),
+        (errno.EAGAIN, "no free resources"),
+        (errno.EMFILE, "no free resources"),
+    ],
+)
+def test_worker_that_cannot_be_started_for_now_is_started_later(
+    store: Store, tmp_path: Path, error: int, reason: str
 ) -> None:
-    executor = NoRoomForLogs(store.url, tmp_path, "tests.jobs.counting_worker")
-    supervisor = Supervisor(store, tmp_path, executor=executor, timeouts=PATIENCE)
+    executor = Exhausted(store, tmp_path, error)
+    timeouts = replace(PATIENCE, retry_s=0.2)
+    supervisor = Supervisor(store, tmp_path, executor=executor, timeouts=timeouts)
     job_id = queue(store, steps=20)
     supervisor.start()
+    wait_until(lambda: supervisor.waiting == reason)
     job = wait_until_final(store, job_id)
     supervisor.stop()
-    assert (job.state, job.attempt, job.failures) == ("succeeded", 2, 0)
+    assert (job.state, job.attempt, job.failures) == ("succeeded", 5, 0)
 
 
 def test_lock_beyond_every_timeout_costs_no_job_a_failure(store: Store, tmp_path: Path) -> None:

@@ -81,6 +81,7 @@ const REMEDIES = {
   "disk full": "Free some space on the disk of the data folder.",
   "database locked": "Another program holds the database, such as a backup.",
   "database damaged": "Stop the server and restore a backup: python -m app restore FILE.",
+  "no free resources": "The machine can start no further process.",
   "disk error": "The disk of the data folder reports errors: check it.",
 };
 
