@@ -157,6 +157,7 @@ class Service:
             supervisor.stop()
             store.close()
             raise
+        supervisor.on_lease = self.parts.checkpoints.refresh
         counts.watch(ServiceState(self.parts))
         self._warm_up = threading.Thread(target=self._start_cell, name="warm-up", daemon=True)
         self._warm_up.start()

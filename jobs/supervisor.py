@@ -131,6 +131,8 @@ class Supervisor:
         self._retention = retention
         self.composed: tuple[Composer, ...] = ()
         """What advances jobs made of jobs; set before the start."""
+        self.on_lease: Callable[[], object] = _nothing
+        """Called when the lease was taken: another server may have changed the database."""
         self._workers: dict[Claim, _Worker] = {}
         self._orphans_queued = False
         self._not_before = -math.inf
@@ -187,6 +189,7 @@ class Supervisor:
     def _take_lease(self) -> None:
         migrate(self._database, self._lease)
         self._holds_lease, self._orphans_queued = True, False
+        self._guarded(self.on_lease)
         self._guarded(self._queue_orphans)  # where it fails, the thread repeats it
 
     def _run(self) -> None:
@@ -376,6 +379,10 @@ class Supervisor:
             reserve.fill_reserve(self._store)
         except StorageFull as error:
             logger.error("%s", error)
+
+
+def _nothing() -> None:
+    """Do nothing."""
 
 
 def _end(span: Span, ended: Exit | None) -> None:

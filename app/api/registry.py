@@ -65,8 +65,7 @@ class CheckpointNames:
         """
         if self._aliases.get(alias) != sha256:
             set_alias(self.store, alias, sha256)
-            with self._lock:
-                self._aliases = list_aliases(self.store)
+            self.refresh()
 
     def remove(self, alias: str) -> None:
         """Remove an alias; its checkpoint stays.
@@ -75,6 +74,10 @@ class CheckpointNames:
             NotFound: There is no such alias.
         """
         remove_alias(self.store, alias)
+        self.refresh()
+
+    def refresh(self) -> None:
+        """Read the aliases again, which another server may have changed."""
         with self._lock:
             self._aliases = list_aliases(self.store)
 

@@ -7,9 +7,12 @@ from pathlib import Path
 
 import pytest
 
+from app.api.registry import CheckpointNames
 from app.errors import Conflict
 from app.storage_errors import StorageUnavailable
 from app.store import attempts, checkpoints, events, job_actions, jobs, metrics
+from app.store.database.lease import Lease
+from app.store.database.lock import ServerLock
 from app.store.engine import Store
 from jobs.executor import LocalProcess
 from jobs.supervisor import Supervisor
@@ -24,7 +27,8 @@ from tests.jobs.machinery import (
     worker_pids,
 )
 from tests.jobs.supervisor_process import COUNTING
-from tests.support.databases import POSTGRESQL_ONLY, wait_until_lease_expires
+from tests.store.test_checkpoints import policy
+from tests.support.databases import POSTGRESQL_ONLY, SQLITE_ONLY, wait_until_lease_expires
 from tests.support.postgresql_server import PostgresqlServer
 
 
@@ -174,6 +178,26 @@ def start_patiently(supervisor: Supervisor) -> None:
     while not supervisor.is_alive:
         with suppress(StorageUnavailable):
             supervisor.start()
+
+
+@SQLITE_ONLY
+def test_server_that_takes_its_lease_again_knows_the_aliases_of_the_other(
+    store: Store, tmp_path: Path, executor: LocalProcess
+) -> None:
+    first, second = policy(b"1"), policy(b"2")
+    for one in (first, second):
+        checkpoints.put_checkpoint(store, one)
+    checkpoints.set_alias(store, "line-2", first.sha256)
+    names = CheckpointNames(store)
+    supervisor = Supervisor(store, tmp_path, executor=executor, timeouts=PATIENCE)
+    supervisor.on_lease = names.refresh
+    supervisor.start()
+    with store.writing() as connection:
+        Lease(store, ServerLock(store, tmp_path / "other")).take(connection)
+    checkpoints.set_alias(store, "line-2", second.sha256)
+    wait_until_final(store, queue(store, steps=20))
+    supervisor.stop()
+    assert names.aliases["line-2"] == second.sha256
 
 
 @POSTGRESQL_ONLY
