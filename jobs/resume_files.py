@@ -1,16 +1,25 @@
 """Files that trainings need to resume: the transitions of their replay memories.
 
 The database has the states, which list the files. ``resume/ID`` in the data folder belongs to
-job ``ID``, until it has succeeded or is deleted.
+job ``ID``, until it has succeeded or is deleted. A folder of an unknown job may belong to
+another database, such as the one that is set again after an error in the settings, or that is
+restored later: it is kept for a while.
 """
 
 import shutil
+import time
+from contextlib import suppress
 from pathlib import Path
 
 from app.errors import NotFound
 from app.store.attempts import has_resume
 from app.store.engine import Store
 from app.store.jobs import get_job
+
+KEEP_UNKNOWN_S = 7 * 24 * 3600.0
+"""Time for which the files of an unknown job are kept [s]."""
+_MARK = "unknown-job"
+"""Name of a file whose time is that of the first look at an unknown job."""
 
 
 def folder_of(data_dir: Path, job_id: str) -> Path:
@@ -24,12 +33,25 @@ def remove(folder: Path) -> None:
 
 
 def remove_unneeded(store: Store, data_dir: Path) -> None:
-    """Delete the files of jobs that are gone, or have ended without a state to resume from."""
+    """Delete the files of jobs that have ended without a state to resume from.
+
+    Those of unknown jobs are deleted ``KEEP_UNKNOWN_S`` after the first look at them.
+    """
     for folder in folder_of(data_dir, "").glob("*"):
         try:
             job = get_job(store, folder.name)
         except NotFound:
-            remove(folder)
+            with suppress(OSError):
+                _remove_unknown(folder)
             continue
+        (folder / _MARK).unlink(missing_ok=True)
         if job.is_final and not has_resume(store, job.id):
             remove(folder)
+
+
+def _remove_unknown(folder: Path) -> None:
+    mark = folder / _MARK
+    if not mark.exists():
+        mark.touch()
+    elif time.time() - mark.stat().st_mtime > KEEP_UNKNOWN_S:
+        remove(folder)
