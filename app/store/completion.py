@@ -12,7 +12,7 @@ import sqlalchemy as sa
 from app.store.database.reserve import write_with_reserve
 from app.store.database.tables import jobs, resume_states
 from app.store.engine import Store
-from app.store.fencing import change_state, fenced_update, peek
+from app.store.fencing import change_state, fenced_update
 from app.store.jobs import read_job
 from app.store.records import COMPOSED, Claim, JobRecord, Spent
 
@@ -77,6 +77,8 @@ def fail(store: Store, claim: Claim, error: str) -> None:
 def crash(store: Store, claim: Claim, error: str, *, max_failures: int) -> JobRecord:
     """Record the crash of an attempt; queue the job again up to a number of crashes.
 
+    A job with a requested cancel is cancelled.
+
     Args:
         claim: The crashed attempt.
         error: The cause, as far as known.
@@ -86,14 +88,20 @@ def crash(store: Store, claim: Claim, error: str, *, max_failures: int) -> JobRe
         StaleAttempt: The attempt no longer holds the job.
         StorageFull: No room is left.
     """
-    job = peek(store, claim)
-    failures = job.failures + 1
-    if failures >= max_failures:
-        fail(store, claim, f"Failed after {failures} attempts. Last error: {error}")
-    else:
-        _requeue_held(store, claim, {"failures": failures, "error": _shown(error)})
-    with store.reading() as connection:
+
+    def end(connection: sa.Connection) -> JobRecord:
+        fenced_update(connection, claim, {}, counts=False)
+        job = read_job(connection, claim.job_id)
+        failures = job.failures + 1
+        if failures < max_failures or job.cancel_requested:
+            changes = {"failures": failures, "error": _shown(error)}
+            _requeue(connection, claim.job_id, changes)
+        else:
+            text = f"Failed after {failures} attempts. Last error: {error}"
+            _end(connection, claim, "failed", {"error": _shown(text)})
         return read_job(connection, claim.job_id)
+
+    return write_with_reserve(store, end)
 
 
 def give_back(store: Store, claim: Claim) -> None:
@@ -102,7 +110,12 @@ def give_back(store: Store, claim: Claim) -> None:
     Raises:
         StaleAttempt: The attempt no longer holds the job.
     """
-    _requeue_held(store, claim, {})
+
+    def requeue(connection: sa.Connection) -> None:
+        fenced_update(connection, claim, {}, counts=False)
+        _requeue(connection, claim.job_id, {})
+
+    write_with_reserve(store, requeue)
 
 
 def requeue_orphans(store: Store) -> tuple[str, ...]:
@@ -164,16 +177,6 @@ def _requeue_killed(connection: sa.Connection, job_id: str) -> None:
     )
     _end(connection, Claim(job_id=job_id, attempt=job.attempt), "failed", {"error": error})
     connection.execute(sa.update(jobs).where(jobs.c.id == job_id).values(kills=kills))
-
-
-def _requeue_held(store: Store, claim: Claim, changes: Mapping[str, Any]) -> None:
-    """Queue a job again, if the claim holds it."""
-
-    def requeue(connection: sa.Connection) -> None:
-        fenced_update(connection, claim, {}, counts=False)
-        _requeue(connection, claim.job_id, changes)
-
-    write_with_reserve(store, requeue)
 
 
 def _requeue(connection: sa.Connection, job_id: str, changes: Mapping[str, Any]) -> None:

@@ -270,3 +270,14 @@ def test_events_come_in_portions(store: Store, claim: Claim) -> None:
     first = events.list_events(store, claim.job_id, limit=3)
     rest = events.list_events(store, claim.job_id, after=first[-1].id, limit=3)
     assert [event.id for event in (*first, *rest)] == [1, 2, 3, 4, 5]
+
+
+def test_worker_killed_after_a_cancel_cancels_its_job_at_the_last_failure_too(
+    store: Store, claim: Claim
+) -> None:
+    completion.crash(store, claim, "killed", max_failures=2)
+    found = attempts.claim_next(store)
+    assert found is not None
+    jobs.request_cancel(store, claim.job_id)
+    job = completion.crash(store, found[0], "killed by SIGTERM", max_failures=2)
+    assert (job.state, job.error) == ("cancelled", None)
