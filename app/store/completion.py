@@ -3,12 +3,14 @@
 Crashes of its worker count as failures of a job; deaths of the server do not.
 """
 
-from collections.abc import Mapping
+import math
+from collections.abc import Iterator, Mapping, Sequence
 from datetime import UTC, datetime
 from typing import Any, Literal
 
 import sqlalchemy as sa
 
+from app.errors import InvalidInput
 from app.store.database.reserve import write_with_reserve
 from app.store.database.tables import jobs, resume_states
 from app.store.engine import Store
@@ -40,9 +42,12 @@ def finish(
 
     Raises:
         StaleAttempt: The attempt no longer holds the job.
+        InvalidInput: A number of the result is not finite.
         StorageFull: No room is left.
     """
     changes: dict[str, Any] = {"result": None if result is None else dict(result)}
+    for field, number in _not_finite(changes["result"], "result"):
+        raise InvalidInput(field, number, "must be a finite number, which JSON can state")
     if ended_by is not None:
         changes["ended_by"] = ended_by
     if run_s is not None:
@@ -143,6 +148,18 @@ def requeue_orphans(store: Store) -> tuple[str, ...]:
         return tuple(orphans)
 
     return write_with_reserve(store, requeue)
+
+
+def _not_finite(value: object, place: str) -> Iterator[tuple[str, float]]:
+    """Yield the places of numbers that JSON cannot state."""
+    if isinstance(value, float) and not math.isfinite(value):
+        yield place, value
+    elif isinstance(value, Mapping):
+        for name, inner in value.items():
+            yield from _not_finite(inner, f"{place}.{name}")
+    elif isinstance(value, Sequence) and not isinstance(value, str):
+        for index, inner in enumerate(value):
+            yield from _not_finite(inner, f"{place}[{index}]")
 
 
 def _shown(error: str) -> str:

@@ -281,3 +281,14 @@ def test_worker_killed_after_a_cancel_cancels_its_job_at_the_last_failure_too(
     jobs.request_cancel(store, claim.job_id)
     job = completion.crash(store, found[0], "killed by SIGTERM", max_failures=2)
     assert (job.state, job.error) == ("cancelled", None)
+
+
+def test_result_with_a_number_that_is_not_finite_is_refused_by_its_place(
+    store: Store, claim: Claim
+) -> None:
+    result = {"results": [{"name": "pick", "time_s": 1.0}, {"time_s": float("nan")}]}
+    with pytest.raises(
+        InvalidInput, match=r"result\.results\[1\]\.time_s = nan must be a finite"
+    ):
+        completion.finish(store, claim, result=result)
+    assert jobs.get_job(store, claim.job_id).state == "running"
