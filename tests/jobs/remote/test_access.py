@@ -275,7 +275,7 @@ def test_server_that_does_not_answer_may_answer_later(claim: Claim) -> None:
 
 
 @pytest.mark.parametrize("status", [408, 429, 502])
-def test_request_that_failed_on_its_way_is_repeated(
+def test_request_that_a_proxy_refused_for_now_is_repeated(
     address: str, claim: Claim, status: int
 ) -> None:
     with (
