@@ -9,6 +9,7 @@ and writes later behaves alike on both.
 import copy
 import json
 import logging
+import math
 import sqlite3
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -27,6 +28,7 @@ from sqlalchemy.exc import (
     DataError,
     NoSuchModuleError,
     OperationalError,
+    ProgrammingError,
 )
 from sqlalchemy.pool import ConnectionPoolEntry
 
@@ -40,6 +42,8 @@ BUSY_TIMEOUT_S = 10.0
 
 The query ``?timeout=SECONDS`` of the URL sets another one. Requests end with a 503 after it;
 workers and the supervisor repeat their writes for as long as it takes."""
+MAX_TIMEOUT_S = 3600.0
+"""Greatest such time [s]."""
 
 WAL_SIZE_LIMIT = 64 * 1024 * 1024
 """Size to which the write-ahead log is cut after a large blob [bytes]."""
@@ -213,6 +217,9 @@ class Store:
         if sqlstate == _NO_RIGHTS:
             rule = f"must name the owner of the database ({reason})"
             return InvalidInput("database_url", self.shown_url, rule)
+        if isinstance(error, ProgrammingError) and error.statement is None:
+            rule = f"must have parameters that its driver takes ({reason})"
+            return InvalidInput("database_url", self.shown_url, rule)
         lost = error.connection_invalidated or sqlstate in _LOST
         if lost or isinstance(error, OperationalError):
             return StorageUnavailable(self.shown_url, reason)
@@ -251,16 +258,35 @@ def _checked_url(database_url: str) -> sa.URL:
         if not path.parent.is_dir():
             rule = f"must lie in a folder that exists; there is no {path.parent}"
             raise InvalidInput("database_url", database_url, rule)
+        unknown = sorted(set(url.query) - {"timeout"})
+        if unknown:
+            rule = "is no parameter of a SQLite file"
+            raise InvalidInput("database_url", unknown[0], rule, ("timeout",))
+        _longest_wait(url)
         url = url.set(database=str(path))
     return url
+
+
+def _longest_wait(url: sa.URL) -> float:
+    """Return the time for which a writer of a SQLite file waits [s]."""
+    given = str(url.query.get("timeout", BUSY_TIMEOUT_S))
+    try:
+        longest = float(given)
+    except ValueError:
+        longest = math.nan
+    if not 0.0 < longest <= MAX_TIMEOUT_S:
+        rule = f"must lie in (0, {MAX_TIMEOUT_S:g}] s"
+        raise InvalidInput("database_url: timeout", given, rule)
+    return longest
 
 
 def _create_engine(url: sa.URL) -> sa.Engine:
     as_json = {"json_serializer": _to_json, "json_deserializer": _from_json}
     if url.get_backend_name() == "sqlite":
-        waits = {} if "timeout" in url.query else {"timeout": BUSY_TIMEOUT_S}
-        longest = float(str(url.query.get("timeout", BUSY_TIMEOUT_S)))
-        engine = sa.create_engine(url, **as_json, connect_args=waits, pool_timeout=longest)
+        longest = _longest_wait(url)
+        engine = sa.create_engine(
+            url, **as_json, connect_args={"timeout": longest}, pool_timeout=longest
+        )
         event.listen(engine, "connect", _prepare_connection)
         event.listen(engine, "begin", _begin)
         return engine

@@ -59,11 +59,23 @@ def test_sqlite_is_durable_and_checks_references(store: Store) -> None:
         ("sqlite://", "must name a file"),
         ("sqlite:///:memory:", "must name a file"),
         ("sqlite:////no/such/folder/x.db", "there is no /no/such/folder"),
+        ("sqlite:////tmp/x.db?timeout=soon", r"timeout = 'soon' must lie in \(0, 3600\] s"),
+        ("sqlite:////tmp/x.db?timeout=-1", r"timeout = '-1' must lie in \(0, 3600\] s"),
+        ("sqlite:////tmp/x.db?timeout=1&timeout=2", r"must lie in \(0, 3600\] s"),
+        ("sqlite:////tmp/x.db?mode=ro", "mode.* is no parameter of a SQLite file.*timeout"),
     ],
 )
 def test_bad_database_url_says_what_is_wrong(url: str, rule: str) -> None:
     with pytest.raises(InvalidInput, match=rule):
         Store(url)
+
+
+@pytest.mark.parametrize("parameter", ["colour=red", "connect_timeout=soon"])
+def test_parameter_that_the_driver_refuses_is_named(parameter: str) -> None:
+    store = Store(f"postgresql://me@127.0.0.1:1/x?{parameter}")
+    rule = f"must have parameters that its driver takes .*{parameter.split('=')[0]}"
+    with pytest.raises(InvalidInput, match=rule), store.reading():
+        pass
 
 
 @pytest.mark.parametrize(
