@@ -94,6 +94,8 @@ def test_numbers_are_written_with_interval_deviation_or_unit():
     pair = {"results": [], "paired": [{"name": "a - b", "rate": rate}]}
     assert stored_value(pair, "a - b", "rate") == "50.00 % (25.00-75.00)"
     assert stored_value(found, "b", "ms", "ms") is None
+    gain = {"name": "a - b", "rate": {"mean": -0.02, "low": -0.15, "high": 0.11}}
+    assert stored_value({"paired": [gain]}, "a - b", "rate") == "-2.00 % (-15.00 to 11.00)"
     ends = [{"step": 4_000_000, "success": share, "reward": -2.0} for share in (0.2, 0.4)]
     curves = [{"name": "p", "played": [one]} for one in ends]
     said = curve_end({"curves": curves}, "p", "success")

@@ -25,7 +25,8 @@ def stored_value(found: Json, row: str, key: str, unit: str = "") -> str | None:
     value = rows.get(row, {}).get(key)
     if isinstance(value, dict) and not unit:
         mean, low, high = (100.0 * value[key] for key in ("mean", "low", "high"))
-        return f"{mean:.2f} % ({low:.2f}-{high:.2f})"
+        to = "-" if low >= 0.0 else " to "
+        return f"{mean:.2f} % ({low:.2f}{to}{high:.2f})"
     if isinstance(value, dict) and "sd" not in value:
         places = 1 if abs(value["mean"]) >= 10.0 else 2
         mean, low, high = (f"{value[key]:.{places}f}" for key in ("mean", "low", "high"))
