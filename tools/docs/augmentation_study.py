@@ -2,7 +2,7 @@
 
     SETS="--set learning.total_steps=1024000 --set people.augmentation=sampled
         --set people.n_people=1 --set people.human_absent=0 --set people.human_off_task=0"
-    python -m app train pick-td3 --seed 21 $SETS --output FOLDER/sampled-21
+    python -m app train pick-reach-td3 --seed 21 $SETS --output FOLDER/sampled-21
 
 Repeat for ``replayed`` and for seeds 22 and 23. Then
 

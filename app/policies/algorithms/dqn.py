@@ -3,6 +3,9 @@
 Double Q-learning, dueling networks, prioritised replay with n-step returns, action masks in
 exploration, targets and prediction, and expert labels: in a part of each minibatch the exact
 planner marks all optimal moves, and a large-margin loss raises one of them above the others.
+The part is the first of the minibatch. The prioritised draw returns transitions in the order of
+their places in the buffer, so that it is always the same region of places: until the buffer is
+full the oldest transitions, afterwards those of the places that are written first.
 
 The double target is ``r + gamma^n Q_target(s', argmax_a Q_online(s', a))``.
 

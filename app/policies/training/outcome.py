@@ -89,8 +89,8 @@ def collect(
 def fit(data: OutcomeData, seed: int) -> OutcomeHead:
     """Return the ensemble fitted to labelled observations.
 
-    A tenth of the episodes is kept apart: on them the spread is widened until the rates of
-    outcomes lie inside the intervals.
+    A tenth of the episodes is kept apart: on them the spread is widened until the rate of
+    success lies inside the interval in nine of ten bins. Fewer than ``BATCH`` rows fit nothing.
 
     Args:
         data: Labelled observations.

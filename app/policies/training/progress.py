@@ -9,8 +9,9 @@ from app.policies.checkpoints.checkpoint import Checkpoint
 class Progress:
     """One point of the learning curve: episodes without exploration.
 
-    The pick scenario tells of its cells without exploration since the last point; the sorting
-    task of episodes that are played for this point alone.
+    Picks count the episodes of environments without exploration since the last point, or play
+    episodes for this point alone if the preset has ``progress_episodes``; the other scenarios
+    always do.
     """
 
     step: int
@@ -20,7 +21,7 @@ class Progress:
     updates: int
     """Updates of the critics so far."""
     episodes: int
-    """Episodes that ended in the window, cells without exploration only."""
+    """Episodes behind the rates."""
     success: float | None
     """Share of them that succeeded; None where none ended."""
     collision: float | None

@@ -4,7 +4,7 @@
 
 Reads ``docs/results/reach-ssm.json``; writes ``docs/img/reach/override.png``, the speed
 override over time in one crossing (thesis fig. 4.9), and ``docs/img/reach/arrivals.png``, the
-number of runs that reached the goal over time.
+share of the runs that reached the goal over time.
 """
 
 import json
@@ -66,7 +66,7 @@ def override(example: Json) -> Figure:
 
 
 def arrivals(seconds: Json, cap: float) -> Figure:
-    """Draw the number of runs at the goal over time, one line per row."""
+    """Draw the share of the runs at the goal over time, one line per row."""
     figure, axes = panels(1, 1, 3.6)
     axis = axes[0, 0]
     for name, (label, colour, line) in ROWS.items():

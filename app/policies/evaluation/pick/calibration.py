@@ -4,13 +4,15 @@ Each row has people of one kind. In every episode one random target is pursued; 
 at one random step the probabilities of success and contact are compared with the outcome. The
 expected calibration error (ECE) is the mean absolute difference of probability and rate over
 ten bins of equal counts; ``ece_floor`` is what calibrated predictions show by chance with these
-counts. The Brier score stands beside that of a constant, and AUC tells how well the probability
-ranks episodes.
+counts if all are independent. The two of an episode have one outcome: chance makes up to 1.4
+times as much. The Brier score stands beside that of a constant, and AUC tells how well the
+probability ranks episodes.
 
 The probabilities are those of the people of the training, a mixture; an observation does not
 tell which kind a person is. ``recalibrated`` states ECE and Brier score after a recalibration
 (``recalibration.py``) by few and by many predictions beside the same kind of people: what
-outcomes observed in one cell correct. It is measured on the half that the fit did not see.
+outcomes observed in one cell correct. It is measured on the half of the predictions that the
+fit did not see; the other prediction of an episode may be in the fitted half.
 
 Source: Guo et al., *On calibration of modern neural networks* (2017); Brier (1950).
 """
