@@ -157,7 +157,8 @@ class BatchTD3(TD3, Stateful):
             device="cpu",
             **replay,
         )
-        self.ema_actor = deepcopy(self.actor.mu) if learning.ema > 0.0 else None
+        shared = {} if self._norm is None else {id(self._norm): self._norm}
+        self.ema_actor = deepcopy(self.actor.mu, shared) if learning.ema > 0.0 else None
         """The actor with averaged weights; None where no average is kept."""
 
     @property

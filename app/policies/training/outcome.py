@@ -90,7 +90,7 @@ def fit(data: OutcomeData, seed: int) -> OutcomeHead:
     """Return the ensemble fitted to labelled observations.
 
     A tenth of the episodes is kept apart: on them the spread is widened until the rate of
-    success lies inside the interval in nine of ten bins. Fewer than ``BATCH`` rows fit nothing.
+    success lies inside the interval in nine of ten bins.
 
     Args:
         data: Labelled observations.
@@ -129,13 +129,14 @@ def _fit_member(
     if (label == 0).any():
         with torch.no_grad():
             network[-1].bias[-1] = time_s[label == 0].mean()  # type: ignore[index]
+    size = max(1, min(BATCH, len(rows) // LEAST_BATCHES))
     schedule = torch.optim.lr_scheduler.OneCycleLR(
-        optimizer, RATE, total_steps=EPOCHS * max(1, len(rows) // BATCH) + 1
+        optimizer, RATE, total_steps=EPOCHS * (len(rows) // size) + 1
     )
     for _ in range(EPOCHS):
         rng.shuffle(rows)
-        for first in range(0, len(rows) - BATCH + 1, BATCH):
-            one = torch.as_tensor(rows[first : first + BATCH])
+        for first in range(0, len(rows) - size + 1, size):
+            one = torch.as_tensor(rows[first : first + size])
             out = network(inputs[one])
             loss = functional.cross_entropy(out[:, : len(OUTCOMES)], label[one])
             won = label[one] == 0

@@ -212,6 +212,18 @@ def test_every_option_trains_and_moves_the_actor(option):
     ReachPolicy(recorder.checkpoints[-1][1])
 
 
+def test_averaged_actor_normalises_like_the_trained_one():
+    few = {
+        "learning.n_envs": 64,
+        "learning.total_steps": 1024,
+        "learning.checkpoint_steps": 1024,
+    }
+    recorder = Recorder()
+    recorder.run(preset_of("reach-ddpg-authors", {**TINY, **few, "learning.ema": 0.99}))
+    counted = recorder.checkpoints[-1][1].arrays()["actor.norm.count"]
+    assert counted == pytest.approx(1024, rel=0.1)
+
+
 def test_averaged_weights_are_what_is_shown_and_kept(tmp_path):
     preset = preset_of("reach-td3", {**TINY, "learning.ema": 0.99})
     stopped = Recorder(stop_at=768, memory=MemoryFiles(FileFolder(tmp_path)))

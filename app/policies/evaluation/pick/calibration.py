@@ -4,15 +4,14 @@ Each row has people of one kind. In every episode one random target is pursued; 
 at one random step the probabilities of success and contact are compared with the outcome. The
 expected calibration error (ECE) is the mean absolute difference of probability and rate over
 ten bins of equal counts; ``ece_floor`` is what calibrated predictions show by chance with these
-counts if all are independent. The two of an episode have one outcome: chance makes up to 1.4
-times as much. The Brier score stands beside that of a constant, and AUC tells how well the
-probability ranks episodes.
+counts, if the two of an episode come true together as often as they can. The Brier score stands
+beside that of a constant, and AUC tells how well the probability ranks episodes.
 
 The probabilities are those of the people of the training, a mixture; an observation does not
 tell which kind a person is. ``recalibrated`` states ECE and Brier score after a recalibration
 (``recalibration.py``) by few and by many predictions beside the same kind of people: what
-outcomes observed in one cell correct. It is measured on the half of the predictions that the
-fit did not see; the other prediction of an episode may be in the fitted half.
+outcomes observed in one cell correct. It is measured on the half of the episodes that the fit
+did not see.
 
 Source: Guo et al., *On calibration of modern neural networks* (2017); Brier (1950).
 """
@@ -96,10 +95,10 @@ def run_calibration(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
         kept = np.concatenate(rule.rows)
         found = np.concatenate(rule.predictions)
         row: dict[str, Any] = {"name": name, "n": n, "predictions": len(kept)}
-        corrected = _recalibrated(found, run.outcome[kept], request.seed)
+        corrected = _recalibrated(found, run.outcome, kept, request.seed)
         for k, (what, outcome) in enumerate((("success", SUCCESS), ("contact", COLLISION))):
             happened = run.outcome[kept] == outcome
-            row[what] = calibration(found[:, k], found[:, 2 + k], happened, request.seed)
+            row[what] = calibration(found[:, k], found[:, 2 + k], happened, kept, request.seed)
             row[what]["recalibrated"] = {
                 size: _errors(one[:, k], happened) for size, one in corrected.items()
             }
@@ -109,7 +108,11 @@ def run_calibration(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
 
 
 def calibration(
-    probability: Float, spread: Float, happened: NDArray[np.bool_], seed: int
+    probability: Float,
+    spread: Float,
+    happened: NDArray[np.bool_],
+    episode: NDArray[np.int64],
+    seed: int,
 ) -> dict[str, Any]:
     """Return measures of calibration of predicted probabilities.
 
@@ -117,12 +120,13 @@ def calibration(
         probability: Predictions, shape (n,).
         spread: Half widths of their 95 % intervals, shape (n,).
         happened: Whether each event happened, shape (n,).
+        episode: Number of the episode of each, shape (n,).
         seed: Seed of the chance level.
     """
     order = np.argsort(probability, kind="stable")
     parts = np.array_split(order, BINS)
-    chance = np.random.default_rng(seed).random((200, len(probability))) < probability
-    floor = [_ece(probability, one, parts) for one in chance]
+    drawn = np.random.default_rng(seed).random((200, episode.max(initial=0) + 1))
+    floor = [_ece(probability, one[episode] < probability, parts) for one in drawn]
     rate = happened.mean()
     bins = [
         {
@@ -144,20 +148,24 @@ def calibration(
     }
 
 
-def _recalibrated(found: Float, outcome: NDArray[np.int64], seed: int) -> dict[str, Float]:
-    """Return probabilities after recalibrations, each half by predictions of the other one.
+def _recalibrated(
+    found: Float, outcome: NDArray[np.int64], episode: NDArray[np.int64], seed: int
+) -> dict[str, Float]:
+    """Return probabilities after recalibrations, each half of the episodes by the other one.
 
     Args:
-        found: Predicted probabilities of success and contact, in the first columns.
-        outcome: Outcome of each episode, shape (n,).
+        found: Predicted probabilities of success and contact, in the first columns of n rows.
+        outcome: Outcome of each episode, shape (n_episodes,).
+        episode: Number of the episode of each prediction, shape (n,).
         seed: Seed of the halves.
 
     Returns:
         Probabilities, shape (n, 3), after recalibration by FEW predictions and by a half.
     """
     predicted = with_timeout(found[:, 0], found[:, 1])
-    label = np.where(outcome == SUCCESS, 0, np.where(outcome == COLLISION, 1, 2))
-    halves = np.array_split(np.random.default_rng(seed).permutation(len(label)), 2)
+    label = np.where(outcome == SUCCESS, 0, np.where(outcome == COLLISION, 1, 2))[episode]
+    place = np.random.default_rng(seed).permutation(len(outcome))[episode]
+    halves = np.split(np.argsort(place), [np.count_nonzero(2 * place < len(outcome))])
     corrected = {name: np.empty((len(label), 3)) for name in ("few", "half")}
     for rows, others in (halves, halves[::-1]):
         for name, fitted in (("few", others[:FEW]), ("half", others)):
