@@ -25,6 +25,8 @@ KEEP = 0.05
 """Share of the steps that are kept; first steps are always kept."""
 EPOCHS, BATCH, RATE, DECAY = 12, 1024, 1e-3, 1e-3
 """Passes over the data, size of a minibatch, learning rate and weight decay."""
+LEAST_BATCHES = 16
+"""Fewest minibatches of a pass; they are smaller where there is little data."""
 TIME_WEIGHT = 0.05
 """Weight of the error of the time, relative to the cross-entropy."""
 

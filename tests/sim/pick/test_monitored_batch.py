@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from app.sim.cells.cell import load_cell
-from app.sim.collision.checker import Shapes
+from app.sim.collision.checker import Shapes, capsule_shapes
+from app.sim.human import model as human
 from app.sim.pick.batch import WHOLE_PICK, PickBatch
 from app.sim.pick.kernels.grasp import GraspRules
 from app.sim.pick.monitored_batch import AMONG_HANDS, MonitoredPickBatch
@@ -33,6 +34,16 @@ def straight(batch: PickBatch) -> np.ndarray:
     low = (state.phase == 1)[:, None]
     wanted = np.where(low, state.q_grasp, state.q_goal)
     return np.clip(3.0 * (wanted - state.q)[:, :5] / 0.5, -1, 1).astype(np.float32)
+
+
+def people_of(batch: PickBatch, e: int) -> Shapes:
+    """Return the capsules of the workers of an environment from their joints and sizes."""
+    people, sized = batch.state.people, []
+    for q, size in zip(people.q[e], people.size[e], strict=True):
+        ends = human.capsules(q, size, CELL.floor_z)
+        sized.append((ends, human.capsule_radii(size)))
+    ends, radii = (np.concatenate(part) for part in zip(*sized, strict=True))
+    return capsule_shapes(ends, radii)
 
 
 def to_the_end(batch: MonitoredPickBatch) -> MonitoredEpisodes:
@@ -63,12 +74,11 @@ def test_each_period_is_what_the_layer_decides():
     layer, slowed = SafetyLayer(batch.arm, AMONG_HANDS), 0
     for _ in range(60):
         q, qd = batch.state.q.copy(), batch.state.qd.copy()
-        columns = batch.state.people.columns.copy()
+        people = people_of(batch, 7)
         batch.step(straight(batch), auto_reset=False)
         e = 7  # the work space holds the command of the environment stepped last
         if batch.state.outcome[e] != RUNNING:
             break
-        people = Shapes(columns=columns[e], cylinders=np.zeros((0, 4)))
         done = layer.decide(q[e], qd[e], batch._work.c, batch._work.d, people)
         np.testing.assert_array_equal(batch.state.q[e], done.q)
         slowed += done.override < 1.0

@@ -208,7 +208,7 @@ def move(
     if people.yielding > 0.0:
         store_clearances(rows, e, crowd)
     copy_capsules(robot.columns, state.robot[e])
-    copy_capsules(crowd.columns, rows.columns[e])
+    copy_rows(crowd.columns, rows.columns[e])
     return kind != NO_CONTACT, unfeasible
 
 
@@ -231,7 +231,7 @@ def begin(state: EpisodeState, e: int, time_limit: float, work: StepWorkspace) -
     """
     state.distance[e] = distance_to(state.goal[e], work.robot)
     copy_capsules(work.robot.columns, state.robot[e])
-    copy_capsules(work.crowd.columns, state.people.columns[e])
+    copy_rows(work.crowd.columns, state.people.columns[e])
     state.time_left[e], state.elapsed[e] = time_limit, 0.0
     state.touched[e], state.outcome[e] = 0, RUNNING
 

@@ -145,7 +145,7 @@ def _people_after(
     else:
         advance_people(people, state.people, e, state.robot[e], arm.dt, work.crowd.away)
     place_people(people, state.people, e, work.crowd)
-    copy_capsules(work.crowd.columns, state.people.columns[e])
+    copy_rows(work.crowd.columns, state.people.columns[e])
     copy_rows(work.crowd.columns, trial.columns1)
     for k in range(trial.cylinders1.shape[0]):
         for i in range(3):
