@@ -62,6 +62,8 @@ class KnownPerson(NamedTuple):
     """Origin of the speeds."""
     age_s: float = 0.0
     """Age of that observation [s]."""
+    displaced_m: float = 0.0
+    """Distance of its predicted parts from where they were last measured [m]."""
     estimate: PersonEstimate | None = None
     """Estimate from key-points; None without key-points."""
 
@@ -250,6 +252,7 @@ def _from_tracker(
         person=person_from_estimate(estimate),
         observed=observed,
         age_s=known.observed_age_s[i],
+        displaced_m=0.0 if last is None else last.displaced_m,
         source="tracker",
         speeds="estimated",
         estimate=estimate,

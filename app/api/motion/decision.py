@@ -77,6 +77,7 @@ def decide(
         None if as_seen else [last[i] for i in monitored],
         safety_settings(cell),
         max((one.age_s for one in people), default=0.0),
+        max((one.displaced_m for one in people), default=0.0),
     )
     with request.robot.faults_in_place():
         decision = decider.decide(question)

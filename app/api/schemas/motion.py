@@ -99,6 +99,7 @@ class MotionRequest(Body):
         observed: Sequence[Person] | None,
         own: SafetySettings,
         age_s: float,
+        displaced_m: float,
     ) -> MotionQuestion:
         """Return the question.
 
@@ -107,8 +108,13 @@ class MotionRequest(Body):
             observed: The people as last observed; None: like ``people``.
             own: The cell's safety settings.
             age_s: Age of the oldest observation of a tracker [s].
+            displaced_m: Distance of people from where they were observed [m]; it counts as
+                the time in which they move as far, unless the settings say that they stand.
         """
         robot = self.robot
+        safety = None if self.safety is None else self.safety.to_domain(own)
+        if safety is not None and safety.human_speed > 0.0:
+            age_s += displaced_m / safety.human_speed
         return MotionQuestion(
             q=robot.joints(robot.q),
             qd=robot.joints(robot.qd),
@@ -121,7 +127,7 @@ class MotionRequest(Body):
             rollout=self.rollout,
             time_left_s=self.time_left_s,
             elapsed_s=self.elapsed_s,
-            safety=None if self.safety is None else self.safety.to_domain(own),
+            safety=safety,
             age_s=self.age_s + age_s,
         )
 

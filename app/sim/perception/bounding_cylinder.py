@@ -82,6 +82,7 @@ _BONES = (
     *((f"{part}_{s}", "nose", 0.16) for part in ("eye", "ear") for s in "rl"),
 )
 """Largest bone lengths [m], at least those of the 95th percentile of men."""
+_WRISTS = K["wrist_r"], K["wrist_l"]
 _HIPS = tuple(K[name] for name in ("mid_hip", "hip_r", "hip_l"))
 _BOUNDED = tuple(
     k
@@ -89,6 +90,8 @@ _BOUNDED = tuple(
     if k not in _HIPS and any(name in bone[:2] for bone in _BONES)
 )
 """Key-points that widen the cylinder when missing: arms, neck and face."""
+HAND_M = 0.22
+"""Length of a hand beyond the wrist [m], at least that of the 95th percentile of men."""
 
 
 def _bone_distances() -> Vec:
@@ -157,6 +160,7 @@ def _unseen_reach(points: Vec, seen: NDArray[np.bool_], center: Vec) -> tuple[fl
         return 0.0, -np.inf
     there = np.flatnonzero(seen)
     lengths = _BONE_DISTANCES[unseen][:, there]
+    lengths += HAND_M * np.isin(unseen, _WRISTS)[:, None]
     if not np.isfinite(lengths).any():  # Only legs are seen: the whole person is above them.
         lengths = np.full_like(lengths, _BONE_DISTANCES[K["wrist_r"], K["mid_hip"]] + 1.0)
     away = np.linalg.norm(points[there, :2] - center, axis=1)

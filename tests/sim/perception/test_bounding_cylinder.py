@@ -5,8 +5,9 @@ import pytest
 
 from app.errors import InvalidInput
 from app.sim.human import model as human
+from app.sim.human.anthropometry import percentile_body
 from app.sim.perception.bounding_cylinder import CylinderSettings, bounding_box, safety_cylinder
-from app.sim.perception.keypoints import GROUPS, K
+from app.sim.perception.keypoints import GROUPS, K, keypoints_of
 from tests.sim.tracked_person import CELL, seen, work
 
 BARE = CylinderSettings(flesh_margin=0.0)
@@ -58,6 +59,22 @@ def test_an_arm_never_seen_is_inside_wherever_it_is() -> None:
             partial[list(GROUPS["face"])] = np.nan
             found = safety_cylinder(partial)
             assert found is not None and found.contains(points)
+
+
+@pytest.mark.parametrize("hidden", [["wrist_r"], ["wrist_r", "elbow_r"]])
+def test_the_hand_of_an_unseen_stretched_arm_is_inside(hidden: list[str]) -> None:
+    size = percentile_body(95.0, 95.0, 50.0, CELL.human.pelvis_height).vector(CELL.floor_z)
+    radii = human.capsule_radii(size)[:10, None]  # the legs are taken to stand below the hips
+    for lean, lift in ((0.0, 0.0), (0.3, 0.5), (0.6, 1.5)):
+        q = human.rest_posture(0.0, 1.45, -np.pi / 2.0)
+        q[[3, 10, 11, 13]] = lean, 1.57, lift, 0.0
+        points = keypoints_of(q, size, CELL.floor_z)
+        points[[K[name] for name in hidden]] = np.nan
+        found = safety_cylinder(points)
+        assert found is not None
+        ends = human.capsules(q, size, CELL.floor_z)[:10, :, :2]
+        away = np.linalg.norm(ends - found.center, axis=2) + radii
+        assert away.max() <= found.radius
 
 
 @pytest.mark.parametrize("names", [["neck"], ["wrist_r"], ["mid_hip", "nose"], ["ankle_l"]])

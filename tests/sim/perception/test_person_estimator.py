@@ -140,6 +140,27 @@ def test_exchanged_sides_are_exchanged_back_and_named(group: str, flag: str) -> 
     np.testing.assert_allclose(wrong.person.q, right.person.q)
 
 
+def test_a_hand_that_turns_back_unseen_is_within_reach_of_its_prediction() -> None:
+    speed, swing = 1.6, 2.385  # of the hand [m/s] and of the shoulder [rad/s]
+    estimator, short, bare = PersonEstimator(CELL.body), [], []
+    for k in range(25):
+        q = human.rest_posture(0.0, 1.45, -np.pi / 2.0)
+        q[[10, 13]] = 0.1 + swing / 30.0 * (k if k < 14 else 28 - k), 0.5
+        points = seen(q)
+        if k > 14:
+            points[[K["elbow_r"], K["wrist_r"]]] = np.nan
+        found = estimator.update(k / 30.0, points)
+        assert found.person is not None and not found.held
+        tip = human.capsules(q, CELL.body, CELL.floor_z)[8, 1]
+        hand = human.capsules(found.person.q, CELL.body, CELL.floor_z)[8]
+        away = np.linalg.norm(hand[1] - tip)
+        assert (found.displaced_m > 0.0) == (k > 14)
+        if k > 14:
+            bare.append(away - speed * found.carried_s)
+            short.append(bare[-1] - found.displaced_m)
+    assert max(short) < 0.0 < 0.1 < max(bare)
+
+
 def test_exchanged_sides_in_the_first_frame_are_seen_by_the_direction_the_person_faces() -> (
     None
 ):
