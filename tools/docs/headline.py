@@ -87,7 +87,7 @@ def lines(results: Path) -> list[list[str]] | None:
             f"thesis: {THESIS['reach-targets']}",
         ],
         [
-            "reach under SSM, crossing people, measured velocity",
+            "reach under SSM, crossing people, velocity known exactly",
             "robot brought to standstill",
             f"{rollout['n']:,}",
             f"{percent(_opposite(rollout['never_at_standstill']))}; "

@@ -9,9 +9,11 @@ future can solve it. A resimulation is
   straight to a configuration at the goal; or
 - *disturbed*: to a configuration until some time, then a policy with noise on its actions.
 
-For unsolved episodes there are two bounds (docs/method.md 2.6): an episode is *provably
-unsolvable* if a person covers the goal, or touches the robot's base, from before the earliest
-possible arrival; a collision is *unavoided* if all resimulations, including retreats, collide.
+Unsolved episodes have two marks (docs/method.md 2.6): an episode is *presumably unsolvable* if a
+person covers the goal, or touches the robot's base, from before the earliest arrival that was
+found; a collision is *unavoided* if all resimulations, including retreats, collide. The first is
+no proof: a tool that points at the person needs less room than its radius about the goal, and
+an earlier arrival may exist.
 """
 
 from collections.abc import Callable, Sequence
@@ -240,10 +242,10 @@ def future_cylinders(batch: ReachBatch, n_periods: int) -> Vec:
     return np.array(found)
 
 
-def provably_unsolvable(
+def presumably_unsolvable(
     walks: Vec, goals: Vec, soonest: Vec, dt: float, tool_radius: float, base_radius: float
 ) -> NDArray[np.bool_]:
-    """Return which episodes cannot be solved, shape (n,).
+    """Return which episodes presumably cannot be solved, shape (n,).
 
     Either a person covers every position of success in every control cycle in which the tool
     could be there, or a person touches the fixed base before the earliest possible arrival.

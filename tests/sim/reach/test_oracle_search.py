@@ -9,7 +9,7 @@ from app.sim.reach.oracle_search import (
     OracleSearch,
     copy_rows,
     future_cylinders,
-    provably_unsolvable,
+    presumably_unsolvable,
 )
 from app.sim.scenario.kernels.episode import RUNNING, SUCCESS
 from tests.policies.straight_controller import Straight
@@ -106,7 +106,7 @@ def test_what_is_covered_for_good_or_pinned_at_the_base_is_never_possible():
     walks[:, 3, 0] = (0.0, 3.0, 0.4)
     walks[60:, 3, 0] = (0.0, 0.4, 0.4)
     soonest = np.full(4, 1.0)
-    found = provably_unsolvable(walks, goals, soonest, 0.02, 0.04, 0.08)
+    found = presumably_unsolvable(walks, goals, soonest, 0.02, 0.04, 0.08)
     assert found.tolist() == [True, False, True, False]
 
 
@@ -116,5 +116,5 @@ def test_what_was_never_possible_is_never_solved():
     search.scripted(np.arange(300), 12)
     walks = future_cylinders(batch_of(300), 250)
     soonest = np.full(300, 0.5)
-    never = provably_unsolvable(walks, batch.state.goal, soonest, CELL.robot.dt, 0.04, 0.08)
+    never = presumably_unsolvable(walks, batch.state.goal, soonest, CELL.robot.dt, 0.04, 0.08)
     assert not (never & (search.resimulations.reached > 0)).any()

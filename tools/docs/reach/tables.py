@@ -69,7 +69,7 @@ COLUMNS: Mapping[str, Mapping[str, str]] = {
     "reach-oracle": {
         "n": "n",
         "solvable": "solvable",
-        "never": "proven unsolvable",
+        "never": "presumed unsolvable",
         "undecided": "undecided",
         "doomed": "every candidate collided",
         "resimulations": "simulated candidates",

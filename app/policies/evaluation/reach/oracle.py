@@ -5,7 +5,7 @@ the same people. Episodes that the policy does not solve are resimulated with ot
 motions (``app/sim/reach/oracle_search.py``) until one reaches the goal or the search ends.
 ``solvable`` is a lower bound on the share of solvable episodes; a causal policy cannot be
 expected to reach it, because a resimulation knows the future motion of people. ``never`` are
-episodes that are proven unsolvable; the rest is ``undecided``. ``doomed`` are episodes in which
+episodes that are presumed unsolvable; the rest is ``undecided``. ``doomed`` are episodes in which
 every resimulation, including retreats, ended in a collision: an upper bound on the share of
 unavoidable collisions.
 
@@ -41,7 +41,7 @@ from app.sim.reach.oracle_search import (
     OracleSearch,
     copy_rows,
     future_cylinders,
-    provably_unsolvable,
+    presumably_unsolvable,
 )
 from app.sim.robot.capsules import load_robot_capsules
 
@@ -162,7 +162,7 @@ def run_oracle(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
     soonest = soonest_arrivals(cell, settings, goals, request.seed)
     base = load_robot_capsules(cell.robot.tool_length, cell.robot.tool_radius).radius[0]
     walks = future_cylinders(batch, round(settings.time_limit_s / arm.dt))
-    never = provably_unsolvable(
+    never = presumably_unsolvable(
         walks, goals, soonest, arm.dt, cell.robot.tool_radius, float(base)
     )
     row = verdict(search.search, never, bench.targets, goals)
