@@ -9,11 +9,11 @@ future can solve it. A resimulation is
   straight to a configuration at the goal; or
 - *disturbed*: to a configuration until some time, then a policy with noise on its actions.
 
-Unsolved episodes have two marks (docs/method.md 2.6): an episode is *presumably unsolvable* if a
-person covers the goal, or touches the robot's base, from before the earliest arrival that was
-found; a collision is *unavoided* if all resimulations, including retreats, collide. The first is
-no proof: a tool that points at the person needs less room than its radius about the goal, and
-an earlier arrival may exist.
+Unsolved episodes have two marks (docs/method.md 2.6): an episode is *presumably unsolvable* if
+a person covers the goal, or touches the robot's base, from before the earliest arrival that was
+found; a collision is *unavoided* if all resimulations, including retreats, collide. The first
+is no proof: a tool that points at the person needs less room than its radius about the goal,
+and an earlier arrival may exist.
 """
 
 from collections.abc import Callable, Sequence

@@ -5,9 +5,9 @@ the same people. Episodes that the policy does not solve are resimulated with ot
 motions (``app/sim/reach/oracle_search.py``) until one reaches the goal or the search ends.
 ``solvable`` is a lower bound on the share of solvable episodes; a causal policy cannot be
 expected to reach it, because a resimulation knows the future motion of people. ``never`` are
-episodes that are presumed unsolvable; the rest is ``undecided``. ``doomed`` are episodes in which
-every resimulation, including retreats, ended in a collision: an upper bound on the share of
-unavoidable collisions.
+episodes that are presumed unsolvable; the rest is ``undecided``. ``doomed`` are episodes in
+which every resimulation, including retreats, ended in a collision: an upper bound on the share
+of unavoidable collisions.
 
 ==============  ==============================================================================
 stage           resimulations of each unsolved episode
