@@ -40,7 +40,7 @@ older than stated. Let ``P`` be the people as observed at ``t_k``, when a path w
    ``t + R`` is where the decision had it at ``t``, while people have moved for R more: this is
    R more latency.
 5. *With known velocities* the same holds for people whose speed in any direction exceeds the
-   observed one by no more than the allowed change at every time between two observations. A
+   observed one by no more than the allowed change until ``T_r`` after the observation. A
    person faster by a further ``w`` is nearer than D by at most ``w (T_r + T_s)`` when the robot
    rests, because the stop is executed from the next observation on: there is no contact in
    motion while that is less than D.

@@ -19,7 +19,7 @@ from app.sim.sorting.kernels.task import (
 )
 
 GOAL_TRIES = 20
-"""Draws of a goal before the old one is kept."""
+"""Draws of a goal before one that is reached already is kept."""
 
 
 @kernel()
