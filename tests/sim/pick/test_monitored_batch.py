@@ -68,6 +68,17 @@ def test_layer_changes_nothing_in_an_empty_cell():
     assert (guarded.state.outcome == SUCCESS).all()
 
 
+@pytest.mark.parametrize("guarded", [True, False])
+def test_capsules_of_workers_are_stored_whole(guarded):
+    batch = monitored(8) if guarded else PickBatch(CELL, 8, 3, WHOLE_PICK)
+    batch.reset()
+    for _ in range(5):
+        for e in range(8):
+            stored = batch.state.people.columns[e]
+            np.testing.assert_allclose(stored, people_of(batch, e).columns, atol=1e-9)
+        batch.step(straight(batch), auto_reset=False)
+
+
 def test_each_period_is_what_the_layer_decides():
     batch = monitored(8)
     batch.reset()
