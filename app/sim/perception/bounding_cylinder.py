@@ -14,6 +14,7 @@ always the least. Flesh margin, hold time and the widening are ours. Unseen legs
 stand below the hips (tables hide them as a rule).
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -82,7 +83,7 @@ _BONES = (
     *((f"{part}_{s}", "nose", 0.16) for part in ("eye", "ear") for s in "rl"),
 )
 """Largest bone lengths [m], at least those of the 95th percentile of men."""
-_WRISTS = K["wrist_r"], K["wrist_l"]
+_WRISTS, _ELBOWS = (tuple(K[f"{part}_{s}"] for s in "rl") for part in ("wrist", "elbow"))
 _HIPS = tuple(K[name] for name in ("mid_hip", "hip_r", "hip_l"))
 _BOUNDED = tuple(
     k
@@ -151,6 +152,25 @@ def safety_cylinder(
         top=max(top, high) + settings.flesh_margin,
         velocity=np.zeros(2) if velocity is None else np.array(velocity),
     )
+
+
+def greatest_distance(before: Vec, now: Vec, members: Sequence[int]) -> float:
+    """Return the greatest distance between two sets of key-points, and of their hands [m].
+
+    Args:
+        before: Key-points [m], shape (25, 3), NaN where missing.
+        now: The others.
+        members: Key-points that count; hands are stretched along the forearms.
+    """
+    moved = [now[members] - before[members]]
+    for wrist, elbow in zip(_WRISTS, _ELBOWS, strict=True):
+        tips = []
+        for points in (before, now):
+            along = points[wrist] - points[elbow]
+            tips.append(points[wrist] + HAND_M * along / max(1e-6, np.linalg.norm(along)))
+        moved.append((tips[1] - tips[0])[None])
+    away = np.linalg.norm(np.concatenate(moved), axis=1)
+    return float(np.max(away, where=np.isfinite(away), initial=0.0))
 
 
 def _unseen_reach(points: Vec, seen: NDArray[np.bool_], center: Vec) -> tuple[float, float]:

@@ -40,10 +40,10 @@ from app.sim.human import model as human
 from app.sim.human.kernels.kinematics import N_SIZE
 from app.sim.human.person import Person
 from app.sim.perception.bounding_cylinder import (
-    HAND_M,
     CylinderSettings,
     SafetyCylinder,
     bounding_box,
+    greatest_distance,
     safety_cylinder,
 )
 from app.sim.perception.kalman_filter import FilterSettings, PointFilter
@@ -81,8 +81,6 @@ _SWAPPED: dict[Group, Flag] = {"arms": "arms-swapped", "legs": "legs-swapped"}
 """Groups with a side check; eyes and ears are too close to each other for it."""
 _DECIDING = [K[name] for name in (*FITTED, "mid_hip", "hip_r", "hip_l")]
 """Key-points that determine joint angles."""
-_CARRIED = [*_DECIDING, -2, -1]
-"""These key-points, and the finger-tips behind all key-points."""
 _MIRRORED = "arms and legs are mirrored (does one axis point the other way here?)"
 
 
@@ -152,16 +150,6 @@ class PersonEstimate:
     def stale(self) -> bool:
         """Whether no credible key-point is recent."""
         return "stale" in self.flags or "never-seen" in self.flags
-
-
-def _with_hands(points: Vec) -> Vec:
-    """Return key-points and the tips of stretched hands [m], shape (27, 3)."""
-    tips = []
-    for side in "rl":
-        wrist, elbow = points[K[f"wrist_{side}"]], points[K[f"elbow_{side}"]]
-        along = wrist - elbow
-        tips.append(wrist + HAND_M * along / max(float(np.linalg.norm(along)), 1e-6))
-    return np.vstack([points, tips])
 
 
 class PersonEstimator:
@@ -369,7 +357,7 @@ class PersonEstimator:
             unusable=() if self._frame is None else self._frame.unusable,
             implausible=None if self._frame is None else self._frame.implausible,
             carried_s=self._carried_at(t),
-            displaced_m=self._displaced(points),
+            displaced_m=greatest_distance(self._measured, points, _DECIDING),
         )
 
     def _carried_at(self, t: float) -> float:
@@ -377,12 +365,6 @@ class PersonEstimator:
         carried = t - self._points.seen_at[_DECIDING]
         known = carried <= self.settings.filter.hold_s
         return float(carried[known].max(initial=0.0))
-
-    def _displaced(self, points: Vec) -> float:
-        """Return the greatest distance of predicted key-points from their measurement [m]."""
-        before, now = (_with_hands(one)[_CARRIED] for one in (self._measured, points))
-        away = np.linalg.norm(now - before, axis=1)
-        return float(np.max(away, where=np.isfinite(away), initial=0.0))
 
     def person_at(self, t: float) -> Person | None:
         """Return only joint angles and speeds of :meth:`at` at ``t`` [s]."""
