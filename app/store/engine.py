@@ -262,13 +262,16 @@ def _checked_url(database_url: str) -> sa.URL:
         if unknown:
             rule = "is no parameter of a SQLite file"
             raise InvalidInput("database_url", unknown[0], rule, ("timeout",))
-        _longest_wait(url)
         url = url.set(database=str(path))
     return url
 
 
 def _longest_wait(url: sa.URL) -> float:
-    """Return the time for which a writer of a SQLite file waits [s]."""
+    """Return the time for which a writer of a SQLite file waits [s].
+
+    Raises:
+        InvalidInput: The URL has another time than a number of seconds in (0, MAX_TIMEOUT_S].
+    """
     given = str(url.query.get("timeout", BUSY_TIMEOUT_S))
     try:
         longest = float(given)

@@ -159,8 +159,9 @@ def greatest_distance(before: Vec, now: Vec, members: Sequence[int]) -> float:
 
     Args:
         before: Key-points [m], shape (25, 3), NaN where missing.
-        now: The others.
-        members: Key-points that count; hands are stretched along the forearms.
+        now: The same key-points at another time [m], shape (25, 3).
+        members: Indices of the key-points that count; those that are missing in one set do not.
+            Hands are stretched along the forearms.
     """
     moved = [now[members] - before[members]]
     for wrist, elbow in zip(_WRISTS, _ELBOWS, strict=True):

@@ -144,7 +144,8 @@ class PersonEstimate:
     carried_s: float = 0.0
     """Longest prediction of an unseen key-point of trunk or arms [s], at most the hold time."""
     displaced_m: float = 0.0
-    """Greatest distance of such a prediction, or of its hand, from the last measurement [m]."""
+    """Greatest distance of a key-point of trunk or arms, or of a hand, at ``t`` from where it
+    was last measured [m]."""
 
     @property
     def stale(self) -> bool:

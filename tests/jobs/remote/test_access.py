@@ -1,7 +1,7 @@
 """A worker on another machine reads and writes what the database would give and take."""
 
 from collections.abc import Callable, Iterator
-from contextlib import closing
+from contextlib import closing, contextmanager
 from hashlib import sha256
 from http.client import HTTPConnection
 from pathlib import Path
@@ -30,7 +30,7 @@ from tests.jobs.remote.serving import TOKEN
 from tests.policies.evaluation.sorting_players import untrained
 from tests.sim.recorded_person import csv_text, working
 from tests.support.databases import SQLITE_ONLY
-from tests.support.failing_proxy import failing_proxy
+from tests.support.failing_proxy import FailingProxy, failing_proxy
 
 pytestmark = SQLITE_ONLY
 SPEC = {"kind": "train", "preset": "sorting-e0-dqn", "seed": 1}
@@ -274,27 +274,31 @@ def test_server_that_does_not_answer_may_answer_later(claim: Claim) -> None:
     assert found.value.short == "server unreachable"
 
 
-@pytest.mark.parametrize("status", [408, 429, 502])
-def test_request_that_a_proxy_refused_for_now_is_repeated(
-    address: str, claim: Claim, status: int
-) -> None:
+@contextmanager
+def through_proxy(address: str, claim: Claim) -> Iterator[tuple[FailingProxy, ServiceAccess]]:
+    """Yield a proxy before the server, and a worker's access to its job through it."""
     with (
         failing_proxy(address) as proxy,
         closing(ServiceConnection(proxy.address, TOKEN, claim)) as service,
     ):
+        yield proxy, ServiceAccess(service)
+
+
+@pytest.mark.parametrize("status", [408, 429, 502])
+def test_request_that_a_proxy_refused_for_now_is_repeated(
+    address: str, claim: Claim, status: int
+) -> None:
+    with through_proxy(address, claim) as (proxy, access):
         proxy.failures = [status]
         with pytest.raises(ServerUnreachable, match=str(status)):
-            ServiceAccess(service).record_progress(64, {"reward": 1.0}, None)
-        ServiceAccess(service).record_progress(64, {"reward": 1.0}, None)
+            access.record_progress(64, {"reward": 1.0}, None)
+        access.record_progress(64, {"reward": 1.0}, None)
 
 
 def test_worker_sees_a_cancel_after_a_heartbeat_that_failed(
     store: Store, address: str, claim: Claim
 ) -> None:
-    with (
-        failing_proxy(address) as proxy,
-        closing(ServiceConnection(proxy.address, TOKEN, claim)) as service,
-    ):
+    with through_proxy(address, claim) as (proxy, access):
 
         def run(worker: JobWorker) -> None:
             proxy.failures = [500, 500]
@@ -302,7 +306,7 @@ def test_worker_sees_a_cancel_after_a_heartbeat_that_failed(
             jobs.request_cancel(store, claim.job_id)
             wait_until(worker.should_stop)
 
-        assert JobWorker(ServiceAccess(service)).execute(run) == 0
+        assert JobWorker(access).execute(run) == 0
     assert jobs.get_job(store, claim.job_id).state == "cancelled"
 
 
