@@ -6,7 +6,9 @@ snapshot: ``POST /v1/task-selection`` returns the same choice and values for the
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Annotated, Literal
+
+from pydantic import Field
 
 from app.live.commands import Mode
 from app.live.reach.snapshot import ReachSnapshot
@@ -20,6 +22,8 @@ from app.sim.pick.task_policy import Candidate, Decision
 PickPhase = Literal["approach", "descend", "lift"]
 PICK_PHASES: tuple[PickPhase, ...] = ("approach", "descend", "lift")
 """Phases of a pick, by their numbers in ``pick/kernels/grasp.py``."""
+MAX_REFUSED = 32
+"""Largest number of refused commands in a snapshot."""
 Status = Literal[
     "moving",
     "picking",
@@ -244,8 +248,8 @@ class WorldSnapshot(ReadModel):
     """simulated seconds per second, as requested last"""
     commands: int = 0
     """number of the last command that was applied or refused, from 1"""
-    refused: RefusedCommand | None = None
-    """last command that was refused after it had been queued"""
+    refused: Annotated[tuple[RefusedCommand, ...], Field(max_length=MAX_REFUSED)] = ()
+    """newest commands that were refused after they had been queued, oldest first"""
     status: Status
     """what the robot does"""
     message: str

@@ -52,9 +52,9 @@ def test_slow_server_is_asked_for_jobs_once_at_a_time(open_page: Callable[..., P
         pass
 
 
-def test_refusal_stays_when_another_command_succeeds(open_page: Callable[..., Page]) -> None:
+def test_refusals_stay_when_another_command_succeeds(open_page: Callable[..., Page]) -> None:
     page = open_page(scene=False)
-    refusals = iter([{"detail": "cube1 is refused"}])
+    refusals = iter([{"detail": "cube1 is refused"}, {"detail": "cube2 is refused"}])
 
     def answer(route: Route) -> None:
         body = next(refusals, None)
@@ -65,12 +65,13 @@ def test_refusal_stays_when_another_command_succeeds(open_page: Callable[..., Pa
 
     page.route("**/v1/worlds/main/commands", answer)
     page.evaluate(
-        """() => ["cube1", "dock1"].forEach((id) =>
+        """() => ["cube1", "cube2", "dock1"].forEach((id) =>
           document.querySelector(`[data-goal=${id}]`).click())"""
     )
     pressed = page.locator('[data-goal="dock1"]').get_attribute("aria-pressed")
     expect(page.locator('[data-role="link"]')).to_have_attribute("data-pending", "0")
-    expect(page.locator(".banner.bad")).to_contain_text("cube1 is refused")
+    for name in ("cube1", "cube2"):
+        expect(page.locator(".banner.bad")).to_contain_text(f"{name} is refused")
     page.click('[data-goal="dock1"]')
     expect(page.locator('[data-goal="dock1"]')).to_have_attribute("aria-pressed", str(pressed))
     expect(page.locator(".banner.bad")).to_have_count(0)

@@ -114,6 +114,20 @@ def test_goal_editor_says_why_a_block_cannot_be_asked_for(
     until(sorting, lambda now: now["sorting"]["goal"] == [], 60.0)
 
 
+def test_page_counts_the_commands_that_a_world_refuses(
+    open_page: Callable[..., Page], sorting: str
+) -> None:
+    page = open_page(scene=False)
+    page.click('[data-cell="cell7"]')
+    page.evaluate(
+        """() => [1, 2, 3].forEach(() =>
+          document.querySelector('[data-add="red-medium"]').click())"""
+    )
+    expect(page.locator(".banner.bad")).to_contain_text("cell7")
+    expect(page.locator(".banner.bad")).to_contain_text("(2 commands)")
+    assert [one["place"] for one in task(sorting)["pieces"]].count("cell7") == 1
+
+
 def test_sorting_page_fits_a_phone(open_page: Callable[..., Page], sorting: str) -> None:
     page = open_page(PHONE, scene=False)
     assert state(sorting)["cell"] == "sorting-e0"

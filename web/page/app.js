@@ -56,10 +56,7 @@ function App() {
       <${Link} cell=${cell} />
       <a class="docs" href="docs">API<${Icon} name="external" /></a>
     </header>
-    ${cell.error && html`<p class="banner bad" role="alert"><${Icon} name="alert" />
-      <span>${cell.error.message}</span>
-      <button type="button" class="quiet-button" aria-label="Dismiss" onClick=${cell.dismiss}>
-        <${Icon} name="close" /></button></p>`}
+    ${cell.errors.length > 0 && html`<${Refusals} errors=${cell.errors} onDismiss=${cell.dismiss} />`}
     <${Stale} cell=${cell} />
     <main class="stage">
       <${Scene} cell=${cell} />
@@ -117,6 +114,17 @@ function Link({ cell: { link, world, heardAt, pending } }) {
   return html`<span class=${`link ${tone}`} role="status" data-role="link"
     data-pending=${pending}><i></i><span>${text}${
     seconds !== null && html`<span aria-hidden="true"> for ${seconds} s</span>`}</span></span>`;
+}
+
+/** Each reason for which commands failed, with their number where it is not one. */
+function Refusals({ errors, onDismiss }) {
+  const counts = new Map();
+  for (const { message } of errors) counts.set(message, (counts.get(message) ?? 0) + 1);
+  return html`<div class="banner bad" role="alert"><${Icon} name="alert" />
+    <div>${[...counts].map(([message, n]) => html`<p key=${message}>${message}${
+      n > 1 && ` (${n} commands)`}</p>`)}</div>
+    <button type="button" class="quiet-button" aria-label="Dismiss" onClick=${onDismiss}>
+      <${Icon} name="close" /></button></div>`;
 }
 
 const CAUSES = {

@@ -23,8 +23,9 @@ export class Unconfirmed {
 
   /** Take in a snapshot of the world. */
   see({ commands, refused }) {
+    const reasons = new Map(refused.map(({ number, reason }) => [number, reason]));
     for (const one of [...this.#waiting]) {
-      if (refused?.number === one.number) one.refused(refused.reason);
+      if (reasons.has(one.number)) one.refused(reasons.get(one.number));
       else if (commands >= one.number) one.done();
     }
   }

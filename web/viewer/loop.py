@@ -11,6 +11,7 @@ several steps are drawn as one frame. Without a viewer nothing is drawn.
 import logging
 import threading
 import time
+from collections import deque
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
@@ -26,7 +27,7 @@ from app.live.lateness import Lateness
 from app.live.pick.risk_worker import RiskWorker
 from app.live.pick.world import LivePickWorld
 from app.live.reach.interfaces import LiveReachPolicy
-from app.live.snapshot import RefusedCommand, WorldSnapshot
+from app.live.snapshot import MAX_REFUSED, RefusedCommand, WorldSnapshot
 from app.live.world_handle import WorldHandle
 from app.sim.cells.cell import Cell
 from app.sim.pick.task_policy import RiskMap, TaskPolicy
@@ -76,7 +77,7 @@ class LiveCell:
         self._speed = 1
         self._ticks, self._undrawn_s = 0, 0.0
         self._done = 0
-        self._refused: RefusedCommand | None = None
+        self._refused: deque[RefusedCommand] = deque(maxlen=MAX_REFUSED)
         self._risk = RiskWorker()
         self._stop = threading.Event()
         self._server: ViewerServer | None = None
@@ -136,11 +137,10 @@ class LiveCell:
             try:
                 self._apply(command)
             except ServiceError as error:
-                self._refused = RefusedCommand(number=self._done, reason=error.message)
+                self._refuse(error.message)
                 logger.warning("command %s was refused: %s", command.tag, error.message)
             except Exception as error:  # The commands after it are carried out all the same.
-                reason = f"{command.tag} failed: {error}"
-                self._refused = RefusedCommand(number=self._done, reason=reason)
+                self._refuse(f"{command.tag} failed: {error}")
                 logger.exception("command %s failed", command.tag)
         for _ in range(self._speed):
             self._world.step()
@@ -148,13 +148,17 @@ class LiveCell:
             self._world.snapshot(),
             speed=self._speed,
             commands=self._done,
-            refused=self._refused,
+            refused=tuple(self._refused),
         )
         self.handle.publish(snapshot)
         self._ticks += 1
         self._undrawn_s += dt * self._speed
         if self._ticks % max(1, round(FRAME_S / dt)) == 0:
             draw(snapshot)
+
+    def _refuse(self, reason: str) -> None:
+        """Name the command that is being applied in the next snapshots."""
+        self._refused.append(RefusedCommand(number=self._done, reason=reason))
 
     def _draw(
         self,

@@ -8,6 +8,7 @@ import pytest
 
 from app.errors import InvalidInput
 from app.live import commands
+from app.live.snapshot import MAX_REFUSED
 from app.live.sorting import commands as commands_of_sorting
 from app.sim.cells.cell import load_cell
 from app.sim.human import model as human
@@ -80,24 +81,36 @@ def test_snapshot_says_which_commands_it_shows(live: LiveCell) -> None:
         live.handle.submit(commands.RemovePerson(person=3))
     assert live.handle.submit(commands.ResumeClock()) == numbers[-1] + 1
     wait_for(lambda: live.handle.snapshot().commands == numbers[-1] + 1)
-    assert live.handle.snapshot().refused is None
+    assert live.handle.snapshot().refused == ()
 
 
-def test_command_that_fits_no_more_when_its_turn_comes_is_named() -> None:
+def refused_of(*places: str) -> list[tuple[int, str]]:
+    """Add a block at each place of an empty table in one tick; return what was refused."""
     live = LiveCell(load_cell("sorting-e0"), None)
-    block = commands_of_sorting.AddObject(colour="red", size="large", at="cell5")
-    live.start()
-    piece = live.handle.snapshot().sorting
-    assert piece is not None
-    for one in piece.pieces:
+    first = live.handle.snapshot().sorting
+    assert first is not None
+    for one in first.pieces:
         live.handle.submit(commands_of_sorting.RemoveObject(id=one.id))
-    number = [live.handle.submit(block), live.handle.submit(block)][-1]
-    wait_for(lambda: live.handle.snapshot().commands >= number)
-    refused = live.handle.snapshot().refused
+    cleared = live.handle.submit(commands.ResumeClock())
+    for place in places:
+        block = commands_of_sorting.AddObject(colour="red", size="large", at=place)
+        live.handle.submit(block)
+    live.start()
+    wait_for(lambda: live.handle.snapshot().commands == cleared + len(places))
     live.stop()
-    assert refused is not None
-    assert refused.number == number
-    assert "cell5" in refused.reason
+    found = live.handle.snapshot().refused
+    return [(one.number - cleared, one.reason) for one in found]
+
+
+def test_each_command_that_fits_no_more_when_its_turn_comes_is_named() -> None:
+    (second, taken), (fourth, also_taken) = refused_of("cell5", "cell5", "cell6", "cell6")
+    assert (second, fourth) == (2, 4)
+    assert "cell5" in taken and "cell6" in also_taken
+
+
+def test_newest_refused_commands_are_kept() -> None:
+    found = refused_of(*["cell5"] * (MAX_REFUSED + 3))
+    assert [number for number, _ in found] == list(range(4, MAX_REFUSED + 4))
 
 
 def test_bad_commands_are_refused_at_the_door(live: LiveCell) -> None:
@@ -191,8 +204,8 @@ def test_command_that_fails_is_named_and_the_next_ones_are_carried_out() -> None
     wait_for(lambda: live.handle.snapshot().commands == last)
     now = live.handle.snapshot()
     live.stop()
-    assert now.refused is not None
-    assert (now.refused.number, now.refused.reason) == (number, "add-person failed: two people")
+    [refused] = now.refused
+    assert (refused.number, refused.reason) == (number, "add-person failed: two people")
     assert (len(now.people), now.mode) == (1, "still")
 
 

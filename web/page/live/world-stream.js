@@ -19,21 +19,21 @@ const CELL_MS = 180000; // another cell may have kernels to compile
  *
  * @returns {{link: "connecting"|"warming"|"live"|"stale"|"lost"|"signin", reason: string,
  *            world: object|null, cell: object|null, cells: object[], history: History,
- *            epoch: number, heardAt: number, pending: number,
+ *            epoch: number, heardAt: number, pending: number, errors: Error[],
  *            send: (command: object) => Promise<void>, show: (cell: string) => Promise<void>}}
  *   `epoch` counts how often the server was found ready; `heardAt` is the time of the last
  *   snapshot, as performance.now() gives it; `pending` counts commands that no snapshot shows
- *   yet.
+ *   yet; `errors` are those of the newest commands.
  */
 export function useCell() {
   const [state, setState] = useState({ link: "connecting", reason: "", world: null, cell: null, cells: [] });
   const [epoch, setEpoch] = useState(0);
-  const [error, setError] = useState(null);
+  const [errors, setErrors] = useState([]);
   const [pending, setPending] = useState(0);
   const unconfirmed = useRef(new Unconfirmed());
   const history = useRef(new History());
   const shown = useRef(null);
-  shown.current = error;
+  shown.current = errors;
 
   useEffect(() => {
     const stop = new AbortController();
@@ -44,23 +44,22 @@ export function useCell() {
   const report = useCallback(async (request) => {
     const before = shown.current;
     setPending((n) => n + 1);
-    try {
-      await request;
-      setError((now) => (now === before ? null : now)); // that of another command stays
-    } catch (problem) {
-      setError(problem);
-    }
+    const own = await request.then(() => [], (problem) => [problem]);
+    // Those of commands that were sent meanwhile stay.
+    setErrors((now) => [...now.filter((one) => !before.includes(one)), ...own]);
     setPending((n) => n - 1);
   }, []);
   // A command that was not confirmed in time: what the world shows now is the answer.
   useEffect(() => {
-    if (state.link === "live") setError((now) => (now instanceof Unreachable ? null : now));
+    if (state.link === "live") {
+      setErrors((now) => now.filter((one) => !(one instanceof Unreachable)));
+    }
   }, [state.link]);
   const send = useCallback((command) => report(carryOut(command, unconfirmed.current)), []);
   const show = useCallback((name) =>
     report(put(`v1/worlds/${WORLD}/cell`, { cell: name }, { patience: CELL_MS })), []);
-  const dismiss = () => setError(null);
-  return { ...state, epoch, pending, history: history.current, send, show, error, dismiss };
+  const dismiss = () => setErrors([]);
+  return { ...state, epoch, pending, history: history.current, send, show, errors, dismiss };
 }
 
 /** Send a command; resolves once a snapshot shows its effect, throws if none does in time. */
