@@ -3,7 +3,7 @@
 from collections.abc import Callable
 
 import pytest
-from playwright.sync_api import Page, Route, expect
+from playwright.sync_api import Browser, Page, Route, expect
 
 from tests.browser.test_drag import tell
 
@@ -75,3 +75,20 @@ def test_refusals_stay_when_another_command_succeeds(open_page: Callable[..., Pa
     page.click('[data-goal="dock1"]')
     expect(page.locator('[data-goal="dock1"]')).to_have_attribute("aria-pressed", str(pressed))
     expect(page.locator(".banner.bad")).to_have_count(0)
+
+
+def test_sign_in_form_sends_its_token_once(browser: Browser, server: str) -> None:
+    page = browser.new_page()
+    needs = {"detail": "the server requires its token"}
+    page.route("**/v1/worlds/main", lambda route: route.fulfill(status=401, json=needs))
+    page.goto(server)
+    page.fill("#token", "a-token-of-some-length")
+    sent: list[str] = []
+    page.on("request", lambda one: sent.append(one.url) if one.method == "POST" else None)
+    with page.expect_navigation():
+        page.evaluate(
+            """() => [1, 2].forEach(() =>
+              document.querySelector(".signin form").requestSubmit())"""
+        )
+    assert sent == [f"{server}/session"]
+    page.close()

@@ -1,8 +1,8 @@
 // Shown when the server asks for its token: the token is exchanged for a session cookie.
 import { html, useState } from "./vendor/htm-preact-standalone.module.js";
+import { useAction } from "./action.js";
 import { post } from "./api.js";
 import { Logo } from "./icons.js";
-import { useAction } from "./training/jobactions.js";
 
 export function SignIn() {
   const [token, setToken] = useState("");

@@ -1,5 +1,6 @@
 // Stored checkpoints: card, use, evaluations, aliases, upload, and two of them side by side.
 import { html, useEffect, useState } from "../vendor/htm-preact-standalone.module.js";
+import { Fault, useAction } from "../action.js";
 import { get, postFile, put, remove } from "../api.js";
 import * as format from "../format.js";
 import { Icon } from "../icons.js";
@@ -128,30 +129,23 @@ function rates(job) {
 
 function Aliases({ one, onChanged }) {
   const [name, setName] = useState("");
-  const [error, setError] = useState(null);
-  const change = async (action) => {
-    try {
-      await action();
-      setName("");
-      setError(null);
-      onChanged();
-    } catch (problem) {
-      setError(problem);
-    }
-  };
+  const { error, run } = useAction(() => {
+    setName("");
+    onChanged();
+  });
   const add = (event) => {
     event.preventDefault();
-    change(() => put(`v1/aliases/${encodeURIComponent(name.trim())}`, { checkpoint: one.sha256 }));
+    run(() => put(`v1/aliases/${encodeURIComponent(name.trim())}`, { checkpoint: one.sha256 }));
   };
   return html`<form class="job-actions" onSubmit=${add} aria-label="Aliases">
     ${one.aliases.map((alias) => html`<button type="button" class="tool" key=${alias}
       title=${`Remove the alias ${alias}`}
-      onClick=${() => change(() => remove(`v1/aliases/${encodeURIComponent(alias)}`))}>
+      onClick=${() => run(() => remove(`v1/aliases/${encodeURIComponent(alias)}`))}>
       ${alias}<${Icon} name="close" /></button>`)}
     <input data-role="alias" value=${name} placeholder="new alias" aria-label="New alias"
       spellcheck="false" maxlength="64" onInput=${(event) => setName(event.target.value)} />
     <button type="submit" class="tool" data-action="alias" disabled=${!name.trim()}>Add alias</button>
-    ${error && html`<span class="field-error" role="alert">${error.message}</span>`}
+    <${Fault} error=${error} />
   </form>`;
 }
 

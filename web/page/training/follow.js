@@ -1,9 +1,10 @@
 // The live cell follows a training: its newest checkpoint acts as soon as it is stored.
 import { html, useEffect, useState } from "../vendor/htm-preact-standalone.module.js";
+import { Fault, useAction } from "../action.js";
 import { get, put, remove } from "../api.js";
 import * as format from "../format.js";
 import { WORLD } from "../live/world-stream.js";
-import { Fault, isActive, useAction } from "./jobactions.js";
+import { isActive } from "./jobactions.js";
 
 /** The server looks at a followed job once a second, and so does the page once it has ended. */
 const LOOK_MS = 1000;

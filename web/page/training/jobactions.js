@@ -1,5 +1,6 @@
 // What can be done with a job: cancel, resume, retry, clone, delete, name, notes, priority.
-import { html, useEffect, useRef, useState } from "../vendor/htm-preact-standalone.module.js";
+import { html } from "../vendor/htm-preact-standalone.module.js";
+import { Ask, Fault, useAction } from "../action.js";
 import { patch, post, remove } from "../api.js";
 import * as format from "../format.js";
 import { Icon } from "../icons.js";
@@ -17,30 +18,6 @@ const REPEATABLE = new Set(["failed", "cancelled"]);
 
 export function isActive(job) {
   return !FINAL.has(job.state);
-}
-
-/** One request at a time, however often its button is clicked; its error stays until the next. */
-export function useAction(onDone) {
-  const [state, setState] = useState({ busy: false, error: null });
-  const running = useRef(false);
-  const run = async (act) => {
-    if (running.current) return;
-    running.current = true;
-    setState({ busy: true, error: null });
-    let error = null;
-    try {
-      onDone?.(await act());
-    } catch (problem) {
-      error = problem;
-    }
-    running.current = false;
-    setState({ busy: false, error });
-  };
-  return { ...state, run };
-}
-
-export function Fault({ error }) {
-  return error && html`<span class="field-error" role="alert">${error.message}</span>`;
 }
 
 /** Buttons of a job; `onOpen` shows a job, `onClone` opens the form with its values. */
@@ -78,32 +55,6 @@ function Delete({ job, onChanged }) {
   return html`<${Ask} name="delete" label="Delete …" yes="Delete the job" no="Keep it"
     question="Delete it? Its curve and its checkpoints go with it." action=${useAction(onChanged)}
     onYes=${() => remove(`v1/jobs/${job.id}`)} />`;
-}
-
-/** A button that asks before it acts. */
-export function Ask({ name, label, question, yes, no, action, onYes }) {
-  const [asking, setAsking] = useState(false);
-  const box = useRef(null);
-  const turned = useRef(false);
-  const turn = (to) => {
-    turned.current = true;
-    setAsking(to);
-  };
-  // The button that had the focus is gone: it goes to the one that changes nothing.
-  useEffect(() => {
-    if (turned.current) box.current.querySelector("button:last-of-type").focus();
-  }, [asking]);
-  return html`<div class="confirm" ref=${box}
-    onKeyDown=${(event) => asking && event.key === "Escape" && turn(false)}>
-    ${asking
-      ? html`<span>${question}</span>
-          <button type="button" class="danger" data-action=${`${name}-yes`} disabled=${action.busy}
-            onClick=${() => action.run(onYes)}>${yes}</button>
-          <button type="button" class="tool" onClick=${() => turn(false)}>${no}</button>`
-      : html`<button type="button" class="tool" data-action=${name}
-          onClick=${() => turn(true)}>${label}</button>`}
-    <${Fault} error=${action.error} />
-  </div>`;
 }
 
 /** Name, priority, budgets and notes of a job, changed together. */
