@@ -16,7 +16,7 @@ recording_format   The stored form of a recording
 remote/            Workers that reach their job over HTTP, and the executor on Ray
 resume_files       Files that trainings need to resume: the transitions of their replay
                    memories
-retention          Retention of ended jobs: how many are kept, and what is removed with a job
+retention          Removal of checkpoints, and of ended jobs with their files
 run                Entry point of a job's process: ``python -m jobs.run --job ID --attempt N``
 spec               Job specs: the body of ``POST /v1/jobs``, stored unchanged with the job
 start              Start of a child process: the parent-death signal, before heavy imports

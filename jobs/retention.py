@@ -1,11 +1,14 @@
-"""Retention of ended jobs: how many are kept, and what is removed with a job."""
+"""Removal of checkpoints, and of ended jobs with their files: how many are kept."""
 
 import logging
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from app.errors import Conflict
+from app.policies.checkpoints import pretrained
 from app.store import retention
+from app.store.checkpoints import get_checkpoint
 from app.store.engine import Store
 from jobs import resume_files
 
@@ -14,7 +17,7 @@ logger = logging.getLogger(__name__)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Retention:
-    """Removes ended jobs with their output and their files to resume from."""
+    """Removes checkpoints, and ended jobs with their output and their files to resume from."""
 
     store: Store
     """The database."""
@@ -38,6 +41,24 @@ class Retention:
         removed = retention.delete_job(self.store, job_id, self.acting())
         self._remove_files(job_id)
         return removed
+
+    def delete_checkpoint(self, reference: str) -> str:
+        """Delete a checkpoint that was uploaded or recalibrated; return its SHA-256.
+
+        Args:
+            reference: Its SHA-256 or alias.
+
+        Raises:
+            NotFound: There is no such checkpoint.
+            Conflict: It is shipped.
+            WrongState: It has an alias, a job made it, or it is in use.
+            StorageFull: No room is left.
+        """
+        sha256 = get_checkpoint(self.store, reference).sha256
+        if sha256 in pretrained.SHA256.values():
+            raise Conflict(f"the checkpoint {reference!r} is shipped with Tandem and stays")
+        retention.delete_checkpoint(self.store, sha256, self.acting())
+        return sha256
 
     def apply(self) -> None:
         """Remove what is beyond the numbers to keep."""

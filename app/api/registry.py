@@ -110,6 +110,11 @@ class CheckpointNames:
             logger.error("%s", damage.message)
         self._damaged[damage.sha256] = damage.name
 
+    def forget(self, removed: Iterable[str]) -> None:
+        """Drop the damage of deleted checkpoints, by SHA-256."""
+        for sha256 in removed:
+            self._damaged.pop(sha256, None)
+
     @property
     def damaged(self) -> tuple[str, ...]:
         """Names of the checkpoints found damaged."""

@@ -16,6 +16,6 @@ jobs         Jobs: submit, read, cancel
 metrics      Learning curves of jobs: one row per step
 recordings   Imported human motion, as bytes under a name; the store never opens them
 records      Data types of the store: frozen dataclasses, no database rows
-retention    Removal of ended jobs and states: on request, and beyond the numbers to keep
+retention    Removal of checkpoints, ended jobs and states: on request, beyond a number to keep
 migrations/  Alembic's scripts: one file per change of the tables
 """

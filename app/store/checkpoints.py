@@ -41,7 +41,7 @@ def put_checkpoint(store: Store, new: NewCheckpoint) -> CheckpointRecord:
     """
     with store.writing() as connection:
         insert_checkpoint(connection, new, imported=True)
-    return get_checkpoint(store, new.sha256)
+        return find_checkpoint(connection, new.sha256)
 
 
 def get_checkpoint(store: Store, reference: str) -> CheckpointRecord:
@@ -51,11 +51,20 @@ def get_checkpoint(store: Store, reference: str) -> CheckpointRecord:
         NotFound: Nothing has that name.
     """
     with store.reading() as connection:
-        sha256 = _resolve(connection, reference)
-        row = connection.execute(_described().where(checkpoints.c.sha256 == sha256)).first()
-        if row is None:
-            raise NotFound("checkpoint", reference)
-        return _record(row, _names(connection))
+        return find_checkpoint(connection, reference)
+
+
+def find_checkpoint(connection: sa.Connection, reference: str) -> CheckpointRecord:
+    """Return one checkpoint in a transaction, by SHA-256 or alias, without its tensors.
+
+    Raises:
+        NotFound: Nothing has that name.
+    """
+    sha256 = _resolve(connection, reference)
+    row = connection.execute(_described().where(checkpoints.c.sha256 == sha256)).first()
+    if row is None:
+        raise NotFound("checkpoint", reference)
+    return _record(row, _names(connection))
 
 
 def read_checkpoint(store: Store, reference: str) -> tuple[CheckpointRecord, bytes]:

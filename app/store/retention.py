@@ -1,4 +1,4 @@
-"""Removal of ended jobs and of their states: on request, and beyond the numbers to keep."""
+"""Removal of checkpoints, ended jobs and states: on request, and beyond a number to keep."""
 
 import logging
 from collections.abc import Mapping
@@ -6,9 +6,9 @@ from collections.abc import Mapping
 import sqlalchemy as sa
 
 from app.errors import NotFound, WrongState
-from app.store.checkpoints import drop_job_checkpoints, sole_checkpoints
+from app.store.checkpoints import drop_job_checkpoints, find_checkpoint, sole_checkpoints
 from app.store.database.reserve import write_with_reserve
-from app.store.database.tables import jobs, resume_states
+from app.store.database.tables import checkpoints, jobs, resume_states
 from app.store.engine import Store
 from app.store.jobs import job_from_row, read_job
 from app.store.records import COMPOSED, FINAL_STATES, JobRecord
@@ -46,7 +46,7 @@ def delete_job(store: Store, job_id: str, acting: Mapping[str, str]) -> tuple[st
             raise WrongState("state", job.state, rule, FINAL_STATES)
         _require_no_part(connection, job)
         removed = sole_checkpoints(connection, job_id)
-        _require_unused(connection, job, removed, acting)
+        _require_unused(connection, removed, acting, f"of job {job.number} ")
         drop_job_checkpoints(connection, job_id, beyond=-1)
         parts = sa.update(jobs).where(jobs.c.part_of == job_id)
         connection.execute(parts.values(part_of=None))  # listed by themselves from now on
@@ -54,6 +54,34 @@ def delete_job(store: Store, job_id: str, acting: Mapping[str, str]) -> tuple[st
         return removed
 
     return write_with_reserve(store, delete)
+
+
+def delete_checkpoint(store: Store, sha256: str, acting: Mapping[str, str]) -> None:
+    """Delete a checkpoint that was uploaded or recalibrated.
+
+    Args:
+        sha256: Its SHA-256.
+        acting: As for :func:`delete_job`.
+
+    Raises:
+        NotFound: There is no such checkpoint.
+        WrongState: It has an alias, a job made it, or it is in use.
+        StorageFull: No room is left.
+    """
+
+    def delete(connection: sa.Connection) -> None:
+        found = find_checkpoint(connection, sha256)
+        if found.aliases:
+            rule = "points to this checkpoint: remove the alias first"
+            raise WrongState("alias", found.aliases[0], rule)
+        if found.job_id is not None:
+            number = read_job(connection, found.job_id).number
+            rule = f"made this checkpoint: delete job {number} instead"
+            raise WrongState("job_id", found.job_id, rule)
+        _require_unused(connection, (sha256,), acting)
+        connection.execute(sa.delete(checkpoints).where(checkpoints.c.sha256 == sha256))
+
+    write_with_reserve(store, delete)
 
 
 def prune(
@@ -117,22 +145,23 @@ def _require_no_part(connection: sa.Connection, job: JobRecord) -> None:
 
 def _require_unused(
     connection: sa.Connection,
-    job: JobRecord,
     removed: tuple[str, ...],
     acting: Mapping[str, str],
+    whose: str = "",
 ) -> None:
-    """Check that no checkpoint that would go acts or is to be evaluated."""
+    """Check that no checkpoint that would go acts or is to be evaluated.
+
+    Args:
+        whose: Words behind its name in the problem, such as ``"of job 5 "``.
+    """
     for sha256 in removed:
         if sha256 in acting:
-            rule = f"of job {job.number} acts in {acting[sha256]}: choose another policy there"
+            rule = f"{whose}acts in {acting[sha256]}: choose another policy there"
             raise WrongState("checkpoint", sha256, rule)
-    active = sa.select(jobs).where(sa.not_(_ENDED))
-    for row in connection.execute(active).mappings():
-        user = job_from_row(row)
+    active = sa.select(jobs.c.number, jobs.c.spec).where(sa.not_(_ENDED))
+    for user in connection.execute(active):
         sha256 = str(user.spec.get("checkpoint"))
         if sha256 in removed:
-            rule = (
-                f"of job {job.number} is evaluated by job {user.number}: wait for its end, or "
-                "cancel it first"
-            )
+            user_text = f"{whose}is evaluated by job {user.number}"
+            rule = f"{user_text}: wait for its end, or cancel it first"
             raise WrongState("checkpoint", sha256, rule)

@@ -111,6 +111,19 @@ def test_every_reader_of_a_damaged_checkpoint_gets_an_error(
     assert service.post("/v1/task-selection", json=state_of(service)).status_code == 200
 
 
+def test_deleted_checkpoint_is_named_as_damaged_no_longer(
+    service: TestClient, data: Path
+) -> None:
+    sha256 = keep(service.app.state.services.store, "gone")  # type: ignore[attr-defined]
+    damage(data / "tandem.db", "checkpoints", "tensors", f"sha256 = '{sha256}'", cut)
+    asked = {**state_of(service), "checkpoint": "gone"}
+    assert named(service.post("/v1/task-selection", json=asked), "gone", sha256)
+    assert "gone" in service.get("/readyz").json()["damaged"]
+    for path in ("/v1/aliases/gone", f"/v1/checkpoints/{sha256}"):
+        assert service.delete(path).status_code == 204
+    assert "gone" not in service.get("/readyz").json()["damaged"]
+
+
 @pytest.mark.parametrize("alias", ["reach", "sorting-e0"])
 def test_damaged_policies_of_other_kinds_are_not_loaded(
     service: TestClient, data: Path, alias: str

@@ -1,5 +1,6 @@
-"""A visitor looks at the stored checkpoints, names one, uploads one and compares two."""
+"""A visitor looks at the stored checkpoints, names one, uploads, compares and deletes one."""
 
+import json
 from collections.abc import Callable
 from pathlib import Path
 
@@ -64,3 +65,26 @@ def test_two_checkpoints_are_compared_by_what_differs(open_page: Callable[..., P
     table = page.locator("[data-role=checkpoint-differences] table")
     expect(table.get_by_role("row", name="Cell")).to_contain_text("sorting-e1")
     expect(table.get_by_role("row", name="Seed")).to_have_count(0)
+
+
+def test_uploaded_checkpoint_is_deleted_after_a_question(
+    open_page: Callable[..., Page], server: str
+) -> None:
+    shipped = pretrained.load("reach")
+    manifest = json.dumps({**shipped.manifest, "seed": 81}).encode()
+    stored = patient_http.post(
+        f"{server}/v1/checkpoints",
+        content=manifest + b"\n" + shipped.tensors,
+        headers={"Content-Type": "application/octet-stream"},
+    )
+    sha256 = stored.json()["sha256"]
+    own = f'[data-checkpoint="{sha256}"]'
+    page = opened(open_page, "reach")
+    expect(page.locator(f"{card('reach')} [data-action=delete-checkpoint]")).to_have_count(0)
+    page.click(f"{own} .job-head")
+    page.click(f"{own} [data-action=delete-checkpoint]")
+    page.get_by_role("button", name="Keep it").click()
+    page.click(f"{own} [data-action=delete-checkpoint]")
+    page.click(f"{own} [data-action=delete-checkpoint-yes]")
+    expect(page.locator(own)).to_have_count(0)
+    assert patient_http.get(f"{server}/v1/checkpoints/{sha256}").status_code == 404

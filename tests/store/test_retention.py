@@ -73,6 +73,37 @@ def test_job_whose_checkpoint_is_to_be_evaluated_is_not_deleted(
     assert len(retention.delete_job(store, claim.job_id, {})) == 1
 
 
+def test_uploaded_checkpoint_is_deleted_once_nothing_uses_it(store: Store) -> None:
+    sha256 = checkpoints.put_checkpoint(store, policy(b"1")).sha256
+    checkpoints.set_alias(store, "best", sha256)
+    with pytest.raises(WrongState, match="remove the alias first") as refused:
+        retention.delete_checkpoint(store, sha256, {})
+    assert (refused.value.field, refused.value.value) == ("alias", "best")
+    checkpoints.remove_alias(store, "best")
+    user = jobs.create_job(store, NewJob(kind="evaluate", spec={"checkpoint": sha256}))
+    with pytest.raises(WrongState, match="is evaluated by job 1: wait for its end"):
+        retention.delete_checkpoint(store, sha256, {})
+    jobs.request_cancel(store, user.id)
+    with pytest.raises(WrongState, match="acts in world main"):
+        retention.delete_checkpoint(store, sha256, {sha256: "world main"})
+    retention.delete_checkpoint(store, sha256, {})
+    assert checkpoints.list_checkpoints(store).items == ()
+    with pytest.raises(NotFound):
+        retention.delete_checkpoint(store, sha256, {})
+
+
+def test_checkpoint_of_a_job_goes_with_the_job_only(store: Store, claim: Claim) -> None:
+    sha256 = save(store, claim, 1, b"1")
+    checkpoints.put_checkpoint(store, policy(b"1"))  # uploaded, too
+    completion.finish(store, claim)
+    with pytest.raises(WrongState, match="delete job 1 instead") as refused:
+        retention.delete_checkpoint(store, sha256, {})
+    assert (refused.value.field, refused.value.value) == ("job_id", claim.job_id)
+    assert retention.delete_job(store, claim.job_id, {}) == ()
+    retention.delete_checkpoint(store, sha256, {})
+    assert rows(store, "checkpoints") == 0
+
+
 def test_parts_of_a_deleted_job_are_jobs_of_their_own(store: Store, claim: Claim) -> None:
     new = NewJob(kind="count", spec={}, part_of=claim.job_id, trial=1)
     part = jobs.create_job(store, new)

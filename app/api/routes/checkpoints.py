@@ -1,4 +1,4 @@
-"""Trained policies: list, read, download, upload, recalibrate."""
+"""Trained policies: list, read, download, upload, recalibrate, delete."""
 
 from typing import Annotated, Any
 
@@ -152,6 +152,23 @@ def get_checkpoint(reference: str, services: ServicesDep) -> CheckpointPublic:
     """Return one checkpoint without its tensors."""
     record, _ = read_sound(services.store, reference)
     return CheckpointPublic.from_domain(record)
+
+
+@router.delete(
+    "/{reference}",
+    status_code=204,
+    summary="Delete an uploaded or recalibrated checkpoint",
+    responses={
+        409: {"description": "It is shipped, has an alias, was made by a job, or is in use"},
+        507: {},
+    },
+)
+def delete_checkpoint(reference: str, services: ServicesDep) -> None:
+    """Delete a checkpoint; results of its evaluations stay.
+
+    The checkpoints of a job are deleted with the job.
+    """
+    services.forget((services.retention.delete_checkpoint(reference),))
 
 
 @router.get("/{reference}/manifest", summary="A checkpoint's manifest")

@@ -130,7 +130,4 @@ def update_job(
 @router.delete("", status_code=204, summary="Delete an ended job", responses=DELETED)
 def delete_job(job: JobDep, services: ServicesDep) -> None:
     """Delete a job with its curve, its states and the checkpoints without an alias."""
-    removed = services.retention.delete(job.id)
-    policies = (services.task_policies, services.sorting_policies, services.reach_policies)
-    for one in policies:
-        one.forget(removed)
+    services.forget(services.retention.delete(job.id))

@@ -52,6 +52,10 @@ class CheckpointsOperations(Transport):
         """One checkpoint, by SHA-256 or alias."""
         return self._parsed(CheckpointPublic, "GET", "/v1/checkpoints/{}", reference)
 
+    def delete_checkpoint(self, reference: str) -> None:
+        """Delete an uploaded or recalibrated checkpoint."""
+        self._send("DELETE", "/v1/checkpoints/{}", reference)
+
     def get_checkpoint_manifest(self, reference: str) -> dict[str, Any]:
         """A checkpoint's manifest."""
         return dict(self._send("GET", "/v1/checkpoints/{}/manifest", reference).json())

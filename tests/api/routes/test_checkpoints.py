@@ -143,6 +143,27 @@ def test_unknown_alias_and_checkpoint_are_named(client: TestClient) -> None:
     assert (answer.status_code, answer.json()["field"]) == (422, "alias")
 
 
+def test_uploaded_checkpoint_is_deleted_and_decides_no_longer(client: TestClient) -> None:
+    body = changed({"seed": 79})
+    sha256 = client.post("/v1/checkpoints", content=body, headers=FILE).json()["sha256"]
+    path, task = f"/v1/checkpoints/{sha256}", {**TASK, "checkpoint": sha256}
+    assert client.post("/v1/motion", json=task).status_code == 200
+    client.put("/v1/aliases/line-3", json={"checkpoint": sha256})
+    refused = client.delete("/v1/checkpoints/line-3")
+    assert (refused.status_code, refused.json()["field"]) == (409, "alias")
+    client.delete("/v1/aliases/line-3")
+    assert client.delete(path).status_code == 204
+    assert client.delete(path).status_code == 404
+    assert client.post("/v1/motion", json=task).json()["field"] == "checkpoint"
+    assert client.post("/v1/checkpoints", content=body, headers=FILE).status_code == 201
+
+
+def test_shipped_checkpoint_is_not_deleted(client: TestClient) -> None:
+    for reference in ("reach", pretrained.SHA256["reach"]):
+        answer = client.delete(f"/v1/checkpoints/{reference}")
+        assert answer.status_code == 409 and "shipped" in answer.json()["detail"]
+
+
 CAME = [{"success": 0.9, "contact": 0.05, "outcome": "timeout"}] * 30
 
 

@@ -1,6 +1,6 @@
-// Stored checkpoints: card, use, evaluations, aliases, upload, and two of them side by side.
+// Stored checkpoints: card, use, evaluations, aliases, upload, delete, two of them side by side.
 import { html, useEffect, useState } from "../vendor/htm-preact-standalone.module.js";
-import { Fault, useAction } from "../action.js";
+import { Ask, Fault, useAction } from "../action.js";
 import { get, postFile, put, remove } from "../api.js";
 import * as format from "../format.js";
 import { Icon } from "../icons.js";
@@ -60,6 +60,7 @@ function Card({ one, open, chosen, acting, jobs, onOpen, onChoose, onChanged }) 
         <a class="tool" download href=${`v1/checkpoints/${one.sha256}/tensors`}>safetensors</a>
         <a class="tool" download=${`${nameOf(one)}.json`}
           href=${`v1/checkpoints/${one.sha256}/manifest`}>manifest</a>
+        ${!one.job_id && one.aliases.length === 0 && html`<${Delete} one=${one} onChanged=${onChanged} />`}
       </div></div>`}
   </li>`;
 }
@@ -147,6 +148,13 @@ function Aliases({ one, onChanged }) {
     <button type="submit" class="tool" data-action="alias" disabled=${!name.trim()}>Add alias</button>
     <${Fault} error=${error} />
   </form>`;
+}
+
+/** For checkpoints of users: those of a job go with it, and shipped ones have an alias. */
+function Delete({ one, onChanged }) {
+  return html`<${Ask} name="delete-checkpoint" label="Delete …" yes="Delete the checkpoint" no="Keep it"
+    question="Delete it? Results of its evaluations stay." action=${useAction(onChanged)}
+    onYes=${() => remove(`v1/checkpoints/${one.sha256}`)} />`;
 }
 
 /** Manifest and tensors, chosen together, as one body: the manifest's line, then the tensors. */

@@ -88,6 +88,20 @@ def test_acting_checkpoint_is_changed(client: TestClient) -> None:
     until(client, lambda world: world["checkpoint"] is not None)
 
 
+def test_checkpoint_that_acts_is_not_deleted(client: TestClient) -> None:
+    observed = [{"success": 0.8, "contact": 0.1, "outcome": "success"}] * 30
+    made = client.post("/v1/checkpoints/pick/recalibration", json={"outcomes": observed})
+    own = made.json()["sha256"]
+    client.post(COMMANDS, json={"tag": "set-policy", "checkpoint": own})
+    until(client, lambda world: world["checkpoint"] == own)
+    refused = client.delete(f"/v1/checkpoints/{own}")
+    assert (refused.status_code, refused.json()["field"]) == (409, "checkpoint")
+    assert "acts in world main" in refused.json()["rule"]
+    client.post(COMMANDS, json={"tag": "set-policy", "checkpoint": "pick"})
+    until(client, lambda world: world["checkpoint"] != own)
+    assert client.delete(f"/v1/checkpoints/{own}").status_code == 204
+
+
 def test_case_study_is_started(client: TestClient) -> None:
     case = client.get("/v1/cells/pick-and-place").json()["cases"][0]
     client.post(COMMANDS, json={"tag": "start-case", "id": case["id"]})
