@@ -95,7 +95,7 @@ class CellCatalog:
 
         Raises:
             NotFound: No cell has that name.
-            Conflict: It is shipped, or a queued or running job trains in it.
+            Conflict: It is shipped, or a job that has not ended trains in it.
         """
         self._require_own(name)
         remove_cell(self._store, name)

@@ -148,10 +148,11 @@ class RecordingCatalog:
         return _read_alike(stored.read_runs(self._store, name)[0], options), is_new
 
     def remove(self, name: str) -> None:
-        """Remove a recording; runs in use are not affected.
+        """Remove a recording; live worlds go on playing it.
 
         Raises:
             NotFound: No recording has that name.
+            WrongState: A job that has not ended evaluates with it.
         """
         with self._known_names_in_error(name):
             stored.remove_recording(self._store, name)

@@ -1,5 +1,6 @@
 """Jobs of requests: the one a path names, pages of them, checks before one is queued."""
 
+from dataclasses import replace
 from typing import Annotated, NamedTuple
 
 from fastapi import Depends, Header, Response
@@ -7,8 +8,10 @@ from fastapi import Depends, Header, Response
 from app.api.schemas.jobs import JobList, JobPublic
 from app.api.services import Services, ServicesDep
 from app.policies.configs import presets
+from app.sim.cells.cell import cell_names
 from app.store import job_actions, jobs, metrics
-from app.store.records import JobRecord, JobState, MetricRow, NewJob
+from app.store.records import JobRecord, JobState, MetricRow, NewJob, References
+from app.store.references import references_of
 from jobs.spec import AnySpec, EvaluateSpec
 
 
@@ -73,10 +76,18 @@ def checked(body: AnySpec, services: Services) -> NewJob:
 
 def queued(new: NewJob, services: Services, response: Response, key: str | None) -> JobPublic:
     """Queue a job; ``Location`` says where to follow it."""
-    job = jobs.create_job(services.store, new, idempotency_key=key)
+    job = jobs.create_job(
+        services.store, new, idempotency_key=key, references=stored_references(new)
+    )
     services.supervisor.wake()
     response.headers["Location"] = f"/v1/jobs/{job.id}"
     return JobPublic.from_domain(job)
+
+
+def stored_references(job: NewJob) -> References:
+    """Return what a job refers to in the database, which has no shipped cells."""
+    found = references_of(job)
+    return replace(found, cell=None) if found.cell in cell_names() else found
 
 
 def shown(job: JobRecord, services: Services) -> JobPublic:

@@ -16,6 +16,7 @@ jobs         Jobs: submit, read, cancel
 metrics      Learning curves of jobs: one row per step
 recordings   Imported human motion, as bytes under a name; the store never opens them
 records      Data types of the store: frozen dataclasses, no database rows
+references   References of jobs: stored when a job is queued, kept until it has ended
 retention    Removal of checkpoints, ended jobs and states: on request, beyond a number to keep
 migrations/  Alembic's scripts: one file per change of the tables
 """

@@ -13,9 +13,10 @@ import sqlalchemy as sa
 
 from app.digests import digest, has_digest
 from app.errors import Conflict, Damaged, NotFound
-from app.store.database.tables import cells, jobs
+from app.store.database.tables import cells
 from app.store.engine import Store
 from app.store.records import CellRecord
+from app.store.references import require_unused
 
 logger = logging.getLogger(__name__)
 
@@ -98,7 +99,7 @@ def remove_cell(store: Store, name: str) -> None:
 
     Raises:
         NotFound: No cell has that name.
-        Conflict: A queued or running job trains in it.
+        WrongState: A job that has not ended trains in it.
     """
     with store.writing() as connection:
         if (
@@ -106,15 +107,5 @@ def remove_cell(store: Store, name: str) -> None:
             is None
         ):
             raise NotFound("cell", name)
-        waiting = sa.select(jobs.c.id, jobs.c.overrides).where(
-            jobs.c.state.in_(("queued", "running"))
-        )
-        users = [
-            row.id for row in connection.execute(waiting) if row.overrides.get("cell") == name
-        ]
-        if users:
-            raise Conflict(
-                f"cell {name!r} is in use by job {users[0]}, which has not ended: cancel the "
-                "job first"
-            )
+        require_unused(connection, "cell", name, lambda job: job.cell == name)
         connection.execute(sa.delete(cells).where(cells.c.name == name))

@@ -9,8 +9,9 @@ from app.errors import InvalidInput, WrongState
 from app.store.database.tables import jobs, resume_states
 from app.store.engine import Store
 from app.store.fencing import change_state
-from app.store.jobs import read_job
-from app.store.records import COMPOSED, JobRecord
+from app.store.jobs import NOTHING, read_job
+from app.store.records import COMPOSED, JobRecord, References
+from app.store.references import require_stored
 
 REPEATABLE = ("cancelled", "failed")
 """States from which a job is resumed or retried."""
@@ -28,7 +29,10 @@ def resume_steps(store: Store, job_ids: Sequence[str]) -> dict[str, int]:
 
 
 def resume_job(
-    store: Store, job_id: str, budget: Mapping[str, float | None] | None = None
+    store: Store,
+    job_id: str,
+    budget: Mapping[str, float | None] | None = None,
+    references: References = NOTHING,
 ) -> JobRecord:
     """Queue an ended job again; its next attempt resumes from its newest state.
 
@@ -37,11 +41,12 @@ def resume_job(
     Args:
         job_id: A job that is cancelled, has failed, or was ended by a budget.
         budget: Changed budgets by name; None removes one.
+        references: What must be stored.
 
     Raises:
         NotFound: There is no such job.
         WrongState: It has not ended or is complete, or it has no state to resume from.
-        InvalidInput: A budget is spent already.
+        InvalidInput: A budget is spent already, or a reference is not stored.
     """
     with store.writing() as connection:
         job = read_job(connection, job_id, for_update=True)
@@ -59,6 +64,7 @@ def resume_job(
             raise WrongState("resume_step", None, rule)
         budgets = {"step_budget": job.step_budget, "time_budget_s": job.time_budget_s}
         budgets |= budget or {}
+        require_stored(connection, references)
         _require_left(job, budgets, {"step_budget": step, "time_budget_s": job.run_s})
         changes = {
             **budgets,

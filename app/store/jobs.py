@@ -25,25 +25,42 @@ from app.store.database.reserve import write_with_reserve
 from app.store.database.tables import jobs
 from app.store.engine import Store
 from app.store.events import append_event
-from app.store.records import FINAL_STATES, JobRecord, JobState, NewJob, Page
+from app.store.records import (
+    FINAL_STATES,
+    JobRecord,
+    JobState,
+    NewJob,
+    Page,
+    References,
+)
+from app.store.references import require_stored
 
 MAX_KEY_LENGTH = 255
 """Longest idempotency key."""
+NOTHING = References()
+"""A job that refers to nothing that can be deleted."""
 NO_PARTS = "none"
 """Selects the jobs that are part of no other job."""
 
 
-def create_job(store: Store, new: NewJob, *, idempotency_key: str | None = None) -> JobRecord:
+def create_job(
+    store: Store,
+    new: NewJob,
+    *,
+    idempotency_key: str | None = None,
+    references: References = NOTHING,
+) -> JobRecord:
     """Queue a job; the same key with the same spec returns the existing job.
 
     Args:
         idempotency_key: Identifies this submission.
+        references: What must be stored.
 
     Raises:
         Conflict: The key was used for another spec.
         NotFound: The parent was deleted.
         WrongState: An equal repetition of its parent has not ended.
-        InvalidInput: The key is empty or too long.
+        InvalidInput: The key is empty or too long, or a reference is not stored.
         StorageFull: No room is left.
     """
     if idempotency_key is not None and not 1 <= len(idempotency_key) <= MAX_KEY_LENGTH:
@@ -53,6 +70,7 @@ def create_job(store: Store, new: NewJob, *, idempotency_key: str | None = None)
         with store.writing() as connection:
             earlier = _by_key(connection, idempotency_key)
             if earlier is None:
+                require_stored(connection, references)
                 return _insert(connection, new, idempotency_key)
     except IntegrityError:  # another server process was faster with the same key
         with store.reading() as connection:

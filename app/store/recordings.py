@@ -16,6 +16,7 @@ from app.errors import Conflict, Damaged, InvalidInput, NotFound
 from app.store.database.tables import recordings
 from app.store.engine import Store
 from app.store.records import NewRecording, StoredRecording
+from app.store.references import require_unused
 
 logger = logging.getLogger(__name__)
 
@@ -124,11 +125,13 @@ def remove_recording(store: Store, name: str) -> None:
 
     Raises:
         NotFound: No recording has that name.
+        WrongState: A job that has not ended evaluates with it.
     """
     query = sa.delete(recordings).where(recordings.c.name == name)
     with store.writing() as connection:
         if not connection.execute(query).rowcount:
             raise NotFound("recording", name)
+        require_unused(connection, "recording", name, lambda job: name in job.recordings)
 
 
 def _record(row: Any) -> StoredRecording:

@@ -68,6 +68,18 @@ class NewJob:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class References:
+    """What a job reads from the database when it runs."""
+
+    checkpoint: str | None = None
+    """SHA-256 or alias of the checkpoint to evaluate."""
+    cell: str | None = None
+    """Name of the cell to train in."""
+    recordings: tuple[str, ...] = ()
+    """Names of the recordings to evaluate with."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class JobRecord(NewJob):
     """A job: what was submitted, and its state."""
 

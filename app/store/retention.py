@@ -12,6 +12,7 @@ from app.store.database.tables import checkpoints, jobs, resume_states
 from app.store.engine import Store
 from app.store.jobs import job_from_row, read_job
 from app.store.records import COMPOSED, FINAL_STATES, JobRecord
+from app.store.references import unfinished
 
 logger = logging.getLogger(__name__)
 
@@ -158,10 +159,7 @@ def _require_unused(
         if sha256 in acting:
             rule = f"{whose}acts in {acting[sha256]}: choose another policy there"
             raise WrongState("checkpoint", sha256, rule)
-    active = sa.select(jobs.c.number, jobs.c.spec).where(sa.not_(_ENDED))
-    for user in connection.execute(active):
-        sha256 = str(user.spec.get("checkpoint"))
-        if sha256 in removed:
-            user_text = f"{whose}is evaluated by job {user.number}"
-            rule = f"{user_text}: wait for its end, or cancel it first"
-            raise WrongState("checkpoint", sha256, rule)
+    for number, references in unfinished(connection):
+        if references.checkpoint in removed:
+            rule = f"{whose}is evaluated by job {number}: wait for its end, or cancel it first"
+            raise WrongState("checkpoint", references.checkpoint, rule)

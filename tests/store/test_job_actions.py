@@ -2,11 +2,18 @@ from dataclasses import replace
 
 import pytest
 
-from app.errors import NotFound, WrongState
+from app.errors import InvalidInput, NotFound, WrongState
 from app.storage_errors import StaleAttempt
 from app.store import attempts, completion, job_actions, jobs
 from app.store.engine import Store
-from app.store.records import Claim, JobRecord, NewCheckpoint, NewJob, ResumeState
+from app.store.records import (
+    Claim,
+    JobRecord,
+    NewCheckpoint,
+    NewJob,
+    References,
+    ResumeState,
+)
 from tests.store.test_checkpoints import policy
 
 COUNT = NewJob(kind="count", spec={"kind": "count"})
@@ -41,6 +48,14 @@ def test_resumed_job_continues_from_its_newest_state(
     assert found is not None and found[1].step == 10 and found[0].attempt == 2
     resumed = attempts.load_resume(store, claim.job_id)
     assert resumed is not None and resumed.step == 10
+
+
+def test_training_whose_cell_was_removed_is_not_resumed(store: Store, claim: Claim) -> None:
+    save(store, claim, 10, policy(b"10"))
+    end(store, claim, "cancelled")
+    with pytest.raises(InvalidInput, match="overrides.cell = 'kitchen' is no longer stored"):
+        job_actions.resume_job(store, claim.job_id, references=References(cell="kitchen"))
+    assert jobs.get_job(store, claim.job_id).state == "cancelled"
 
 
 def test_kills_before_a_resume_count_no_longer(store: Store, claim: Claim) -> None:

@@ -10,6 +10,14 @@ from app.api.services import ServicesDep
 from app.errors import Conflict, NotFound
 from app.policies.checkpoints import pretrained
 
+IN_USE: dict[int | str, dict[str, Any]] = {
+    409: {
+        "description": "It is the name of a shipped checkpoint, or a job that has not ended "
+        "evaluates its checkpoint by this name"
+    },
+    507: {},
+}
+
 router = APIRouter(prefix="/v1/aliases", tags=["checkpoints"])
 RESERVED: dict[int | str, dict[str, Any]] = {
     409: {"description": "It is the name of a shipped checkpoint"},
@@ -53,7 +61,7 @@ def set_alias(name: str, body: AliasTarget, services: ServicesDep, response: Res
     return Alias.of(name, record.sha256)
 
 
-@router.delete("/{name}", status_code=204, summary="Remove an alias", responses=RESERVED)
+@router.delete("/{name}", status_code=204, summary="Remove an alias", responses=IN_USE)
 def remove_alias(name: str, services: ServicesDep) -> None:
     """Remove an alias; its checkpoint stays."""
     _require_own(name)

@@ -6,7 +6,14 @@ from typing import Annotated, Any
 from fastapi import APIRouter, Body, Response
 
 from app.api.description import CREATED
-from app.api.job_requests import IdempotencyKey, JobDep, checked, queued, shown
+from app.api.job_requests import (
+    IdempotencyKey,
+    JobDep,
+    checked,
+    queued,
+    shown,
+    stored_references,
+)
 from app.api.schemas import examples
 from app.api.schemas.examples import named
 from app.api.schemas.jobs import JobPublic
@@ -67,7 +74,8 @@ def resume_job(
     """
     changes = {} if body is None else body.model_dump(exclude_unset=True)
     require_budgeted(job, changes)
-    resumed = job_actions.resume_job(services.store, job.id, changes)
+    references = stored_references(job)
+    resumed = job_actions.resume_job(services.store, job.id, changes, references)
     services.supervisor.wake()
     return shown(resumed, services)
 

@@ -105,7 +105,12 @@ async def create_recording(
     return RecordingPublic.from_domain(record)
 
 
-@router.delete("/{name}", status_code=204, summary="Remove a recording", responses={507: {}})
+@router.delete(
+    "/{name}",
+    status_code=204,
+    summary="Remove a recording",
+    responses={409: {"description": "A job that has not ended evaluates with it"}, 507: {}},
+)
 def delete_recording(name: str, services: ServicesDep) -> None:
     """Remove a recording."""
     services.recordings.remove(name)

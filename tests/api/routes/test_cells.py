@@ -140,5 +140,12 @@ def test_cell_with_a_waiting_job_cannot_be_removed(
     job = client.post("/v1/jobs", json=body).json()
     refused = client.delete("/v1/cells/workshop")
     client.post(f"/v1/jobs/{job['id']}/cancel")
-    assert refused.status_code == 409
-    assert job["id"] in refused.json()["detail"]
+    assert (refused.status_code, refused.json()["field"]) == (409, "cell")
+    assert f"job {job['number']}" in refused.json()["rule"]
+
+
+def test_job_may_name_a_shipped_cell(client: TestClient) -> None:
+    body = {"kind": "train", "preset": "pick-td3", "overrides": {"cell": "pick-and-place"}}
+    posted = client.post("/v1/jobs", json=body)
+    assert posted.status_code == 202
+    client.post(f"/v1/jobs/{posted.json()['id']}/cancel").raise_for_status()

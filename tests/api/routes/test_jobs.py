@@ -141,7 +141,10 @@ def test_evaluation_beside_a_stored_recording_is_accepted(
     job = answer.json()
     assert answer.status_code == 202
     assert job["spec"] == {**body, "checkpoint": "pick"}
+    refused = client.delete(f"/v1/recordings/{wave}")
+    assert (refused.status_code, refused.json()["field"]) == (409, "recording")
     client.post(f"/v1/jobs/{job['id']}/cancel")
+    assert "event: end" in client.get(f"/v1/jobs/{job['id']}/events").text
 
 
 def test_jobs_are_listed_in_pages_newest_first(

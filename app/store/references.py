@@ -1,0 +1,84 @@
+"""References of jobs: stored when a job is queued, kept until it has ended.
+
+Both are checked in the transaction that queues the job or deletes the object: of two at once
+the later one is refused.
+"""
+
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any
+
+import sqlalchemy as sa
+
+from app.errors import InvalidInput, WrongState
+from app.store.database.tables import aliases, cells, checkpoints, jobs, recordings
+from app.store.records import FINAL_STATES, NewJob, References
+
+
+def references_of(job: NewJob) -> References:
+    """Return what a job refers to; its cell may be a shipped one."""
+    return _references(job.spec, job.overrides or {})
+
+
+def require_stored(connection: sa.Connection, references: References) -> None:
+    """Check that what a job refers to is stored.
+
+    Raises:
+        InvalidInput: Something is not, since it was deleted after the job was checked.
+    """
+    found = references.checkpoint
+    pointed = sa.select(aliases.c.sha256).where(aliases.c.name == found)
+    same = sa.or_(checkpoints.c.sha256 == found, checkpoints.c.sha256.in_(pointed))
+    _require(connection, "checkpoint", found, checkpoints, same)
+    cell = references.cell
+    _require(connection, "overrides.cell", cell, cells, cells.c.name == cell)
+    for place, name in enumerate(references.recordings):
+        field = f"recordings[{place}]"
+        _require(connection, field, name, recordings, recordings.c.name == name)
+
+
+def unfinished(connection: sa.Connection) -> Iterator[tuple[int, References]]:
+    """Yield number and references of each job that has not ended, oldest first."""
+    query = sa.select(jobs.c.number, jobs.c.spec, jobs.c.overrides)
+    query = query.where(jobs.c.state.not_in(FINAL_STATES)).order_by(jobs.c.number)
+    for row in connection.execute(query):
+        yield row.number, _references(row.spec, row.overrides)
+
+
+def require_unused(
+    connection: sa.Connection, field: str, name: str, refers: Callable[[References], bool]
+) -> None:
+    """Check that no job that has not ended refers to an object.
+
+    Args:
+        field: Kind of the object.
+        name: Its name.
+        refers: Whether references are to this object.
+
+    Raises:
+        WrongState: A job does.
+    """
+    for number, references in unfinished(connection):
+        if refers(references):
+            rule = f"is in use by job {number}, which has not ended: cancel the job first"
+            raise WrongState(field, name, rule)
+
+
+def _references(spec: Mapping[str, Any], overrides: Mapping[str, Any]) -> References:
+    return References(
+        checkpoint=spec.get("checkpoint"),
+        cell=overrides.get("cell"),
+        recordings=tuple(spec.get("recordings", ())),
+    )
+
+
+def _require(
+    connection: sa.Connection,
+    field: str,
+    name: str | None,
+    table: sa.Table,
+    same: sa.ColumnElement[bool],
+) -> None:
+    """Check that a table has the row of a name; None names nothing."""
+    query = sa.select(sa.literal(1)).select_from(table).where(same)
+    if name is not None and connection.execute(query).first() is None:
+        raise InvalidInput(field, name, "is no longer stored")
