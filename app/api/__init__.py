@@ -17,7 +17,7 @@ registry          Cache of loaded policies, and names of stored checkpoints
 security          Access control: one ASGI layer around every route, mount and socket
 service_state     Metrics that are read from the service at a scrape
 services          Parts of the service that routes use; ``app.main`` creates them
-sockets           Refusal of a WebSocket with a reason
+sockets           Limits of WebSocket messages, and refusal of a socket with a reason
 texts             Detection of JSON that no route accepts
 tracker_sessions  Sessions of trackers: the estimators of people, kept between frames
 validation        Conversion of pydantic's validation errors to field, value, rule and

@@ -1,9 +1,13 @@
-"""Refusal of a WebSocket with a reason."""
+"""Limits of WebSocket messages, and refusal of a socket with a reason."""
 
 from starlette.websockets import WebSocket
 
-TRY_AGAIN, POLICY = 1013, 1008
-"""Close codes: try again later; the request breaks a rule."""
+MAX_MESSAGE = 64 * 1024
+"""Longest message of a client: characters of a text, bytes of another frame."""
+MAX_MESSAGE_BYTES = 4 * MAX_MESSAGE
+"""Largest message that the server receives: a character has at most four bytes in UTF-8."""
+TRY_AGAIN, POLICY, TOO_LARGE = 1013, 1008, 1009
+"""Close codes: try again later; the request breaks a rule; the message is too large."""
 
 MAX_REASON = 123
 """Longest reason [bytes]."""

@@ -13,14 +13,13 @@ from fastapi import FastAPI
 from starlette.concurrency import run_in_threadpool
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from app.api.sockets import MAX_MESSAGE_BYTES
 from app.cli.http_limits import LimitedHttp
 from app.cli.preflight import address_of
 from app.settings import Settings
 
 GRACE_S = 3
 """Time for open requests once the server stops [s]."""
-MAX_FRAME_BYTES = 16 * 1024 * 1024
-"""Largest WebSocket frame: a picture of the viewer's canvas; see ``app.api.routes.viewer``."""
 
 
 class Server(uvicorn.Server):
@@ -61,7 +60,7 @@ def new_server(
         log_config=None,
         access_log=False,
         ws_per_message_deflate=False,
-        ws_max_size=MAX_FRAME_BYTES,
+        ws_max_size=MAX_MESSAGE_BYTES,
         timeout_graceful_shutdown=GRACE_S,
         callback_notify=on_tick,
         timeout_notify=0,

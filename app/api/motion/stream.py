@@ -32,15 +32,13 @@ from app.api.problems import (
 )
 from app.api.schemas.motion import LeftOut, MotionRequest, StreamUse
 from app.api.services import Services
-from app.api.sockets import POLICY
+from app.api.sockets import MAX_MESSAGE, POLICY
 from app.api.texts import fault_in_json
 from app.errors import ServiceError
 
 logger = logging.getLogger(__name__)
 
 PATH = "/v1/motion/stream"
-MAX_MESSAGE = 1 << 16
-"""Longest message [characters]."""
 MAX_WAITING = 64
 """Largest number of requests that wait where each is answered; then none is received."""
 MAX_STAMP, MAX_TIME = 64, 1e18

@@ -12,7 +12,7 @@ import hashlib
 import logging
 from functools import lru_cache
 from importlib import resources
-from typing import Annotated, Literal
+from typing import Annotated
 
 import msgspec
 from fastapi import APIRouter, Header
@@ -24,7 +24,7 @@ from websockets.exceptions import ConnectionClosed
 from websockets.typing import Subprotocol
 
 from app.api.services import MAX_VIEWERS, LiveWorld, ServicesDep, services_of
-from app.api.sockets import refuse
+from app.api.sockets import MAX_MESSAGE, TOO_LARGE, refuse
 from app.errors import ServiceError
 
 logger = logging.getLogger(__name__)
@@ -39,11 +39,8 @@ TYPES = {
     "TransformControlsDragStartMessage",
     "TransformControlsUpdateMessage",
     "ViewerCameraMessage",
-    "GetRenderResponseMessage",
 }
 """Allowed messages of a browser: no uploads, no requests for a public tunnel."""
-MAX_FRAME_BYTES = 64 * 1024
-"""Largest frame other than a picture."""
 SMALL_BYTES = 1024
 """Largest frame decoded on the event loop, in microseconds."""
 # The viewer's page is one inline script that unpacks itself, and its WebAssembly loader
@@ -168,17 +165,17 @@ async def to_viewer(client: WebSocket, viewer: ClientConnection) -> None:
         if message["type"] == "websocket.disconnect":
             return
         frame: bytes = message.get("bytes") or b""
+        if len(frame or message.get("text") or "") > MAX_MESSAGE:
+            await client.close(TOO_LARGE, f"a frame has at most {MAX_MESSAGE} bytes")
+            return
         if len(frame) <= SMALL_BYTES:
             allowed = is_allowed(frame)
         else:
             allowed = await asyncio.to_thread(is_allowed, frame)
         if allowed:
             await viewer.send(frame)
-            continue
-        logger.warning("dropped a forbidden frame of a browser")
-        if len(frame or message.get("text") or "") > MAX_FRAME_BYTES:
-            await client.close(1009, f"a frame has at most {MAX_FRAME_BYTES} bytes")
-            return
+        else:
+            logger.warning("dropped a forbidden frame of a browser")
 
 
 async def to_client(client: WebSocket, viewer: ClientConnection) -> None:
@@ -187,28 +184,13 @@ async def to_client(client: WebSocket, viewer: ClientConnection) -> None:
         await client.send_bytes(frame if isinstance(frame, bytes) else frame.encode())
 
 
-class Picture(msgspec.Struct, forbid_unknown_fields=True):
-    """A picture of the canvas, requested by the viewer."""
-
-    type: Literal["GetRenderResponseMessage"]
-    """Name of the message."""
-    payload: bytes
-    """The picture, JPEG or PNG."""
-    render_uuid: str
-    """Id of the request."""
-
-
 def is_allowed(frame: bytes) -> bool:
     """Return whether a browser's frame may reach the viewer.
 
-    A frame is one msgpack map with the name of the message in ``type``. A frame of at most
-    ``MAX_FRAME_BYTES`` is decoded as the viewer does, so that both see the same ``type``; a
-    larger one must be a picture without further members.
+    A frame is one msgpack map with the name of the message in ``type``. It is decoded as the
+    viewer does, so that both see the same ``type``.
     """
     try:
-        if len(frame) > MAX_FRAME_BYTES:
-            msgspec.msgpack.decode(frame, type=Picture)
-            return True
         message = msgspec.msgpack.decode(frame)
     except (msgspec.DecodeError, ValueError, RecursionError):
         return False

@@ -14,6 +14,7 @@ from websockets.sync.client import ClientConnection, connect
 from app.api.motion.load import LOOP_HZ, MAX_SHARE, MAX_SOCKETS, MotionLoad, SocketRate
 from app.api.schemas.examples import MOTION
 from app.api.services import Services
+from app.api.sockets import MAX_MESSAGE, MAX_MESSAGE_BYTES, TOO_LARGE
 from app.main import create_app
 from app.settings import Settings
 from tests.api.live_server import running, wait_until_ready
@@ -76,6 +77,25 @@ def close_of(socket: ClientConnection) -> tuple[int, str]:
         socket.recv(timeout=PATIENCE_S)
     assert socket.close_code is not None
     return socket.close_code, socket.close_reason or ""
+
+
+@pytest.mark.usefixtures("services")
+def test_longest_message_is_read_and_a_longer_one_is_answered_by_a_problem(url: str) -> None:
+    longest = json.dumps({"cell": "\U0001f9be" * (MAX_MESSAGE - 12)}, ensure_ascii=False)
+    assert len(longest) == MAX_MESSAGE and len(longest.encode()) > 3 * MAX_MESSAGE
+    with connect(url) as socket:
+        for message, status in ((longest, 422), (longest + " ", 413)):
+            socket.send(message)
+            assert received(socket)["status"] == status
+
+
+@pytest.mark.usefixtures("services")
+def test_message_beyond_what_is_received_closes_its_socket(url: str) -> None:
+    with connect(url) as other, connect(url) as socket:
+        socket.send(" " * (MAX_MESSAGE_BYTES + 1))
+        assert close_of(socket)[0] == TOO_LARGE
+        send(other, stamp=1)
+        assert received(other)["stamp"] == 1
 
 
 @pytest.mark.usefixtures("services")
