@@ -72,10 +72,12 @@ def clean_runs(times: Vec, artifacts: Sequence[Artifact]) -> tuple[tuple[int, in
         artifacts: From :func:`find_artifacts`.
     """
     good = np.ones(len(times), dtype=bool)
-    for one in artifacts:
-        after, before = times - times[one.first], times[one.last] - times
-        # A tolerance of 0.5 ns makes the result independent of rounding.
-        good[(np.minimum(after, before)) >= -(MARGIN + 0.5e-9)] = False
+    margin = MARGIN + 0.5e-9  # with a tolerance that makes the result independent of rounding
+    firsts = times[[one.first for one in artifacts]] - margin
+    lasts = times[[one.last for one in artifacts]] + margin
+    begins, ends = np.searchsorted(times, firsts), np.searchsorted(times, lasts, side="right")
+    for begin, end in zip(begins, ends, strict=True):
+        good[begin:end] = False
     edges = np.flatnonzero(np.diff(np.concatenate([[False], good, [False]]).astype(int)))
     runs = edges.reshape(-1, 2) - np.array([0, 1])
     return tuple((int(a), int(b)) for a, b in runs if times[b] - times[a] >= MIN_RUN)
@@ -94,11 +96,13 @@ def merged(
     in_file = [
         replace(one, first=int(frames[one.first]), last=int(frames[one.last])) for one in found
     ]
-    firsts = np.array([one.first for one in missing])
+    firsts = np.sort([one.first for one in missing])
+    begins = np.searchsorted(firsts, [one.first for one in in_file], side="right")
+    ends = np.searchsorted(firsts, [one.last for one in in_file])
     kept = [
         one
-        for one in in_file
-        if one.parts != ("time",) or not ((one.first < firsts) & (firsts < one.last)).any()
+        for one, begin, end in zip(in_file, begins, ends, strict=True)
+        if one.parts != ("time",) or begin >= end
     ]
     return tuple(sorted([*kept, *missing], key=lambda one: (one.first, one.last)))
 

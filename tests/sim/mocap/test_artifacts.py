@@ -6,6 +6,7 @@ from app.sim.human.anthropometry import BodySize
 from app.sim.mocap.artifacts import (
     MARGIN,
     MAX_SPEED,
+    MIN_RUN,
     Artifact,
     clean_runs,
     find_artifacts,
@@ -92,3 +93,61 @@ def test_runs_shorter_than_a_second_are_dropped() -> None:
     points[[200, 280], WRIST_R] += 0.5
     runs = clean_runs(times, find_artifacts(times, points))
     assert runs == ((0, 193), (287, 599))
+
+
+class CountedTimes(np.ndarray):
+    """Times that count the numbers of their arithmetic."""
+
+    work = 0
+
+    def __array_ufunc__(
+        self, ufunc: np.ufunc, method: str, *inputs: object, **options: object
+    ) -> object:
+        plain = [np.asarray(one) for one in inputs]
+        CountedTimes.work += max(one.size for one in plain)
+        return getattr(ufunc, method)(*plain, **options)
+
+
+def many_artifacts(n: int) -> tuple[Vec, list[Artifact]]:
+    """Return ``n`` times at about 50 Hz, with about one artefact per 100 of them."""
+    rng = np.random.default_rng(7)
+    firsts = np.flatnonzero(rng.random(n - 50) < 0.01)
+    lasts = firsts + rng.integers(1, 50, len(firsts))
+    found = [
+        Artifact(first=int(a), last=int(b), parts=("wrist_r",), speed=9.0, reason="")
+        for a, b in zip(firsts, lasts, strict=True)
+    ]
+    return np.cumsum(rng.uniform(0.01, 0.03, n)), found
+
+
+def test_runs_between_many_artifacts_are_farther_from_each_than_the_margin() -> None:
+    times, artifacts = many_artifacts(20_000)
+    bad = np.zeros(len(times), dtype=bool)
+    for one in artifacts:
+        bad |= (times > times[one.first] - MARGIN) & (times < times[one.last] + MARGIN)
+    runs = clean_runs(times, artifacts)
+    good = np.flatnonzero(~bad)
+    groups = np.split(good, np.flatnonzero(np.diff(good) > 1) + 1)
+    long = [(one[0], one[-1]) for one in groups if times[one[-1]] - times[one[0]] >= MIN_RUN]
+    assert len(long) > 20 and runs == tuple(long)
+
+
+def test_work_for_runs_grows_with_the_frames_and_artifacts_not_their_product() -> None:
+    times, artifacts = many_artifacts(20_000)
+    CountedTimes.work = 0
+    clean_runs(times.view(CountedTimes), artifacts)
+    assert 0 < CountedTimes.work <= 4 * (len(times) + len(artifacts))
+
+
+def test_holes_are_replaced_by_the_missing_values_inside_them() -> None:
+    def span(first: int, last: int, part: str) -> Artifact:
+        return Artifact(first=first, last=last, parts=(part,), speed=0.0, reason="")
+
+    missing = [span(40, 41, "elbow_r"), span(11, 12, "elbow_r")]
+    holes = [span(10, 13, "time"), span(12, 40, "time"), span(39, 42, "time")]
+    left = merged(holes, missing, np.arange(50))
+    assert [(one.first, one.parts[0]) for one in left] == [
+        (11, "elbow_r"),
+        (12, "time"),
+        (40, "elbow_r"),
+    ]
