@@ -26,7 +26,7 @@ NICENESS = 10
 """Niceness of a worker, below the priority of the server and its live cell."""
 
 
-def main(
+def run_attempt(
     connect: Connect,
     style: logs.Style = "text",
     arguments: Sequence[str] | None = None,

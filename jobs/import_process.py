@@ -196,7 +196,3 @@ def _framed(head: Mapping[str, Any], payload: bytes) -> bytes:
 def _unframed(content: bytes) -> tuple[dict[str, Any], bytes]:
     start = _LENGTH + int.from_bytes(content[:_LENGTH], "little")
     return json.loads(content[_LENGTH:start]), content[start:]
-
-
-if __name__ == "__main__":
-    main()

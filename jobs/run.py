@@ -26,7 +26,7 @@ from app.policies.training.train import train as train_policy
 from app.settings import Settings, load_settings
 from app.store.records import Claim, NewCheckpoint, ResumeState
 from jobs.access import JobAccess, open_access
-from jobs.attempt import main
+from jobs.attempt import run_attempt
 from jobs.inputs import JobInputs, StoreInputs
 from jobs.spec import EvaluateSpec, parse_spec
 from jobs.worker import JobWorker, Runner
@@ -122,7 +122,12 @@ def connect(settings: Settings, claim: Claim) -> tuple[JobAccess, Mapping[str, R
     return access, runners(StoreInputs(access.store, settings.data, claim.job_id))
 
 
-if __name__ == "__main__":
+def main() -> int:
+    """Run the attempt of the command line with the settings of the environment."""
     torch.set_num_threads(1)
     settings = load_settings()
-    sys.exit(main(partial(connect, settings), settings.log))
+    return run_attempt(partial(connect, settings), settings.log)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

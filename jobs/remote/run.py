@@ -13,7 +13,7 @@ import torch
 from app.settings import Settings, load_settings
 from app.store.records import Claim
 from jobs.access import JobAccess
-from jobs.attempt import main
+from jobs.attempt import run_attempt
 from jobs.remote.access import ServiceAccess
 from jobs.remote.connection import ServiceConnection
 from jobs.remote.inputs import ServiceInputs
@@ -27,7 +27,12 @@ def connect(settings: Settings, claim: Claim) -> tuple[JobAccess, Mapping[str, R
     return ServiceAccess(service), runners(ServiceInputs(service))
 
 
-if __name__ == "__main__":
+def main() -> int:
+    """Run the attempt of the command line with the settings of the environment."""
     torch.set_num_threads(1)
     settings = load_settings()
-    sys.exit(main(partial(connect, settings), settings.log))
+    return run_attempt(partial(connect, settings), settings.log)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

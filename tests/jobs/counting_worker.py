@@ -9,7 +9,6 @@ database in this process [pages], read at each transaction).
 
 import os
 import random
-import sys
 import time
 from collections.abc import Mapping
 from pathlib import Path
@@ -22,7 +21,7 @@ from app.digests import digest
 from app.errors import InvalidInput
 from app.store.records import Claim, NewCheckpoint, ResumeState
 from jobs.access import JobAccess, StoreAccess, open_access
-from jobs.attempt import main
+from jobs.attempt import run_attempt
 from jobs.worker import JobWorker, Runner
 
 GRID = 5
@@ -99,5 +98,5 @@ def connect(claim: Claim) -> tuple[JobAccess, Mapping[str, Runner]]:
     return access, {"count": count}
 
 
-if __name__ == "__main__":
-    sys.exit(main(connect))
+def main() -> int:
+    return run_attempt(connect)
