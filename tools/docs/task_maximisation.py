@@ -28,8 +28,8 @@ from app.policies.configs.pick import PickPreset
 from app.policies.evaluation.pick.episodes import EVALUATION_LIBRARY
 from app.policies.inference.value_networks import pick_preset_of
 from app.policies.networks.pick import actor_of, critics_for
+from app.policies.training.curve import play
 from app.policies.training.pick import settings_of, values_of
-from app.policies.training.td3 import play
 from app.provenance import describe
 from app.sim.cells.cell import load_cell
 from app.sim.pick.batch import OUTCOMES

@@ -25,9 +25,11 @@ from app.policies.configs.pick import PickPreset
 from app.policies.configs.reach import ReachPreset
 from app.policies.configs.sorting import SortingPreset
 from app.policies.training import pick, reach
-from app.policies.training.td3 import CURVE_SEED, PlayedBatch, play
+from app.policies.training.curve import CURVE_SEED, play
 from app.provenance import describe
 from app.sim.cells.cell import load_cell
+from app.sim.pick.batch import PickBatch
+from app.sim.reach.mixed_batch import ReachEnvironments
 from tools.docs.learning_curves import lines, merged
 from tools.docs.training_curves import read
 
@@ -93,7 +95,7 @@ def standing_still(preset: ReachPreset | PickPreset) -> float:
     """Return the mean return of standing still in the episodes of the curve of a preset."""
     cell = load_cell(preset.cell)
     if isinstance(preset, PickPreset):
-        batch: PlayedBatch = pick.curve_batch(preset, cell)
+        batch: PickBatch | ReachEnvironments = pick.curve_batch(preset, cell)
     else:
         batch = reach.curve_batch(preset, cell)
     _, returns = play(Still(batch.n_act), batch)

@@ -1,5 +1,7 @@
 """Training runs.
 
+curve         Greedy episodes behind a point of a learning curve, the same ones at every
+              point
 file_store    Stores of files that are named by their SHA-256; a folder is one
 memory_files  Replay memory on disk: files of transitions named by their SHA-256, written
               incrementally

@@ -20,17 +20,11 @@ from app.policies.configs.pick import PickPeople, PickPreset
 from app.policies.networks.actor_critic import Critics
 from app.policies.networks.outcome import OutcomeHead
 from app.policies.networks.pick import LAYOUTS, actor_of, critics_for
+from app.policies.training.curve import CURVE_SEED, outcome_rates, play
 from app.policies.training.outcome import collect, fit
 from app.policies.training.reporter import Callbacks, Reporter
 from app.policies.training.run import TrainingRun
-from app.policies.training.td3 import (
-    CURVE_SEED,
-    TD3Scenario,
-    TrainingMonitor,
-    outcome_rates,
-    play,
-    start_td3,
-)
+from app.policies.training.td3 import TD3Scenario, TrainingMonitor, start_td3
 from app.sim.cells.cell import Cell
 from app.sim.core.arrays import Vec
 from app.sim.envs.tasks import ArmTask
@@ -255,14 +249,14 @@ class PickReporter(Reporter):
         self._monitor, self._preset, self._batch = monitor, run.preset, monitor.env.batch
         self._returns = np.zeros(run.preset.learning.n_envs)
         self._counts = np.zeros(len(OUTCOMES), dtype=np.int64)
-        self._total_return, self._run = 0.0, run
+        self._total_return = 0.0
         plays = run.preset.learning.progress_episodes > 0
         self._test_batch = curve_batch(run.preset, run.cell) if plays else None
 
     def load_state_dict(self, state: Mapping[str, Any]) -> None:
         """Restore a state, and the collision cost and the starts of its step."""
         super().load_state_dict(state)
-        follow_schedules(self._preset, self._batch, self._attempt.step)
+        follow_schedules(self._preset, self._batch, self._run.step)
 
     def watch(self, rewards: NDArray[np.floating]) -> None:
         """Count the episodes that ended, and update the training range."""
@@ -282,7 +276,7 @@ class PickReporter(Reporter):
         """
         if self._test_batch is not None:
             with self._run.untimed():
-                return outcome_rates(*play(self._monitor.actor, self._test_batch))
+                return outcome_rates(*play(self._monitor.actor, self._test_batch), OUTCOMES)
         episodes = int(self._counts.sum())
         shares = {
             name: int(self._counts[OUTCOMES.index(name)]) / episodes if episodes else None

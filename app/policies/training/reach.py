@@ -16,20 +16,15 @@ from app.policies.inference.reach_policy import LAYOUTS, PEOPLE_SET, blocked_rul
 from app.policies.networks.actor_critic import Critics, PlainActor, ResidualActor
 from app.policies.networks.ddpg import DDPGActor, DDPGCritics, RunningNormalisation
 from app.policies.networks.quantiles import QuantileCritics
+from app.policies.training.curve import CURVE_SEED, outcome_rates, play
 from app.policies.training.reporter import Callbacks, Reporter
 from app.policies.training.run import TrainingRun
-from app.policies.training.td3 import (
-    CURVE_SEED,
-    TD3Scenario,
-    TrainingMonitor,
-    outcome_rates,
-    play,
-    start_td3,
-)
+from app.policies.training.td3 import TD3Scenario, TrainingMonitor, start_td3
 from app.sim.cells.cell import Cell
 from app.sim.core.arrays import Vec
 from app.sim.envs.tasks import ArmTask
 from app.sim.people.kernels.pedestrian import VX, VY, R, X, Y
+from app.sim.pick.batch import OUTCOMES
 from app.sim.reach.batch import N_ACT, ReachSettings
 from app.sim.reach.blocked_batch import new_reach_batch
 from app.sim.reach.kernels.observation import BASE_START
@@ -151,7 +146,7 @@ class ReachReporter(Reporter):
         self, run: TrainingRun, callbacks: Callbacks, monitor: TrainingMonitor
     ) -> None:
         super().__init__(run, callbacks)
-        self._run, self._monitor, preset = run, monitor, run.preset
+        self._monitor, preset = monitor, run.preset
         assert isinstance(preset, ReachPreset)
         self._test_batch = curve_batch(preset, run.cell)
 
@@ -162,7 +157,7 @@ class ReachReporter(Reporter):
     def rates(self) -> dict[str, Any]:
         """Return rates of greedy episodes of the present actor."""
         with self._run.untimed():
-            return outcome_rates(*play(self._monitor.actor, self._test_batch))
+            return outcome_rates(*play(self._monitor.actor, self._test_batch), OUTCOMES)
 
 
 def visited_states(batch: ReachEnvironments) -> dict[str, Vec]:

@@ -3,43 +3,15 @@
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 from stable_baselines3.common.callbacks import BaseCallback
 
 from app.errors import SimulationError
-from app.policies.configs.presets import Preset
 from app.policies.training.progress import Progress
-from app.policies.training.run import OnCheckpoint
+from app.policies.training.run import OnCheckpoint, TrainingRun
 from app.state_dict import Stateful
-
-
-class Run(Protocol):
-    """One attempt at a training."""
-
-    @property
-    def preset(self) -> Preset:
-        """All hyper-parameters."""
-
-    @property
-    def seed(self) -> int:
-        """Seed of everything random."""
-
-    @property
-    def step(self) -> int:
-        """Environment steps so far."""
-
-    @property
-    def updates(self) -> int:
-        """Updates so far."""
-
-    @property
-    def cpu_s(self) -> float:
-        """CPU time so far [s]."""
-
-    def save(self, on_checkpoint: OnCheckpoint) -> None:
-        """Pass on policy and state."""
 
 
 class Callbacks(NamedTuple):
@@ -61,9 +33,9 @@ class Reporter(BaseCallback, Stateful, ABC):
         callbacks: Receivers of the curve and of checkpoints.
     """
 
-    def __init__(self, run: Run, callbacks: Callbacks) -> None:
+    def __init__(self, run: TrainingRun, callbacks: Callbacks) -> None:
         super().__init__()
-        self._attempt, self._callbacks = run, callbacks
+        self._run, self._callbacks = run, callbacks
         self._begin_window()
 
     def load_state_dict(self, state: Mapping[str, Any]) -> None:
@@ -80,32 +52,32 @@ class Reporter(BaseCallback, Stateful, ABC):
         """Return episodes, success, collision, timeout and reward since the last point."""
 
     def _begin_window(self) -> None:
-        self._wall, self._window_step = time.monotonic(), self._attempt.step
-        self._window_updates = self._attempt.updates
+        self._wall, self._window_step = time.monotonic(), self._run.step
+        self._window_updates = self._run.updates
 
     def _on_step(self) -> bool:
         rewards = np.asarray(self.locals["rewards"])
         if not np.isfinite(rewards).all():
             raise SimulationError(
-                f"non-finite reward at step {self.num_timesteps}, seed {self._attempt.seed}"
+                f"non-finite reward at step {self.num_timesteps}, seed {self._run.seed}"
             )
         self.watch(rewards)
         return True
 
     def report(self) -> bool:
         """Report after a step and its updates; return whether the training continues."""
-        step, intervals = self._attempt.step, self._attempt.preset.learning
+        step, intervals = self._run.step, self._run.preset.learning
         if step % intervals.progress_steps == 0:
             self._callbacks.on_progress(self._point(step))
             self._begin_window()
             if step % intervals.checkpoint_steps == 0:
-                self._attempt.save(self._callbacks.on_checkpoint)
+                self._run.save(self._callbacks.on_checkpoint)
         return not self._callbacks.should_stop()
 
     def _point(self, step: int) -> Progress:
         wall = max(1e-6, time.monotonic() - self._wall)
         speed = (step - self._window_step) / wall
-        total, updates = self._attempt.preset.learning.total_steps, self._attempt.updates
+        total, updates = self._run.preset.learning.total_steps, self._run.updates
         has_rate = updates > self._window_updates or step >= total
         return Progress(
             step=step,
@@ -115,5 +87,5 @@ class Reporter(BaseCallback, Stateful, ABC):
             steps_per_s=speed,
             time_left_s=(total - step) / speed if has_rate else None,
             **self.rates(),
-            cpu_s=self._attempt.cpu_s,
+            cpu_s=self._run.cpu_s,
         )

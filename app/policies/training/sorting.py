@@ -15,18 +15,17 @@ from app.policies.algorithms.dqn import Expert, SortingDQN
 from app.policies.algorithms.vecenv import BatchVecEnv
 from app.policies.configs.sorting import SortingPreset
 from app.policies.networks.sorting_q import layout_of
+from app.policies.training.curve import CURVE_SEED, outcome_rates, play
 from app.policies.training.reporter import Callbacks, Reporter
 from app.policies.training.run import Parts, TrainingRun
 from app.sim.cells.cell import Cell
 from app.sim.envs.sorting import SortingTask
-from app.sim.sorting.batch import OUTCOMES, SortingBatch, SortingSettings, batch_in
+from app.sim.sorting.batch import OUTCOMES, SortingSettings, batch_in
 from app.sim.sorting.kernels.planner import new_work
 from app.sim.sorting.kernels.planner_batch import TaskBatch, mark_rows
 from app.sim.sorting.kernels.task import FAILURE_SCALE
 from app.sim.sorting.state import NULL, SortingShape
 
-CURVE_SEED = 1_000_003
-"""Seed of the episodes behind a point of the curve; no evaluation uses it."""
 FADE_EVERY = 16
 """Steps of all tasks between two looks at the curriculum."""
 
@@ -89,7 +88,7 @@ class SortingReporter(Reporter):
 
     def __init__(self, run: TrainingRun, callbacks: Callbacks, trained: SortingDQN) -> None:
         super().__init__(run, callbacks)
-        self._run, self._trained, self._preset = run, trained, trained.preset
+        self._trained, self._preset = trained, trained.preset
         self._faded = 0.0
         settings = SortingSettings(
             horizon_factor=self._preset.episode.horizon_factor,
@@ -113,30 +112,8 @@ class SortingReporter(Reporter):
     def rates(self) -> dict[str, Any]:
         """Return how greedy episodes end now."""
         with self._run.untimed():
-            ended, returns = play(self._trained, self._played)
-        n = len(ended)
-        return {
-            "episodes": n,
-            "success": float((ended == OUTCOMES.index("success")).mean()),
-            "collision": None,
-            "timeout": float((ended == OUTCOMES.index("timeout")).mean()),
-            "reward": float(returns.mean()),
-        }
+            return outcome_rates(*play(self._greedy, self._played), OUTCOMES)
 
-
-def play(model: SortingDQN, batch: SortingBatch) -> tuple[NDArray[np.int64], NDArray[Any]]:
-    """Play one greedy episode in every row of a batch.
-
-    Returns:
-        Outcomes and undiscounted returns, each (n_envs,).
-    """
-    obs = batch.reset().copy()
-    ended, returns = np.zeros(batch.n_envs, dtype=np.int64), np.zeros(batch.n_envs)
-    while (live := np.flatnonzero(ended == 0)).size:
-        act = np.zeros(batch.n_envs, dtype=np.int64)
-        with torch.inference_mode():
-            act[live] = model.q_net(torch.as_tensor(obs[live])).argmax(dim=1).numpy()
-        result = batch.step(act, auto_reset=False)
-        obs, returns = result.obs.copy(), returns + result.rew
-        ended = np.where(result.ended > 0, result.ended, ended)
-    return ended, returns
+    def _greedy(self, obs: torch.Tensor) -> torch.Tensor:
+        moves: torch.Tensor = self._trained.q_net(obs).argmax(dim=1)
+        return moves

@@ -2,11 +2,9 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
-import numpy as np
 import torch
-from numpy.typing import NDArray
 
 from app.policies.algorithms.exploration import Exploration
 from app.policies.algorithms.td3 import BatchTD3, Networks, critics_of
@@ -18,28 +16,9 @@ from app.policies.training.run import Parts, TrainingRun
 from app.sim.cells.cell import Cell
 from app.sim.core.arrays import Vec
 from app.sim.envs.tasks import ArmTask
-from app.sim.pick.batch import OUTCOMES
-from app.sim.scenario.step_result import StepResult
 
-CURVE_SEED = 1_000_003
-"""Seed of the episodes behind a point of the curve; no evaluation uses it."""
 RANGE_EVERY = 8
 """Steps of all environments between two updates of the training range."""
-
-
-class PlayedBatch(Protocol):
-    """Environments that episodes are played in."""
-
-    n_envs: int
-    """Number of environments."""
-    n_act: int
-    """Length of an action."""
-
-    def reset(self) -> NDArray[np.float32]:
-        """Start episode 0 in every environment; return observations, (n_envs, obs_size)."""
-
-    def step(self, act: NDArray[np.float32], *, auto_reset: bool = True) -> StepResult:
-        """Move every environment through one control cycle."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -125,40 +104,3 @@ def start_td3(
         visited_states=scenario.visited_states,
     )
     return run, monitor
-
-
-def play(
-    actor: torch.nn.Module, batch: PlayedBatch, gamma: float = 1.0
-) -> tuple[NDArray[np.int64], NDArray[np.floating]]:
-    """Play one greedy episode in every row of a batch.
-
-    Args:
-        actor: Returns actions of observations.
-        gamma: Discount factor of the returns per step.
-
-    Returns:
-        Outcomes and returns, each (n_envs,).
-    """
-    obs = batch.reset().copy()
-    ended, returns = np.zeros(batch.n_envs, dtype=np.int64), np.zeros(batch.n_envs)
-    act, discount = np.zeros((batch.n_envs, batch.n_act), dtype=np.float32), 1.0
-    while (live := np.flatnonzero(ended == 0)).size:
-        with torch.inference_mode():
-            act[live] = actor(torch.as_tensor(obs[live])).numpy()
-        result = batch.step(act, auto_reset=False)
-        obs, returns = result.obs.copy(), returns + discount * result.rew
-        discount *= gamma
-        ended = np.where(result.ended > 0, result.ended, ended)
-    return ended, returns
-
-
-def outcome_rates(
-    ended: NDArray[np.int64], returns: NDArray[np.floating]
-) -> dict[str, float | int]:
-    """Return the point of a curve of played episodes."""
-    shares = {name: float((ended == k).mean()) for k, name in enumerate(OUTCOMES)}
-    return {
-        "episodes": len(ended),
-        **{name: shares[name] for name in ("success", "collision", "timeout")},
-        "reward": float(returns.mean()),
-    }

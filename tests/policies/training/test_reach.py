@@ -8,10 +8,10 @@ from app.errors import InvalidInput
 from app.policies.algorithms.vecenv import BatchVecEnv
 from app.policies.configs import presets
 from app.policies.inference.reach_policy import ReachPolicy
+from app.policies.training.curve import play
 from app.policies.training.file_store import FileFolder
 from app.policies.training.memory_files import MemoryFiles
 from app.policies.training.reach import batch_of, settings_of, start, visited_states
-from app.policies.training.td3 import play
 from app.sim.cells.cell import load_cell
 from app.sim.envs.tasks import ArmTask
 from app.sim.reach.batch import ReachBatch, ReachSettings

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from app.policies.configs.sorting import SortingPreset
-from app.policies.training import sorting
+from app.policies.training.curve import CURVE_SEED
 from app.sim.cells.cell import load_cell
 from app.sim.sorting.batch import SortingSettings, batch_in
 from app.sim.sorting.state import Move
@@ -30,7 +30,7 @@ def moving_nothing(preset: SortingPreset) -> float:
     weights, factor = preset.reward.weights, preset.episode.horizon_factor
     settings = SortingSettings(horizon_factor=factor, weights=weights)
     n = preset.learning.progress_episodes
-    batch = batch_in(load_cell(preset.cell), n, sorting.CURVE_SEED, settings)
+    batch = batch_in(load_cell(preset.cell), n, CURVE_SEED, settings)
     batch.reset()
     tower = batch.shape.n_cells
     act = np.full(n, batch.shape.action_of(Move(tower, tower)))
