@@ -168,6 +168,14 @@ def hidden(n_in: int, width: int, layers: int, normed: bool = False) -> list[nn.
     return made
 
 
+def initialise_glorot(module: nn.Module) -> None:
+    """Set Glorot-uniform weights and zero biases, as Stable-Baselines 2 does."""
+    for layer in module.modules():
+        if isinstance(layer, nn.Linear):
+            nn.init.xavier_uniform_(layer.weight)
+            nn.init.zeros_(layer.bias)
+
+
 class QNetwork(nn.Sequential):
     """Map observation and action to one or several values.
 

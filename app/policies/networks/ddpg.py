@@ -11,7 +11,7 @@ Stable-Baselines 2 and of the authors' parameters (docs/method.md 2.5).
 import torch
 from torch import nn
 
-from app.policies.networks.actor_critic import Critics, hidden
+from app.policies.networks.actor_critic import Critics, hidden, initialise_glorot
 
 LAST_WEIGHT = 3e-3
 """Bound of the initial weights of last layers."""
@@ -57,11 +57,8 @@ class RunningNormalisation(nn.Module):
 
 def initialise(net: nn.Sequential) -> None:
     """Set Glorot-uniform weights and zero biases; the last layer's weights lie in ±0.003."""
-    linear = [layer for layer in net if isinstance(layer, nn.Linear)]
-    for layer in linear:
-        nn.init.xavier_uniform_(layer.weight)
-        nn.init.zeros_(layer.bias)
-    nn.init.uniform_(linear[-1].weight, -LAST_WEIGHT, LAST_WEIGHT)
+    initialise_glorot(net)
+    nn.init.uniform_(net[-1].weight, -LAST_WEIGHT, LAST_WEIGHT)  # type: ignore[arg-type]
 
 
 class DDPGActor(nn.Module):
@@ -106,8 +103,7 @@ class LateActionQ(nn.Module):
         super().__init__()
         self._n_obs, self.norm = n_obs, norm
         self.first = nn.Sequential(nn.Linear(n_obs, width), nn.ReLU())
-        nn.init.xavier_uniform_(self.first[0].weight)  # type: ignore[arg-type]
-        nn.init.zeros_(self.first[0].bias)  # type: ignore[arg-type]
+        initialise_glorot(self.first)
         after = hidden(width + n_act, width, layers - 1)
         self.rest = nn.Sequential(*after, nn.Linear(width, 1))
         initialise(self.rest)

@@ -4,7 +4,14 @@ import torch
 from torch import nn
 
 from app.policies.configs.pick import PickPreset
-from app.policies.networks.actor_critic import Critics, Fade, MeanCritics, ResidualActor, hidden
+from app.policies.networks.actor_critic import (
+    Critics,
+    Fade,
+    MeanCritics,
+    ResidualActor,
+    hidden,
+    initialise_glorot,
+)
 from app.policies.networks.quantiles import QuantileCritics
 from app.sim.pick.kernels.observation_layout import (
     BODY_SIZES,
@@ -52,14 +59,6 @@ class NormedActor(nn.Module):
     def forward(self, obs: torch.Tensor) -> torch.Tensor:
         """Return actions, shape (n, 5), for observations, shape (n, n_obs)."""
         return torch.tanh(self.net(obs))
-
-
-def initialise_glorot(module: nn.Module) -> None:
-    """Set Glorot-uniform weights and zero biases, as Stable-Baselines 2 does for TD3."""
-    for layer in module.modules():
-        if isinstance(layer, nn.Linear):
-            nn.init.xavier_uniform_(layer.weight)
-            nn.init.zeros_(layer.bias)
 
 
 def actor_of(preset: PickPreset, n_obs: int) -> ResidualActor | NormedActor:
