@@ -206,11 +206,6 @@ def purpose_of(manifest: Mapping[str, Any]) -> str:
     return REACHING if "human" in groups else CHOOSING
 
 
-def task_of(checkpoint: Checkpoint) -> str:
-    """Return the purpose of a checkpoint's policy."""
-    return purpose_of(checkpoint.manifest)
-
-
 def require_purpose(checkpoint: Checkpoint, purpose: str) -> None:
     """Check the purpose of a checkpoint's policy.
 

@@ -33,8 +33,6 @@ def read_upload(content: bytes) -> Checkpoint:
     """
     manifest, tensors = split(content, MAX_MANIFEST)
     checkpoint = load(manifest, tensors)
-    if (kind := checkpoint.manifest["kind"]) != "policy":
-        raise InvalidInput("manifest.kind", kind, "cannot be uploaded", ("policy",))
     if not tensors:
         raise InvalidInput("tensors", "nothing", "must follow the manifest's line")
     checkpoint.arrays()

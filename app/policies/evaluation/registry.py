@@ -6,7 +6,13 @@ from types import MappingProxyType
 from typing import Any
 
 from app.errors import InvalidInput, NotFound
-from app.policies.checkpoints.checkpoint import CHOOSING, REACHING, SORTING, Checkpoint, task_of
+from app.policies.checkpoints.checkpoint import (
+    CHOOSING,
+    REACHING,
+    SORTING,
+    Checkpoint,
+    purpose_of,
+)
 from app.policies.evaluation.pick import calibration, people, tracker, worst_people
 from app.policies.evaluation.pick import cases as pick_cases
 from app.policies.evaluation.pick import ssm as pick_ssm
@@ -113,8 +119,10 @@ def evaluate(
     if checkpoint is None and name not in WITHOUT_CHECKPOINT:
         raise InvalidInput("checkpoint", None, f"must name a checkpoint for {name}")
     check_motions(name, [motion.name for motion in motions])
-    _check_task(name, checkpoint)
-    tested = {} if name in WITHOUT_CHECKPOINT else _identity(checkpoint)
+    tested = {}
+    if checkpoint is not None and name not in WITHOUT_CHECKPOINT:
+        _check_task(name, checkpoint)
+        tested = {"checkpoint": checkpoint.sha256}
     started = time.process_time()
     request = EvaluationRequest(episodes=episodes, seed=seed, motions=motions, on_row=on_row)
     outcome = PROTOCOLS[name](checkpoint, request)
@@ -152,11 +160,9 @@ def task_measured(name: str) -> str:
     return REACHING if name in OF_REACHING else CHOOSING
 
 
-def _check_task(name: str, checkpoint: Checkpoint | None) -> None:
+def _check_task(name: str, checkpoint: Checkpoint) -> None:
     """Check that a checkpoint is of the scenario of a protocol."""
-    if checkpoint is None or name in WITHOUT_CHECKPOINT:
-        return
-    wanted, actual = task_measured(name), task_of(checkpoint)
+    wanted, actual = task_measured(name), purpose_of(checkpoint.manifest)
     if wanted != actual:
         found = checkpoint.manifest["preset"].get("name") or checkpoint.sha256[:12]
         fitting = set(PROTOCOLS) - WITHOUT_CHECKPOINT
@@ -186,7 +192,3 @@ def check_motions(
     if name not in using and given:
         rule = f"must not be given to {name}, which takes no recorded motion"
         raise InvalidInput(field, list(given[:3]), rule, sorted(using))
-
-
-def _identity(checkpoint: Checkpoint | None) -> dict[str, str]:
-    return {} if checkpoint is None else {"checkpoint": checkpoint.sha256}

@@ -60,16 +60,10 @@ def visited_states(batch: PickBatch) -> dict[str, Vec]:
     return visited
 
 
-def work_of(people: PickPeople, seed: int = 0) -> HumanMotionConfig:
-    """Return the motion of the workers.
-
-    Args:
-        people: Fields of the preset.
-        seed: Seed of their postures and samples.
-    """
+def work_of(people: PickPeople) -> HumanMotionConfig:
+    """Return the motion of the workers of a preset."""
     return HumanMotionConfig(
         motion=people.human_motion,
-        seed=seed,
         pace=people.human_pace,
         pace_max=max(people.human_pace, people.human_pace_max),
         at_rest=people.human_at_rest,
