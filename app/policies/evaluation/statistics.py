@@ -1,8 +1,12 @@
 """Rates and means with 95 % intervals, as results carry them."""
 
+from typing import Any
+
 import numpy as np
 import scipy  # loads scipy.stats where it is first used
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
+
+from app.sim.pick.batch import OUTCOMES
 
 
 def wilson(hits: int, n: int) -> dict[str, float]:
@@ -19,6 +23,19 @@ def wilson(hits: int, n: int) -> dict[str, float]:
         raise ValueError(f"a rate needs 0 <= hits <= n and n >= 1, got {hits} of {n}")
     interval = scipy.stats.binomtest(hits, n).proportion_ci(0.95, method="wilson")
     return {"mean": hits / n, "low": float(interval.low), "high": float(interval.high)}
+
+
+def outcome_intervals(outcome: NDArray[np.int64]) -> dict[str, Any]:
+    """Return the number of episodes and the rate of each outcome; unfeasible only if met.
+
+    Args:
+        outcome: Index of each episode into OUTCOMES, shape (n,).
+    """
+    n = len(outcome)
+    counts = {name: int((outcome == k).sum()) for k, name in enumerate(OUTCOMES) if k > 0}
+    if counts["unfeasible"] == 0:
+        del counts["unfeasible"]
+    return {"n": n} | {name: wilson(count, n) for name, count in counts.items()}
 
 
 def mean_of(values: ArrayLike) -> dict[str, float] | None:

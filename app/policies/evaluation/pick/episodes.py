@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from app.policies.configs.pick import PickPreset
 from app.policies.evaluation.pick.recorded_people import Trace
-from app.policies.evaluation.statistics import wilson
+from app.policies.evaluation.statistics import outcome_intervals
 from app.policies.inference.value_networks import ValueNetworks
 from app.sim.cells.cell import Cell
 from app.sim.collision.checker import Shapes
@@ -21,7 +21,6 @@ from app.sim.core.observation_layout import slices_of
 from app.sim.people.human_motion_config import HumanMotionConfig
 from app.sim.people.kernels.people import new_people_geometry, see_rows
 from app.sim.pick.batch import (
-    OUTCOMES,
     PickBatch,
     PickSettings,
     observation_workspace_of,
@@ -124,17 +123,10 @@ class Episodes:
 
     def row(self, name: str) -> dict[str, object]:
         """Return the result row of these episodes, rates with 95 % intervals."""
-        n = len(self.outcome)
-        counts = np.bincount(self.outcome, minlength=len(OUTCOMES))
         won = self.won
-        unfeasible = int(counts[kernel.UNFEASIBLE])
         return {
             "name": name,
-            "n": n,
-            "success": wilson(int(counts[kernel.SUCCESS]), n),
-            "collision": wilson(int(counts[kernel.COLLISION]), n),
-            "timeout": wilson(int(counts[kernel.TIMEOUT]), n),
-            **({"unfeasible": wilson(unfeasible, n)} if unfeasible else {}),
+            **outcome_intervals(self.outcome),
             "time_to_success_s": float(self.duration_s[won].mean()) if won.any() else None,
             "switches_per_episode": float(self.switches.mean()),
         }

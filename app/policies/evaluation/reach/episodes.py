@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.policies.evaluation.pick.recorded_people import Trace, recheck
-from app.policies.evaluation.statistics import mean_of, wilson
+from app.policies.evaluation.statistics import mean_of, outcome_intervals, wilson
 from app.policies.inference.controllers import Controller
 from app.sim.cells.cell import Cell
 from app.sim.core.arrays import Vec
@@ -32,7 +32,6 @@ N_RECHECKED = 200
 """Number of episodes checked again with FCL, at most N_ENVS."""
 RECHECK_PARTS = 2
 """Poses per control period checked again with FCL: one every 10 ms."""
-ENDS = (kernel.SUCCESS, kernel.COLLISION, kernel.TIMEOUT, kernel.UNFEASIBLE)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -54,16 +53,7 @@ class ReachEpisodes:
 
     def rates(self, which: Any = slice(None)) -> dict[str, Any]:
         """Return the rates of outcomes of selected episodes with 95 % intervals."""
-        outcome = self.outcome[which]
-        n, counts = len(outcome), np.bincount(outcome, minlength=max(ENDS) + 1)
-        unfeasible = int(counts[kernel.UNFEASIBLE])
-        return {
-            "n": n,
-            "success": wilson(int(counts[kernel.SUCCESS]), n),
-            "collision": wilson(int(counts[kernel.COLLISION]), n),
-            "timeout": wilson(int(counts[kernel.TIMEOUT]), n),
-            **({"unfeasible": wilson(unfeasible, n)} if unfeasible else {}),
-        }
+        return outcome_intervals(self.outcome[which])
 
     def row(self, name: str) -> dict[str, Any]:
         """Return the result row of these episodes."""

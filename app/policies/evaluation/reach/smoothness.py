@@ -72,8 +72,11 @@ def record_paths(batch: ReachBatch, controller: Controller, goals: Vec) -> Paths
     running, kept = np.ones(batch.n_envs, dtype=np.bool_), []
 
     def record() -> None:
-        now = (state.q, state.qd, state.qdd, state.clear[:, 0], state.distance)
-        kept.append([np.where(_as(running, part), part, np.nan) for part in now])
+        parts = (state.q, state.qd, state.qdd, state.clear[:, 0], state.distance)
+        now = [part.copy() for part in parts]
+        for part in now:
+            part[~running] = np.nan
+        kept.append(now)
         running[:] = state.outcome == kernel.RUNNING
 
     record()
@@ -89,10 +92,6 @@ def record_paths(batch: ReachBatch, controller: Controller, goals: Vec) -> Paths
         distance=distance,
         outcome=state.outcome.copy(),
     )
-
-
-def _as(rows: NDArray[np.bool_], part: Vec) -> NDArray[np.bool_]:
-    return rows.reshape(-1, *(1 for _ in part.shape[1:]))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
