@@ -159,9 +159,7 @@ class PrioritisedReplay(ReplayBuffer):
     ) -> None:
         super().__init__(buffer_size, observation_space, action_space, device, n_envs)
         self._n_steps, self._gamma, self._alpha = n_steps, gamma, alpha
-        leaves = 1
-        while leaves < self.buffer_size * n_envs:
-            leaves *= 2
+        leaves = 1 << (self.buffer_size * n_envs - 1).bit_length()  # a power of two
         self._tree = np.zeros(2 * leaves)
         self._greatest = 1.0
         self._rng = np.zeros(1, dtype=np.uint64)

@@ -10,6 +10,7 @@ from typing import Literal, Self
 from pydantic import model_validator
 
 from app.errors import InvalidInput
+from app.policies.checkpoints.checkpoint import MAX_BYTES
 from app.policies.configs.fields import (
     CellName,
     FieldGroup,
@@ -27,8 +28,6 @@ from app.policies.configs.td3 import (
 from app.sim.reach.batch import GoalRule, LimitRule, StartRule, ViewName
 from app.sim.reach.goal_sets import MOST_HALTON, N_HALTON
 
-MAX_BYTES = 16 * 1024 * 1024
-"""Size of the networks that a checkpoint holds [bytes]."""
 MOST_SEEN = 256
 """Upper bound of the inputs of a network, its smaller parts included."""
 
