@@ -98,7 +98,6 @@ def fit(
     demonstrations: Sequence[Vec],
     durations: Vec,
     *,
-    phases: Sequence[Vec] | None = None,
     n_basis: int = N_BASIS,
     width: float | None = None,
     ridge: float = RIDGE,
@@ -107,22 +106,19 @@ def fit(
     """Fit a primitive to demonstrations of one task.
 
     Args:
-        demonstrations: Joint positions [m, rad], shape (T_i, n_joints) each; T_i may differ.
+        demonstrations: Joint positions [m, rad] at even times, shape (T_i, n_joints) each;
+            T_i may differ.
         durations: Durations [s], shape (n,).
-        phases: Phase of every sample, shape (T_i,) each; None: evenly from 0 to 1.
         n_basis: Gaussians per joint.
         width: Their width [phase]; None: :func:`usual_width`.
         ridge: lambda of the regression, per sample.
         floor: Standard deviation added to every weight, smoothly along the phase [m, rad].
     """
     motions = _checked(demonstrations, durations, n_basis)
-    if phases is None:
-        phases = [np.linspace(0.0, 1.0, len(motion)) for motion in motions]
-    _require_phases(phases, motions)
     width = usual_width(n_basis) if width is None else width
     weights, squares = [], []
-    for motion, phase in zip(motions, phases, strict=True):
-        phi = basis(phase, n_basis, width)
+    for motion in motions:
+        phi = basis(np.linspace(0.0, 1.0, len(motion)), n_basis, width)
         found = weights_of(motion, phi, ridge)
         weights.append(found)
         squares.append(np.mean((motion - phi @ found.T) ** 2, axis=0))
@@ -197,16 +193,6 @@ def _checked(demonstrations: Sequence[Vec], durations: Vec, n_basis: int) -> lis
         if not (np.isfinite(duration) and duration > 0.0):
             raise InvalidInput(f"durations[{i}]", duration, "must be above 0 s")
     return motions
-
-
-def _require_phases(phases: Sequence[Vec], motions: Sequence[Vec]) -> None:
-    if len(phases) != len(motions):
-        raise InvalidInput("phases", len(phases), f"must be one array each ({len(motions)})")
-    for i, (phase, motion) in enumerate(zip(phases, motions, strict=True)):
-        inside = np.shape(phase) == (len(motion),) and bool(((phase >= 0) & (phase <= 1)).all())
-        if not inside:
-            rule = f"must be {len(motion)} numbers in [0, 1], one per sample"
-            raise InvalidInput(f"phases[{i}]", np.shape(phase), rule)
 
 
 def _floor(n_basis: int, floor: float) -> Vec:

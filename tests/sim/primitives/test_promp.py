@@ -76,15 +76,6 @@ def test_weights_of_known_spread_are_found_again() -> None:
     np.testing.assert_allclose(moments(found, Z)[1], moments(true, Z)[1], atol=0.012)
 
 
-def test_given_phases_align_demonstrations_of_unlike_pace() -> None:
-    x = np.linspace(0.0, 1.0, 80)
-    path = np.stack([np.sin(2.0 * x), np.cos(3.0 * x)], axis=1)
-    late = np.stack([np.sin(2.0 * x**2), np.cos(3.0 * x**2)], axis=1)
-    aligned = fit([path, late], [1.0, 1.0], phases=[x, x**2], floor=0.0)
-    blind = fit([path, late], [1.0, 1.0], floor=0.0)
-    assert moments(aligned, Z)[1].max() < 1e-5 < 1e-2 < moments(blind, Z)[1].max()
-
-
 def test_moments_are_those_of_many_draws(promp: ProMP) -> None:
     weights = draw_weights(promp, 20000, np.random.default_rng(6))
     drawn = positions(promp, weights, np.array([0.3]))[:, 0]
@@ -163,12 +154,6 @@ def test_broken_demonstration_is_named(spoil, field: str) -> None:
     with pytest.raises(InvalidInput) as caught:
         fit(*spoil(*reaches(3)))
     assert caught.value.field.startswith(field)
-
-
-@pytest.mark.parametrize("phases", [[], [np.linspace(0.0, 1.0, 9)], [np.full(80, np.nan)]])
-def test_phases_that_do_not_fit_their_samples_are_named(phases: list[Vec]) -> None:
-    with pytest.raises(InvalidInput, match="phases"):
-        fit([np.zeros((80, 2))], [1.0], phases=phases)
 
 
 def test_primitive_cannot_be_written_to(promp: ProMP) -> None:
