@@ -11,7 +11,7 @@ from math import ceil
 import numpy as np
 
 from app.errors import InvalidInput
-from app.sim.cells.cell import Cell, load_cell
+from app.sim.cells.cell import load_cell
 from app.sim.core.arrays import Vec
 from app.sim.people.human_motion_config import REACHING
 from app.sim.people.kernels.people import new_people_geometry
@@ -120,10 +120,6 @@ class TrialResult:
         return TrialResult(rows=self.rows[kept], dt=self.dt)
 
 
-def _cell_of(settings: TrialSettings) -> Cell:
-    return with_people(load_cell(settings.cell), settings.people)
-
-
 def run_trial(
     settings: TrialSettings, n_episodes: int, seed: int, first: int = 0
 ) -> TrialResult:
@@ -140,7 +136,7 @@ def run_trial(
         raise InvalidInput("episodes", n_episodes, "must be at least 1")
     if not settings.people:
         raise InvalidInput("people", [], "must name at least one person")
-    cell = _cell_of(settings)
+    cell = with_people(load_cell(settings.cell), settings.people)
     arm, people = arm_of(cell), people_of(cell, REACHING)
     state = new_people_state(cell, people, 1)
     crowd = new_people_geometry(people, len(cell.workers), len(cell.cylinders))

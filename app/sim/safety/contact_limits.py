@@ -24,7 +24,7 @@ UR10_MOVING_MASS = 28.7
 """Mass of the UR10 above its base [kg], the sum over its URDF's links."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True)
 class Region:
     """One body region of tables A.2 and A.3."""
 
@@ -42,34 +42,21 @@ class Region:
     """Effective mass [kg]."""
 
 
-def _region(
-    name: str, force: float, pressure: float, transient: float, stiffness: float, mass: float
-) -> Region:
-    return Region(
-        name=name,
-        force=force,
-        pressure=pressure,
-        transient=transient,
-        stiffness=stiffness,
-        mass=mass,
-    )
-
-
 REGIONS = {
     region.name: region
     for region in (
-        _region("skull and forehead", 130.0, 110.0, 1.0, 150.0, 4.4),
-        _region("face", 65.0, 110.0, 1.0, 75.0, 4.4),
-        _region("neck", 150.0, 140.0, 2.0, 50.0, 1.2),
-        _region("back and shoulders", 210.0, 160.0, 2.0, 35.0, 40.0),
-        _region("chest", 140.0, 120.0, 2.0, 25.0, 40.0),
-        _region("abdomen", 110.0, 140.0, 2.0, 10.0, 40.0),
-        _region("pelvis", 180.0, 210.0, 2.0, 25.0, 40.0),
-        _region("upper arms and elbow joints", 150.0, 190.0, 2.0, 30.0, 3.0),
-        _region("lower arms and wrist joints", 160.0, 180.0, 2.0, 40.0, 2.0),
-        _region("hands and fingers", 140.0, 190.0, 2.0, 75.0, 0.6),
-        _region("thighs and knees", 220.0, 220.0, 2.0, 50.0, 75.0),
-        _region("lower legs", 130.0, 210.0, 2.0, 60.0, 75.0),
+        Region("skull and forehead", 130.0, 110.0, 1.0, 150.0, 4.4),
+        Region("face", 65.0, 110.0, 1.0, 75.0, 4.4),
+        Region("neck", 150.0, 140.0, 2.0, 50.0, 1.2),
+        Region("back and shoulders", 210.0, 160.0, 2.0, 35.0, 40.0),
+        Region("chest", 140.0, 120.0, 2.0, 25.0, 40.0),
+        Region("abdomen", 110.0, 140.0, 2.0, 10.0, 40.0),
+        Region("pelvis", 180.0, 210.0, 2.0, 25.0, 40.0),
+        Region("upper arms and elbow joints", 150.0, 190.0, 2.0, 30.0, 3.0),
+        Region("lower arms and wrist joints", 160.0, 180.0, 2.0, 40.0, 2.0),
+        Region("hands and fingers", 140.0, 190.0, 2.0, 75.0, 0.6),
+        Region("thighs and knees", 220.0, 220.0, 2.0, 50.0, 75.0),
+        Region("lower legs", 130.0, 210.0, 2.0, 60.0, 75.0),
     )
 }
 """All regions by name. The skull's pressure is the temple's, the lesser of its two."""

@@ -16,7 +16,7 @@ Source: docs/method.md 2.7; ISO/TS 15066:2016.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -125,10 +125,8 @@ class SafetySettings:
     def describe(self) -> dict[str, float | bool]:
         """Return every assumption by name and unit, as stated in results."""
         return {
-            f"{field.name} [{UNITS[field.name]}]" if UNITS[field.name] else field.name: getattr(
-                self, field.name
-            )
-            for field in fields(self)
+            f"{name} [{unit}]" if unit else name: getattr(self, name)
+            for name, unit in UNITS.items()
         }
 
 
