@@ -113,33 +113,19 @@ def _any(n: int, shape: SortingShape, rng: Generator) -> NDArray[np.int64]:
     return rng.integers(1, shape.n_types + 1, n)
 
 
-def _sort_all(n: int) -> Start:
-    """Return a start with ``n`` random objects, all in the goal."""
-
-    def start(shape: SortingShape, fail: Vec, rng: Generator) -> SortingState:
-        codes = _any(n, shape, rng)
-        return _scattered(codes, sorted_goal(codes, shape), shape, fail, rng)
-
-    return start
-
-
-def _with_duplicates(n: int) -> Start:
-    """Return a start in which ``n`` objects of the goal have a duplicate in a riskier cell.
+def _with_duplicates(shape: SortingShape, fail: Vec, rng: Generator) -> SortingState:
+    """Return five objects of the goal, each with a duplicate in a riskier cell.
 
     The safer one of each couple stands in one of the safest ``n_cells // 2`` cells.
     """
-
-    def start(shape: SortingShape, fail: Vec, rng: Generator) -> SortingState:
-        codes = _any(n, shape, rng)
-        ranked = np.lexsort((rng.random(shape.n_cells), fail))
-        safe, risky = np.split(ranked, [shape.n_cells // 2])
-        clutter = np.zeros(shape.n_cells, dtype=np.int8)
-        clutter[rng.permutation(safe)[:n]] = codes
-        clutter[rng.permutation(risky)[:n]] = codes
-        goal = sorted_goal(codes, shape)
-        return replace(empty_state(shape), clutter=clutter, goal=goal, fail=fail.copy())
-
-    return start
+    codes = _any(5, shape, rng)
+    ranked = np.lexsort((rng.random(shape.n_cells), fail))
+    safe, risky = np.split(ranked, [shape.n_cells // 2])
+    clutter = np.zeros(shape.n_cells, dtype=np.int8)
+    clutter[rng.permutation(safe)[:5]] = codes
+    clutter[rng.permutation(risky)[:5]] = codes
+    goal = sorted_goal(codes, shape)
+    return replace(empty_state(shape), clutter=clutter, goal=goal, fail=fail.copy())
 
 
 def _with_room_below(shape: SortingShape, fail: Vec, rng: Generator) -> SortingState:
@@ -151,7 +137,7 @@ def _with_room_below(shape: SortingShape, fail: Vec, rng: Generator) -> SortingS
 
 
 def _some(n_objects: int, n_goal: int) -> Start:
-    """Return a start with random objects, of which a random part is the goal."""
+    """Return a start with random objects, the first ``n_goal`` of which are the goal."""
 
     def start(shape: SortingShape, fail: Vec, rng: Generator) -> SortingState:
         codes = _any(n_objects, shape, rng)
@@ -267,7 +253,7 @@ TESTS: tuple[SortingTest, ...] = (
         expected="Every object is sorted, without a contact.",
         n_objects=5,
         n_goal=5,
-        start=_sort_all(5),
+        start=_some(5, 5),
     ),
     SortingTest(
         name="test-2",
@@ -276,7 +262,7 @@ TESTS: tuple[SortingTest, ...] = (
         expected="Every object is sorted, without a contact.",
         n_objects=10,
         n_goal=10,
-        start=_sort_all(10),
+        start=_some(10, 10),
     ),
     SortingTest(
         name="test-3",
@@ -286,7 +272,7 @@ TESTS: tuple[SortingTest, ...] = (
         safer_duplicates=True,
         n_objects=10,
         n_goal=5,
-        start=_with_duplicates(5),
+        start=_with_duplicates,
     ),
     SortingTest(
         name="test-4",

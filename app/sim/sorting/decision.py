@@ -155,9 +155,8 @@ def attempts_by_action(
     """
     moves = [shape.move_of(action) for action in actions]
     attempts = np.zeros(len(actions))
-    heights = np.count_nonzero(state.towers, axis=1)
     written = attempts_by_move(
-        Objects(state.clutter.copy(), state.towers.copy(), heights),
+        Objects(state.clutter.copy(), state.towers.copy(), state.heights),
         Task(state.goal, np.count_nonzero(state.goal, axis=1), state.fail),
         np.array([(move.pick, move.place) for move in moves], dtype=np.int64).reshape(-1, 2),
         MAX_PLANNED,

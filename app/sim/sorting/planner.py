@@ -37,9 +37,9 @@ class Plan:
 def _solve(state: SortingState, shape: SortingShape) -> tuple[Plan, PlannerWork]:
     """Return the plan of a state, and the work space that holds it."""
     work = new_work(shape.n_cells, shape.n_colours, shape.n_sizes)
-    heights = np.count_nonzero(state.towers, axis=1)
     task = Task(state.goal, np.count_nonzero(state.goal, axis=1), state.fail)
-    moves, attempts = plan_state(Objects(state.clutter, state.towers, heights), task, work)
+    objects = Objects(state.clutter, state.towers, state.heights)
+    moves, attempts = plan_state(objects, task, work)
     if moves < 0:
         raise _cannot_be_met(state, shape)
     best = int(work.actions[0])
