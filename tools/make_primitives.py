@@ -31,7 +31,6 @@ from app.sim.primitives import promp
 from app.sim.primitives.keyframes import STYLES
 from app.sim.primitives.library_file import (
     FILE,
-    HANDS,
     TaskPrimitive,
     TaskSegment,
     place_of,
@@ -64,7 +63,7 @@ def make_primitive(
         elbow_spread: Standard deviation of the added swivel of the working arm [rad].
     """
     name = f"{cell.name}/{segment.start}/{segment.end}".encode()
-    rng = np.random.default_rng([SEED, HANDS.index(segment.hand), *name])
+    rng = np.random.default_rng([SEED, human.HANDS.index(segment.hand), *name])
     ends = place_of(cell, segment.start), place_of(cell, segment.end)
     motions, paths = [], []
     for i, size in enumerate(draw_people(cell, n, rng)):

@@ -61,8 +61,7 @@ class StraightPolicy:
         hands = [np.full(3, np.inf)]
         for person in people:
             size = self._size if person.size is None else person.size
-            points = human.joint_points(person.q, size)
-            hands += [points["hand_r"], points["hand_l"]]
+            hands.extend(human.palms(person.q, size))
         near = np.linalg.norm(goals[:, None] - np.stack(hands), axis=2).min(axis=1)
         values = 4.0 - np.abs(postures - q).max(axis=1) - 4.0 * np.exp(-((near / 0.2) ** 2))
         index = int(values.argmax())

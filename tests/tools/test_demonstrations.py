@@ -26,8 +26,7 @@ BY_NAME = {style.name: style for style in STYLES}
 
 
 def palms_of(q: Vec, size: Vec) -> Vec:
-    rows = [human.joint_points(row, size) for row in q]
-    return np.array([[row["hand_r"], row["hand_l"]] for row in rows])
+    return np.array([human.palms(row, size) for row in q])
 
 
 def station(name: str, cell: Cell = CELL) -> Vec:

@@ -23,7 +23,7 @@ from app.sim.core.arrays import Vec
 from app.sim.human import model as human
 from app.sim.human.anthropometry import percentile_body
 from app.sim.primitives.keyframes import STYLES, draw_keyframe
-from app.sim.primitives.library_file import FILE, HANDS, load_primitives, read_header
+from app.sim.primitives.library_file import FILE, load_primitives, read_header
 from app.sim.primitives.primitive_library import MotionLibrary, motion_library
 from tests.sim.library_motions import SegmentMotion, random_segment, random_segments
 from tools.demonstrations import PHASES, between
@@ -184,7 +184,7 @@ def section(found: Json) -> str:
     pairs = dict.fromkeys((one["start"], one["end"]) for one in found["primitives"])
     lines = ["| segment | right hand [s] | left hand [s] |", "| --- | ---: | ---: |"]
     for start, end in pairs:
-        cells = [_spread(rows[start, end, hand]) for hand in HANDS]
+        cells = [_spread(rows[start, end, hand]) for hand in human.HANDS]
         lines.append(f"| {start} – {end} | {cells[0]} | {cells[1]} |")
     low, high = header["percentiles"]["stature"]
     return f"""\

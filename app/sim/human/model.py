@@ -17,6 +17,7 @@ from app.sim.geometry.capsules import ends_of
 from app.sim.human.kernels import kinematics as body
 
 Hand = Literal["r", "l"]
+HANDS: tuple[Hand, Hand] = ("r", "l")
 
 JOINT_NAMES = (
     "pelvis_x",
@@ -149,6 +150,12 @@ def joint_points(q: Vec, size: Vec) -> dict[str, Vec]:
     """Return the joint centres by name (POINT_NAMES) [m], each of shape (3,)."""
     points, _ = _forward(q, size)
     return dict(zip(POINT_NAMES, points, strict=True))
+
+
+def palms(q: Vec, size: Vec) -> Vec:
+    """Return the positions of the right and the left palm [m], shape (2, 3)."""
+    points = joint_points(q, size)
+    return np.stack([points["hand_r"], points["hand_l"]])
 
 
 def body_frames(q: Vec, size: Vec) -> dict[str, Vec]:

@@ -24,7 +24,6 @@ from app.sim.human.anthropometry import BodySize
 from app.sim.human.model import Hand
 from app.sim.primitives.kernels import script
 
-HANDS: tuple[Hand, Hand] = ("r", "l")
 REACH_PACE = 0.5
 """Mean palm speed of a single reach [m/s]."""
 SHORTEST_REACH_S = 0.8
@@ -41,8 +40,6 @@ class ReachLibrary:
     """Palm positions, right then left [m], shape (n, 2, 3)."""
     of_station: script.Index
     """First posture and count of each body, place and hand, (n_bodies, n_places, 2, 2)."""
-    n_stations: int
-    """Number of stations, cubes first; home is the place after them."""
     n_cubes: int
     """Number of cubes."""
 
@@ -66,7 +63,7 @@ def build_reach_library(
     for size, index in zip(sizes, of_station, strict=True):
         begin = len(postures)
         for place, station in enumerate(cell.pick_stations):
-            for column, hand in enumerate(HANDS):
+            for column, hand in enumerate(human.HANDS):
                 index[place, column] = len(postures), variants
                 target = np.array(station.position)
                 postures.extend(
@@ -74,7 +71,7 @@ def build_reach_library(
                 )
         index[-1, :] = len(postures), variants
         postures.extend(_at_home(cell, rng) for _ in range(variants))
-        hands.extend(_palms(q, size) for q in postures[begin:])
+        hands.extend(human.palms(q, size) for q in postures[begin:])
     stacked, palms = np.array(postures), np.array(hands)
     for array in (stacked, palms, of_station):
         array.setflags(write=False)
@@ -83,14 +80,8 @@ def build_reach_library(
         postures=stacked,
         hands=palms,
         of_station=of_station,
-        n_stations=len(cell.pick_stations),
         n_cubes=n_cubes,
     )
-
-
-def _palms(q: Vec, size: Vec) -> Vec:
-    points = human.joint_points(q, size)
-    return np.stack([points["hand_r"], points["hand_l"]])
 
 
 def _at_home(cell: Cell, rng: np.random.Generator) -> Vec:

@@ -20,10 +20,9 @@ import numpy as np
 
 from app.sim.cells.cell import Cell, load_cell
 from app.sim.core.arrays import Vec
-from app.sim.human.model import Hand
+from app.sim.human.model import HANDS, Hand
 
 FILE = Path(str(resources.files("app.sim.primitives"))) / "data" / "task_primitives.npz"
-HANDS: tuple[Hand, Hand] = ("r", "l")
 """Order of the hands in arrays."""
 HOME = "home"
 """Name of the resting place."""

@@ -34,7 +34,6 @@ from app.sim.human.anthropometry import BodySize, percentile_body
 from app.sim.primitives import promp
 from app.sim.primitives.keyframes import draw_keyframe
 from app.sim.primitives.library_file import (
-    HANDS,
     HOME,
     TaskPrimitive,
     place_of,
@@ -155,7 +154,7 @@ def _keyframes(
     hands: list[Vec] = []
     for person, size in enumerate(bodies):
         for place, point in enumerate([*points, None]):
-            for column, hand in enumerate(HANDS):
+            for column, hand in enumerate(human.HANDS):
                 of_station[person, place, column] = len(postures), variants
                 if point is None and column == 1:  # home has no working hand
                     of_station[person, place, column] = of_station[person, place, 0]
@@ -163,13 +162,8 @@ def _keyframes(
                 for _ in range(variants):
                     keyframe = draw_keyframe(cell, size, point, hand, rng)
                     postures.append(keyframe.q)
-                    hands.append(_palms(keyframe.q, size))
+                    hands.append(human.palms(keyframe.q, size))
     return np.array(postures), np.array(hands), of_station
-
-
-def _palms(q: Vec, size: Vec) -> Vec:
-    points = human.joint_points(q, size)
-    return np.stack([points["hand_r"], points["hand_l"]])
 
 
 def _segments(
@@ -189,7 +183,8 @@ def _segments(
         some = draw_samples(found, 2 * n_samples, rng) if augmentation else found.weights
         n = n_samples if augmentation else len(some)
         spread = float(logs.std(ddof=1)) if augmentation else 0.0
-        start, end, column = order[segment.start], order[segment.end], HANDS.index(segment.hand)
+        start, end = order[segment.start], order[segment.end]
+        column = human.HANDS.index(segment.hand)
         for ends, known, drawn in (
             ((start, end), found.weights, some[:n]),
             ((end, start), found.weights[..., ::-1], some[-n:, :, ::-1]),

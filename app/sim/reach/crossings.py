@@ -72,8 +72,6 @@ LEAST_STEP = 0.15
 """Least distance that recorded people walk in the second around their arrival [m]."""
 BEHIND = (0.2, 3.0)
 """Place of a recorded person's axis, as a fraction of the segment."""
-ON_LINE = 1e-9
-"""Distance below which an axis is on a segment, as a fraction of its length."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -160,7 +158,7 @@ def recorded_crossings(cell: Cell, motions: Sequence[Motion], n: int) -> Crossin
     cylinders = [cylinder_track(motion, cell.floor_z, dt) for motion in motions]
     found = []
     for number in range(n):
-        found.append(_recorded(cell, home, motions, cylinders, SEED, number))
+        found.append(_recorded(cell, home, motions, cylinders, number))
     return _set_of(found)
 
 
@@ -235,11 +233,10 @@ def _recorded(
     home: Vec,
     motions: Sequence[Motion],
     cylinders: Sequence[Vec],
-    seed: int,
     number: int,
 ) -> Crossing:
     """Draw goal, recording and moment of a crossing that is clear of the robot at home."""
-    rng, dt = np.random.default_rng([seed, number, 1]), cell.robot.dt
+    rng, dt = np.random.default_rng([SEED, number, 1]), cell.robot.dt
     for _ in range(TRIES):
         goal, which = _goal(cell, rng), int(rng.integers(len(motions)))
         lead = round(rng.uniform(*ARRIVAL) / dt)

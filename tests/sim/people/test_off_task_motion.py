@@ -34,8 +34,7 @@ def test_hands_come_over_the_whole_reach_of_the_table() -> None:
     table, found = CELL.table, []
     for motion in off_task_motions(CELL, MEDIAN, 8, 4):
         for row in motion.q[::25]:
-            points = human.joint_points(row, SIZE)
-            found += [points["hand_r"], points["hand_l"]]
+            found.extend(human.palms(row, SIZE))
     palms = np.array(found)
     over = palms[(palms[:, 1] < table.y_max) & (palms[:, 2] > 0.0)]
     assert len(over) > 0.15 * len(palms)

@@ -57,7 +57,7 @@ def crossing_time(track: Vec, start: Vec, goal: Vec, dt: float) -> float:
         return math.inf
     offset = track[:, :2] - start[:2]
     side = (segment[0] * offset[:, 1] - segment[1] * offset[:, 0]) / square
-    side[np.abs(side) < crossing.ON_LINE] = 0.0
+    side[np.abs(side) < 1e-9] = 0.0
     along = offset @ segment / square
     before, after = side[:-1], side[1:]
     for k in np.flatnonzero((before * after <= 0.0) & (before != after)):
