@@ -85,7 +85,7 @@ def read_bvh(text: str) -> Bvh:
     n_channels = sum(len(joint.channels) for joint in joints)
     head = [(k + 1, lines[k]) for k in range(start + 1, len(lines)) if lines[k].strip()]
     n_frames, dt = _frame_lines(head[:2], len(lines))
-    values = read_rows(head[2:], n_channels, n_frames, "a number per channel of the skeleton")
+    values = read_rows(head[2:], n_channels, n_frames)
     first_line = head[2][0]
     return Bvh(joints=joints, dt=dt, values=values, first_line=first_line)
 
@@ -163,29 +163,26 @@ def axis_turns(axis: int, angle: Vec) -> Vec:
     )
 
 
-def read_rows(
-    lines: Sequence[tuple[int, str]], n_columns: int, n_rows: int | None, what: str
-) -> Vec:
+def read_rows(lines: Sequence[tuple[int, str]], n_columns: int, n_rows: int) -> Vec:
     """Return a table of finite numbers, shape (n, n_columns).
 
     Args:
         lines: Line numbers and texts, without empty lines.
-        n_columns: Number of values per line.
-        n_rows: Number of lines stated in the head of the file; None if not stated.
-        what: Required content of a line, for the message.
+        n_columns: Number of values per line, one per channel of the skeleton.
+        n_rows: Number of lines stated in the head of the file.
 
     Raises:
         BadRecording: A line holds another number of values, or text.
     """
-    if len(lines) > MAX_FRAMES or (n_rows or 0) > MAX_FRAMES:
-        value = f"<{max(len(lines), n_rows or 0)} frames>"
+    if (most := max(len(lines), n_rows)) > MAX_FRAMES:
+        value = f"<{most} frames>"
         raise bad("frames", value, f"must be at most {MAX_FRAMES}", "cut the file into parts")
     faults: list[Fault] = []
     values = np.zeros((len(lines), n_columns))
     for k, (number, line) in enumerate(lines):
         words = line.split()
         if len(words) != n_columns:
-            rule = f"must hold {n_columns} numbers, {what}"
+            rule = f"must hold {n_columns} numbers, a number per channel of the skeleton"
             place, hint = f"line {number}", _comma_hint(line)
             faults.append(Fault(place=place, value=f"<{len(words)}>", rule=rule, hint=hint))
         else:
@@ -197,7 +194,7 @@ def read_rows(
             faults.extend(_bad_words(words, number))
         if len(faults) >= MAX_FAULTS:
             break
-    if not faults and n_rows is not None and len(lines) != n_rows:
+    if not faults and len(lines) != n_rows:
         rule = f"must be the {n_rows} that the head of the file states"
         hint = "the file is cut off" if len(lines) < n_rows else ""
         place = f"frames, last line {lines[-1][0]}" if lines else "frames"

@@ -75,7 +75,7 @@ def read_csv(text: str, names: Mapping[str, str] | None = None) -> AngleTrack:
     degrees = _declared_degrees(file, columns)
     _check_units(file, columns, degrees)
     values = file.table.values(columns)
-    good = complete_rows(values, "frames")
+    good = complete_rows(values)
     sound = {name: column[good] for name, column in values.items()}
     q = np.stack([sound[name] for name in JOINT_NAMES], axis=1)
     q[:, 2:] = in_radians({name: sound[name] for name in JOINT_NAMES[2:]}, degrees)

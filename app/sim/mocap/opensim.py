@@ -91,7 +91,7 @@ def read_opensim(text: str, names: Mapping[str, str] | None = None) -> AngleTrac
     _check_counts(said, table)
     columns = _columns(table, names or {})
     values = table.values(columns)
-    good = complete_rows(values, "frames")
+    good = complete_rows(values)
     sound = {name: column[good] for name, column in values.items()}
     times = check_times(sound.pop("time"), table, good)
     require_places({name: sound[name] for name in PLACES})

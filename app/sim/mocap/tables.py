@@ -147,7 +147,7 @@ class TextTable:
                 return said.index(theirs)
         if keys.count(plain(theirs)) == 1 and plain(theirs):
             return keys.index(plain(theirs))
-        raise no_such_name(theirs, [one for one in self.labels if one], "column")
+        raise no_such_name(theirs, [one for one in self.labels if one])
 
     def _cells(self, text: str) -> list[str] | None:
         """Return the cells of a row; None if their number is wrong."""
@@ -246,20 +246,19 @@ def check_map(names: Mapping[str, str], ours: Sequence[str]) -> None:
             raise bad("name map", shown(f"{theirs}={own}"), "must end with one of ours", hint)
 
 
-def no_such_name(theirs: str, there: Sequence[str], what: str) -> BadRecording:
-    """Return the error of a name map with a name that the file does not have.
+def no_such_name(theirs: str, there: Sequence[str]) -> BadRecording:
+    """Return the error of a name map with a column that the file does not have.
 
     Args:
         theirs: Name in the map.
         there: Names in the file.
-        what: Kind of object that is named, such as ``"column"``.
     """
     likeness = {one: _likeness(theirs, one) for one in there}
     near = sorted(likeness, key=likeness.__getitem__, reverse=True)
     close = [one for one in near if likeness[one] >= MIN_LIKENESS]
-    said = "nearly the same" if close else f"the file's {what}s"
+    said = "nearly the same" if close else "the file's columns"
     hint = f"{said}: {', '.join((close[:3] or list(there))[:40])[:300]}"
-    return bad("name map", shown(theirs), f"is the name of no {what}, or of several", hint)
+    return bad("name map", shown(theirs), "is the name of no column, or of several", hint)
 
 
 def number(cell: str, decimal: str = ".") -> float:
@@ -273,12 +272,11 @@ def number(cell: str, decimal: str = ".") -> float:
     return np.inf if value is None else value
 
 
-def complete_rows(columns: Mapping[str, Vec], place: str) -> NDArray[np.bool_]:
+def complete_rows(columns: Mapping[str, Vec]) -> NDArray[np.bool_]:
     """Return which rows have all values, shape (n,).
 
     Args:
         columns: Values by name, each of shape (n,), missing ones NaN.
-        place: Name of the table, for the message.
 
     Raises:
         BadRecording: A column has no value, or fewer than two rows are complete.
@@ -290,7 +288,7 @@ def complete_rows(columns: Mapping[str, Vec], place: str) -> NDArray[np.bool_]:
     if good.sum() < 2:
         value = f"<{int(good.sum())}>"
         rule = "must be at least 2 that have all values"
-        raise bad(place, value, rule, "one frame is no motion")
+        raise bad("frames", value, rule, "one frame is no motion")
     return np.asarray(good)
 
 
