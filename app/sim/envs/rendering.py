@@ -101,7 +101,7 @@ def _static_solids(cell: Cell) -> tuple[Solid, ...]:
         half = box.half_size
         solids.append(Box(center=box.center, half_size=half, yaw=box.yaw, colour=OBSTACLE))
     for kind, side, height in (("cube", 0.035, 0.07), ("dock", 0.075, 0.012)):
-        for station in cell.stations_of("cube" if kind == "cube" else "dock"):
+        for station in cell.stations_of(kind):
             middle = (*station.position[:2], 0.5 * height)
             half = (side, side, 0.5 * height)
             solids.append(Box(center=middle, half_size=half, colour=STATION))
@@ -215,12 +215,12 @@ def block_solids(cell: Cell, shape: SortingShape, state: SortingState) -> list[S
     for k, station in enumerate(cell.stations_of("clutter")):
         x, y, _ = station.position
         share = min(float(state.fail[k]) / MOST_FAILURE, 1.0)
-        solids.append(_tile(x, y, 0.08, _between(*FAILURES, share)))
+        solids.append(_tile(x, y, _between(*FAILURES, share)))
         if state.clutter[k] != NULL:
             solids.append(block(state.clutter[k], x, y, 0))
     for c, station in enumerate(cell.stations_of("cluster")):
         x, y, _ = station.position
-        solids.append(_tile(x, y, 0.08, _between(TRAY, colours[c], 0.35)))
+        solids.append(_tile(x, y, _between(TRAY, colours[c], 0.35)))
         for k, (code, wanted) in enumerate(zip(state.towers[c], state.goal[c], strict=True)):
             if code != NULL:
                 solids.append(block(code, x, y, k))
@@ -233,8 +233,8 @@ _FLAT = 0.004
 """Height of the tiles on which blocks stand [m]."""
 
 
-def _tile(x: float, y: float, half: float, colour: Rgb) -> Solid:
-    return Box(center=(x, y, 0.5 * _FLAT), half_size=(half, half, 0.5 * _FLAT), colour=colour)
+def _tile(x: float, y: float, colour: Rgb) -> Solid:
+    return Box(center=(x, y, 0.5 * _FLAT), half_size=(0.08, 0.08, 0.5 * _FLAT), colour=colour)
 
 
 def _between(low: Rgb, high: Rgb, share: float) -> Rgb:

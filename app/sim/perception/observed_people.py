@@ -334,9 +334,8 @@ def checked_vector(path: str, values: Vec, size: int, low: Vec, high: Vec, unit:
     if vector.shape != (size,):
         raise InvalidInput(path, vector.tolist(), f"must hold {size} numbers")
     inside = (low <= vector) & (vector <= high)
-    if inside.all():
-        return vector
-    for i in np.flatnonzero(~inside)[:1]:
+    if not inside.all():
+        i = int(np.argmin(inside))
         field, value = f"{path}[{i}]", float(vector[i])
         if not math.isfinite(value):
             raise InvalidInput(field, value, "must be finite")

@@ -311,8 +311,7 @@ class _Query:
     def _algorithm(self) -> Any:
         kinds = {"rrt-connect": og.RRTConnect, "rrt-star": og.RRTstar, "aorrtc": og.AORRTC}
         algorithm = kinds[self._settings.planner](self._info)
-        if RANGE_RAD > 0.0:
-            algorithm.setRange(RANGE_RAD)
+        algorithm.setRange(RANGE_RAD)
         return algorithm
 
     def _rows(self, found: Any) -> Vec:

@@ -112,12 +112,12 @@ def _inside(low: Vec, high: Vec, goals: Vec, field: str) -> Vec:
         return points
     held = np.clip(points, low, high)
     # negated so that NaN is rejected too
-    wrong = np.flatnonzero(~(np.abs(held - points) <= SLACK).all(axis=1))
-    for row in wrong[:1]:
-        goal = points[row].tolist()
+    wrong = points[~(np.abs(held - points) <= SLACK).all(axis=1)]
+    if len(wrong):
+        goal = wrong[0].tolist()
         if not all(map(math.isfinite, goal)):
             raise InvalidInput(field, goal, "must be finite")
-        raise GoalOutside(field, goal, outside_of(points[row], low, high, field))
+        raise GoalOutside(field, goal, outside_of(wrong[0], low, high, field))
     return held
 
 

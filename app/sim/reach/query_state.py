@@ -68,7 +68,7 @@ class QueryState:
         self._tops = np.full((n_cylinders, 1), self.top_z)
         self.distances = np.zeros(n_bodies + n_cylinders)
         """Distance of the robot to each person [m], bodies first, shape (n_people,)."""
-        self._calls: dict[int, Callable[..., None]] = {}
+        self._call: Callable[..., None] | None = None
         self._buffers: dict[int, tuple[Vec, NDArray[np.float32]]] = {}
         self._load = direct(load_state, self._shared)
 
@@ -160,9 +160,9 @@ class QueryState:
             places,
             out,
         )
-        if not self._calls:
-            self._calls[0] = direct(queries.observe_rows, arguments)
-        self._calls[0](*arguments)
+        if self._call is None:
+            self._call = direct(queries.observe_rows, arguments)
+        self._call(*arguments)
         found: NDArray[np.float32] = out[0]
         return found
 
