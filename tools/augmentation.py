@@ -14,6 +14,7 @@ Source: docs/method.md 3.4, thesis section 5.3.3.
 from collections.abc import Callable
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from app.sim.core.arrays import Vec
 from app.sim.human import model as human
@@ -75,7 +76,8 @@ def _turned(q: Vec, hand: Hand, turn: float, points: PointsOf, before: Vec) -> V
     named, frames = points(q), human.body_frames(q, MEDIAN.vector(0.0))
     line = named[f"hand_{hand}"] - named[f"shoulder_{hand}"]
     torso, upper = frames["torso"][:3, :3], frames[f"upper_arm_{hand}"][:3, :3]
-    r = torso.T @ _about(line / np.linalg.norm(line), turn) @ upper
+    about = Rotation.from_rotvec(turn * line / np.linalg.norm(line)).as_matrix()
+    r = torso.T @ about @ upper
     side = -1.0 if hand == "r" else 1.0
     abduct = -side * np.arcsin(np.clip(r[1, 2], -1.0, 1.0))
     flex, rotate = -np.arctan2(r[0, 2], r[2, 2]), np.arctan2(r[1, 0], r[1, 1])
@@ -85,11 +87,3 @@ def _turned(q: Vec, hand: Hand, turn: float, points: PointsOf, before: Vec) -> V
         before + np.remainder(arm - before + np.pi, 2 * np.pi) - np.pi for arm in (one, other)
     ]
     return min(both, key=lambda arm: float(np.abs(arm - before).sum()))
-
-
-def _about(axis: Vec, angle: float) -> Vec:
-    """Return the rotation by an angle [rad] about a unit axis (Rodrigues), shape (3, 3)."""
-    x, y, z = axis
-    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    turn = np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * cross @ cross
-    return np.asarray(turn)

@@ -20,6 +20,7 @@ import torch
 from numpy.typing import NDArray
 from torch import nn
 
+from app.policies.networks.actor_critic import hidden
 from app.sim.cells.cell import load_cell
 from app.sim.core.jit import kernel
 from app.sim.core.kernels import rng as random
@@ -181,13 +182,7 @@ def fitted(
         rate_noise: See there.
         n_updates: Number of minibatches.
     """
-    net = nn.Sequential(
-        nn.Linear(N_IN, WIDTH),
-        nn.ReLU(),
-        nn.Linear(WIDTH, WIDTH),
-        nn.ReLU(),
-        nn.Linear(WIDTH, N_TIMES),
-    )
+    net = nn.Sequential(*hidden(N_IN, WIDTH, 2), nn.Linear(WIDTH, N_TIMES))
     adam = torch.optim.Adam(net.parameters(), LR, fused=True)
     steps = torch.optim.lr_scheduler.CosineAnnealingLR(adam, n_updates)
     inputs, outputs = torch.as_tensor(seen), torch.as_tensor(said)
@@ -203,13 +198,8 @@ def fitted(
 
 
 def network_of(net: nn.Sequential) -> Network:
-    """Return a network in the form of the kernels."""
-    arrays: list[Floats] = []
-    for layer in (net[0], net[2], net[4]):
-        assert isinstance(layer, nn.Linear)
-        arrays.append(np.ascontiguousarray(layer.weight.detach().numpy().T))
-        arrays.append(layer.bias.detach().numpy().copy())
-    return Network(*arrays)
+    """Return a network of linear layers in the form of the kernels."""
+    return Network(*(np.array(p.detach().numpy().T, order="C") for p in net.parameters()))
 
 
 def make(n_pedestrians: int, n_updates: int, seed: int) -> tuple[Network, Network]:

@@ -19,15 +19,16 @@ import torch
 from torch import nn
 
 from app.policies.configs.pick import PickPreset
+from app.policies.networks.actor_critic import hidden
 from app.policies.training.pick import settings_of
 from app.sim.cells.cell import load_cell
 from app.sim.core.arrays import Vec
 from app.sim.human.kernels import kinematics as body
 from app.sim.people.human_motion_config import HumanMotionConfig
 from app.sim.pick.batch import PickBatch, PickSettings
-from app.sim.prediction.kernels.networks import Floats, Network
 from app.sim.prediction.kernels.worker import N_JOINTS, TIMES, WorkerPredictor, predict_worker
 from app.sim.prediction.weights import WORKER_FILE, worker_predictor
+from tools.train_motion_predictor import network_of
 
 logger = logging.getLogger(__name__)
 
@@ -81,11 +82,7 @@ def fitted(moments: PostureMoments, n_updates: int, seed: int) -> WorkerPredicto
     mean = moments.now.mean(axis=0)
     scale = moments.now.std(axis=0) + LEAST_SCALE
     net = nn.Sequential(
-        nn.Linear(2 * N_JOINTS, WIDTH),
-        nn.ReLU(),
-        nn.Linear(WIDTH, WIDTH),
-        nn.ReLU(),
-        nn.Linear(WIDTH, len(TIMES) * N_JOINTS),
+        *hidden(2 * N_JOINTS, WIDTH, 2), nn.Linear(WIDTH, len(TIMES) * N_JOINTS)
     )
     inputs = torch.as_tensor((moments.now - mean) / scale, dtype=torch.float32)
     targets = torch.as_tensor(moments.change.reshape(len(inputs), -1), dtype=torch.float32)
@@ -98,12 +95,7 @@ def fitted(moments: PostureMoments, n_updates: int, seed: int) -> WorkerPredicto
         loss.backward()  # type: ignore[no-untyped-call]
         adam.step()
         rate.step()
-    arrays: list[Floats] = []
-    for layer in (net[0], net[2], net[4]):
-        assert isinstance(layer, nn.Linear)
-        arrays.append(np.ascontiguousarray(layer.weight.detach().numpy().T))
-        arrays.append(layer.bias.detach().numpy().copy())
-    return worker_predictor(Network(*arrays), mean, scale)
+    return worker_predictor(network_of(net), mean, scale)
 
 
 def hands(q: Vec, size: Vec) -> Vec:

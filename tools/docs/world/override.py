@@ -15,6 +15,7 @@ from app.sim.collision.checker import shapes_of
 from app.sim.collision.contact import clearance
 from app.sim.human import model as human
 from app.sim.pick.batch import step_robot
+from app.sim.primitives.phase import min_jerk
 from app.sim.robot.ur10 import Robot
 from app.sim.safety.layer import SafetyLayer, safety_settings
 from app.sim.scene.scene import NO_CYLINDERS, arm_of, people_of
@@ -49,10 +50,8 @@ class Visit:
 
 def pelvis_y(t: float) -> float:
     """Return the pelvis y of the person [m]: minimum jerk to the table, stay, return."""
-    x = np.clip((t - COMES) / (STAYS - COMES), 0.0, 1.0)
-    back = np.clip((t - LEAVES) / (STAYS - COMES), 0.0, 1.0)
-    part = [s**3 * (10.0 - 15.0 * s + 6.0 * s**2) for s in (x, back)]
-    return float(FAR + (NEAR - FAR) * (part[0] - part[1]))
+    there, back = min_jerk((t - np.array([COMES, LEAVES])) / (STAYS - COMES))
+    return float(FAR + (NEAR - FAR) * (there - back))
 
 
 def visit() -> tuple[Json, Visit]:
