@@ -55,6 +55,23 @@ def merged(found: Sequence[Json], new: Sequence[Json]) -> list[Json]:
     return [by_key[key] for key in sorted(by_key)]
 
 
+def add_curves(path: Path, command: str, seed: int, new: Sequence[Json]) -> None:
+    """Add curves to a result file.
+
+    Args:
+        command: Command stated in the result.
+        seed: Seed of the episodes.
+    """
+    found = json.loads(path.read_text(encoding="utf-8"))["curves"] if path.exists() else []
+    result = {
+        "command": command,
+        "seed": seed,
+        "curves": merged(found, new),
+        "machine": describe(),
+    }
+    path.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
+
+
 def collect(study: CurveStudy, title: str) -> None:
     """Evaluate the runs named on the command line and write their curves."""
     parser = argparse.ArgumentParser(description=title)
@@ -67,12 +84,4 @@ def collect(study: CurveStudy, title: str) -> None:
     for one in options.stock:
         name, _, file = one.partition("=")
         new.append(study.of_stock(name, Path(file)))
-    path = study.results
-    found = json.loads(path.read_text(encoding="utf-8"))["curves"] if path.exists() else []
-    result = {
-        "command": study.command,
-        "seed": study.seed,
-        "curves": merged(found, new),
-        "machine": describe(),
-    }
-    path.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
+    add_curves(study.results, study.command, study.seed, new)

@@ -13,7 +13,6 @@ fields are listed in the file.
 """
 
 import argparse
-import json
 from pathlib import Path
 from typing import Any
 
@@ -26,11 +25,10 @@ from app.policies.configs.reach import ReachPreset
 from app.policies.configs.sorting import SortingPreset
 from app.policies.training import pick, reach
 from app.policies.training.curve import CURVE_SEED, play
-from app.provenance import describe
 from app.sim.cells.cell import load_cell
 from app.sim.pick.batch import PickBatch
 from app.sim.reach.mixed_batch import ReachEnvironments
-from tools.docs.learning_curves import lines, merged
+from tools.docs.learning_curves import add_curves, lines
 from tools.docs.training_curves import read
 
 RESULTS = Path(__file__).resolve().parents[2] / "docs/results"
@@ -109,15 +107,9 @@ def main() -> None:
     parser.add_argument("runs", nargs="+", type=Path, metavar="RUN")
     parser.add_argument("--variant", help="what distinguishes the runs from their preset")
     options = parser.parse_args()
-    path = RESULTS / f"{options.file}.json"
-    found = json.loads(path.read_text(encoding="utf-8"))["curves"] if path.exists() else []
-    result = {
-        "command": f"python -m tools.docs.thesis_curves {options.file} RUN ...",
-        "seed": CURVE_SEED,
-        "curves": merged(found, [curve_of(run, options.variant) for run in options.runs]),
-        "machine": describe(),
-    }
-    path.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
+    command = f"python -m tools.docs.thesis_curves {options.file} RUN ..."
+    curves = [curve_of(run, options.variant) for run in options.runs]
+    add_curves(RESULTS / f"{options.file}.json", command, CURVE_SEED, curves)
 
 
 if __name__ == "__main__":

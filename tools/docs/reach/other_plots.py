@@ -11,20 +11,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullFormatter
 
-from tools.docs.reach.style import (
-    BLUE,
-    GREEN,
-    GREY,
-    INK,
-    MODES,
-    ORANGE,
-    PURPLE,
-    RED,
-    Json,
-    bars,
-    panels,
-    percent,
-)
+from tools.docs.reach.style import INK, MODES, PURPLE, Json, bars, percent
+from tools.docs.world.plots import BLUE, GREEN, GREY, ORANGE, RED, panels
 
 PEOPLE = {"direct": "nearest person", "direct-rollout": "nearest, rollout"}
 """Labels of two modes beside several people."""

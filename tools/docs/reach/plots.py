@@ -23,22 +23,9 @@ from matplotlib.patches import Circle, Rectangle
 from app.sim.people.kernels.pedestrian import WALKING
 from app.sim.people.pedestrian import PedestrianSettings
 from tools.docs.reach.other_plots import curves, others, smoothness
-from tools.docs.reach.style import (
-    BLUE,
-    GREEN,
-    GREY,
-    INK,
-    MODES,
-    ORANGE,
-    PURPLE,
-    RED,
-    Json,
-    bars,
-    panels,
-    percent,
-    save,
-)
+from tools.docs.reach.style import INK, MODES, PURPLE, Json, bars, percent
 from tools.docs.reach.tables import policy_of, siblings
+from tools.docs.world.plots import BLUE, GREEN, GREY, MISSES, ORANGE, RED, panels, save
 from tools.docs.world.walks import Walk, walk
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -46,10 +33,6 @@ ROOT = Path(__file__).resolve().parents[3]
 RESULTS, IMAGES = ROOT / "docs/results", ROOT / "docs/img/reach"
 FLOOR, CEILING = 0.90, 0.10
 """Success at and below which, and collisions at and above which, the colour saturates."""
-MISSES = LinearSegmentedColormap.from_list(
-    "misses", ["#7f1d1d", "#d9622b", "#f3c567", "#dcebd8", "#9ccfb0"]
-)
-"""From many failures to none."""
 HITS = LinearSegmentedColormap.from_list("hits", ["#f4f5f7", "#f3c567", "#d9622b", "#7f1d1d"])
 """From no collision to many."""
 

@@ -7,24 +7,7 @@ import numpy as np
 from matplotlib.ticker import FuncFormatter
 from numpy.typing import NDArray
 
-from tools.docs.world.plots import BLUE, GREEN, GREY, ORANGE, RED, panels, save
-
-__all__ = [
-    "BLUE",
-    "GREEN",
-    "GREY",
-    "INK",
-    "MODES",
-    "ORANGE",
-    "PURPLE",
-    "RED",
-    "Grid",
-    "Json",
-    "bars",
-    "panels",
-    "percent",
-    "save",
-]
+from tools.docs.world.plots import BLUE, GREEN, ORANGE
 
 Json = dict[str, Any]
 Grid = NDArray[np.float64]

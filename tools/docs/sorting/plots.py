@@ -15,12 +15,12 @@ from typing import Any
 import numpy as np
 from matplotlib import colormaps
 from matplotlib.axes import Axes
-from matplotlib.colors import Colormap, LinearSegmentedColormap, Normalize
+from matplotlib.colors import Colormap, Normalize
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, NullFormatter, PercentFormatter
 from numpy.typing import NDArray
 
-from tools.docs.world.plots import BLUE, GREEN, GREY, ORANGE, RED, panels, save
+from tools.docs.world.plots import BLUE, GREEN, GREY, MISSES, ORANGE, RED, panels, save
 
 ROOT = Path(__file__).resolve().parents[3]
 
@@ -30,10 +30,6 @@ STARTS = ("clean", "disturbed")
 """Rows of the result to draw."""
 FLOOR = 0.95
 """Success at and below which the colour saturates."""
-MISSES = LinearSegmentedColormap.from_list(
-    "misses", ["#7f1d1d", "#d9622b", "#f3c567", "#dcebd8", "#9ccfb0"]
-)
-"""From many failures to none."""
 COLOURS = {"dqn": BLUE, "pure": GREEN, "thesis": ORANGE, "stock": GREY}
 """Colour of a curve by a part of its name; later entries take precedence."""
 Json = dict[str, Any]

@@ -8,6 +8,7 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.colors import LinearSegmentedColormap
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, Rectangle
@@ -22,6 +23,10 @@ from tools.docs.world.walks import Walk
 
 BLUE, ORANGE, GREEN, RED, GREY = "#2563a8", "#d97706", "#2a9d6f", "#b3261e", "#8a8f98"
 LIGHT = "#e6e8eb"
+MISSES = LinearSegmentedColormap.from_list(
+    "misses", ["#7f1d1d", "#d9622b", "#f3c567", "#dcebd8", "#9ccfb0"]
+)
+"""From many failures to none."""
 LIFT = 1
 """The highlighted joint: shoulder lift, which reaches the end of its range."""
 STYLE: Any = {
