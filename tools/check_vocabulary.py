@@ -84,13 +84,8 @@ def in_name(token: str) -> list[str]:
     return [part for part in parts(token) if WORDS.fullmatch(part) or NAMES.fullmatch(part)]
 
 
-def in_text(text: str, *, code: bool = False) -> Iterator[str]:
-    """Yield banned words and phrases of one line of text.
-
-    Args:
-        text: One line.
-        code: Whether single words are identifiers, as outside Python's strings and comments.
-    """
+def in_text(text: str) -> Iterator[str]:
+    """Yield banned words and phrases of one line of text."""
     yield from (match[0].strip() for match in PHRASES.finditer(text))
     spans = [match.span() for match in IDIOMS.finditer(text)]
     ticks = [match.span() for match in re.finditer(r"`[^`\n]+`", text)]
@@ -101,7 +96,7 @@ def in_text(text: str, *, code: bool = False) -> Iterator[str]:
         words = parts(token)
         compound = "-" not in token and (len(words) > 1 or "_" in token)
         quoted = any(a <= at < b for a, b in ticks)
-        if code or compound or quoted:
+        if compound or quoted:
             yield from (
                 f"{word} ({token})" if word != token else word for word in in_name(token)
             )

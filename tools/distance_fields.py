@@ -21,7 +21,7 @@ Field = Callable[[Vec], Vec]
 """Maps points (..., 3) [m] to distances [m]; negative inside."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(frozen=True, slots=True)
 class Cone:
     """A round cone: the hull of two balls, flattened along the axes by ``flat``."""
 
