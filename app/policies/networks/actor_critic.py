@@ -185,14 +185,15 @@ class QNetwork(nn.Sequential):
         n_act: Length of an action.
         layers: Number of hidden layers.
         normed: Whether hidden layers are normalised.
+        n_values: Number of values: 1, or quantiles of one.
         crowd: Position of the people set; None without one.
     """
 
     def __init__(
         self,
         width: int,
-        n_obs: int = N_FEATURES,
-        n_act: int = CONTROLLED,
+        n_obs: int,
+        n_act: int,
         layers: int = 2,
         normed: bool = True,
         n_values: int = 1,
@@ -207,31 +208,13 @@ class Critics(nn.Module):
     """The value functions ``q1``, ``q2``, ...: two of them in TD3, one in DDPG.
 
     Args:
-        width: Units per hidden layer.
-        n_obs: Length of observations.
-        n_act: Length of an action.
-        layers: Number of hidden layers of each.
-        normed: Whether hidden layers are normalised.
-        n_values: Number of values of each.
-        crowd: Position of the people set; None without one.
+        networks: Map observations beside actions, shape (n, n_obs + n_act), to values.
     """
 
-    def __init__(
-        self,
-        width: int,
-        n_obs: int = N_FEATURES,
-        n_act: int = CONTROLLED,
-        n_critics: int = 2,
-        layers: int = 2,
-        normed: bool = True,
-        n_values: int = 1,
-        crowd: CrowdShape | None = None,
-    ) -> None:
+    def __init__(self, *networks: nn.Module) -> None:
         super().__init__()
-        self.n_critics = n_critics
-        for number in range(1, n_critics + 1):
-            q = QNetwork(width, n_obs, n_act, layers, normed, n_values, crowd)
-            self.add_module(f"q{number}", q)
+        for number, network in enumerate(networks, 1):
+            self.add_module(f"q{number}", network)
 
     def forward(self, obs: torch.Tensor, act: torch.Tensor) -> tuple[torch.Tensor, ...]:
         """Return all values, shape (n, 1) each, of (n, n_obs) and (n, n_act)."""

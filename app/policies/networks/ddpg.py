@@ -11,7 +11,7 @@ Stable-Baselines 2 and of the authors' parameters (docs/method.md 2.5).
 import torch
 from torch import nn
 
-from app.policies.networks.actor_critic import Critics, hidden, initialise_glorot
+from app.policies.networks.actor_critic import hidden, initialise_glorot
 
 LAST_WEIGHT = 3e-3
 """Bound of the initial weights of last layers."""
@@ -114,29 +114,3 @@ class LateActionQ(nn.Module):
         seen = obs if self.norm is None else self.norm(obs)
         value: torch.Tensor = self.rest(torch.cat([self.first(seen), act], dim=1))
         return value
-
-
-class DDPGCritics(Critics):
-    """Value functions of DDPG that take the action after their first layer.
-
-    Args:
-        width: Units per hidden layer.
-        n_obs: Length of observations.
-        n_act: Length of an action.
-        layers: Number of hidden layers of each.
-        norm: Normalisation of observations; None for raw ones.
-    """
-
-    def __init__(
-        self,
-        width: int,
-        n_obs: int,
-        n_act: int,
-        n_critics: int,
-        layers: int,
-        norm: RunningNormalisation | None,
-    ) -> None:
-        nn.Module.__init__(self)
-        self.n_critics = n_critics
-        for number in range(1, n_critics + 1):
-            self.add_module(f"q{number}", LateActionQ(width, n_obs, n_act, layers, norm))

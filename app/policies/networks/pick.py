@@ -8,6 +8,7 @@ from app.policies.networks.actor_critic import (
     Critics,
     Fade,
     MeanCritics,
+    QNetwork,
     ResidualActor,
     hidden,
     initialise_glorot,
@@ -76,11 +77,13 @@ def actor_of(preset: PickPreset, n_obs: int) -> ResidualActor | NormedActor:
 def critics_for(preset: PickPreset, n_obs: int) -> Critics:
     """Return new critics for observations of a length."""
     sizes = preset.networks
-    shape = sizes.width, n_obs, CONTROLLED, sizes.n_critics, sizes.layers
-    normed = sizes.critic_norm == "layer"
-    if sizes.critic == "quantiles":
-        return QuantileCritics(*shape, normed, sizes.n_quantiles, sizes.dropped_quantiles)
-    critics = (MeanCritics if sizes.target_value == "mean" else Critics)(*shape, normed)
+    shape = sizes.width, n_obs, CONTROLLED, sizes.layers, sizes.critic_norm == "layer"
+    quantiles = sizes.critic == "quantiles"
+    n_values = sizes.n_quantiles if quantiles else 1
+    networks = [QNetwork(*shape, n_values) for _ in range(sizes.n_critics)]
+    if quantiles:
+        return QuantileCritics(*networks, dropped=sizes.dropped_quantiles)
+    critics = (MeanCritics if sizes.target_value == "mean" else Critics)(*networks)
     if sizes.actor == "plain":
         initialise_glorot(critics)
     return critics

@@ -13,40 +13,23 @@ from typing import Any
 import numpy as np
 import torch
 from numpy.typing import NDArray
-from torch import Tensor
+from torch import Tensor, nn
 
-from app.policies.networks.actor_critic import Critics, CrowdShape
+from app.policies.networks.actor_critic import Critics
 from app.sim.core.jit import FAST, kernel
 
 
 class QuantileCritics(Critics):
-    """Critics with ``n_quantiles`` quantiles of the return each.
+    """Critics with several quantiles of the return each.
 
     Args:
-        width: Units per hidden layer.
-        n_obs: Length of observations.
-        n_act: Length of an action.
-        layers: Number of hidden layers of each.
-        normed: Whether hidden layers are normalised.
-        n_quantiles: Number of quantiles of each.
+        networks: Map observations beside actions to quantiles.
         dropped: Number of highest quantiles dropped in targets, per critic.
-        crowd: Position of the people set; None without one.
     """
 
-    def __init__(
-        self,
-        width: int,
-        n_obs: int,
-        n_act: int,
-        n_critics: int = 2,
-        layers: int = 2,
-        normed: bool = True,
-        n_quantiles: int = 25,
-        dropped: int = 2,
-        crowd: CrowdShape | None = None,
-    ) -> None:
-        super().__init__(width, n_obs, n_act, n_critics, layers, normed, n_quantiles, crowd)
-        self._kept = n_critics * (n_quantiles - dropped)
+    def __init__(self, *networks: nn.Module, dropped: int) -> None:
+        super().__init__(*networks)
+        self._dropped = dropped * len(networks)
 
     def least(self, obs: Tensor, act: Tensor) -> Tensor:
         """Return the minimum over the critics' mean quantiles, shape (n,)."""
@@ -59,8 +42,9 @@ class QuantileCritics(Critics):
         They are unordered and without gradient.
         """
         together = torch.cat(self.forward(obs, act), dim=1).float().numpy()
-        apart = np.partition(together, self._kept - 1, axis=1)
-        return torch.from_numpy(apart[:, : self._kept])
+        kept = together.shape[1] - self._dropped
+        apart = np.partition(together, kept - 1, axis=1)
+        return torch.from_numpy(apart[:, :kept])
 
     def first(self, obs: Tensor, act: Tensor) -> Tensor:
         """Return the value that the actor maximises, shape (B, 1): the mean quantile."""

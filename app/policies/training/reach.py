@@ -13,8 +13,8 @@ from app.policies.algorithms.exploration import Exploration, OUNoise, PerEnvAR1N
 from app.policies.algorithms.td3 import Networks
 from app.policies.configs.reach import ReachExploration, ReachPreset
 from app.policies.inference.reach_policy import LAYOUTS, PEOPLE_SET, blocked_rules_of
-from app.policies.networks.actor_critic import Critics, PlainActor, ResidualActor
-from app.policies.networks.ddpg import DDPGActor, DDPGCritics, RunningNormalisation
+from app.policies.networks.actor_critic import Critics, PlainActor, QNetwork, ResidualActor
+from app.policies.networks.ddpg import DDPGActor, LateActionQ, RunningNormalisation
 from app.policies.networks.quantiles import QuantileCritics
 from app.policies.training.curve import CURVE_SEED, outcome_rates, play
 from app.policies.training.reporter import Callbacks, Reporter
@@ -102,13 +102,13 @@ def networks_of(preset: ReachPreset, n_obs: int) -> Networks:
         return PlainActor(width, n_obs, N_ACT, layers, crowd)
 
     def critic() -> Critics:
-        n = sizes.n_critics
+        shape, numbers = (width, n_obs, N_ACT, layers), range(sizes.n_critics)
         if sizes.critic == "ddpg":
-            return DDPGCritics(width, n_obs, N_ACT, n, layers, norm)
+            return Critics(*(LateActionQ(*shape, norm) for _ in numbers))
         if sizes.critic == "mean":
-            return Critics(width, n_obs, N_ACT, n, layers, normed, crowd=crowd)
-        quantiles = sizes.n_quantiles, sizes.dropped_quantiles
-        return QuantileCritics(width, n_obs, N_ACT, n, layers, normed, *quantiles, crowd)
+            return Critics(*(QNetwork(*shape, normed, crowd=crowd) for _ in numbers))
+        networks = [QNetwork(*shape, normed, sizes.n_quantiles, crowd) for _ in numbers]
+        return QuantileCritics(*networks, dropped=sizes.dropped_quantiles)
 
     return Networks(actor=actor, critic=critic, width=width, norm=norm)
 

@@ -9,7 +9,7 @@ from app.policies.algorithms.prioritized_replay import PrioritisedReplay
 from app.policies.algorithms.td3 import BatchTD3, critics_of
 from app.policies.configs.reach import ReachExploration
 from app.policies.configs.td3 import NoiseExploration
-from app.policies.networks.actor_critic import Critics, PlainActor, ResidualActor
+from app.policies.networks.actor_critic import Critics, PlainActor, QNetwork, ResidualActor
 from app.policies.training import pick as pick_training
 from app.policies.training import reach as reach_training
 from app.policies.training.run import TrainingRun
@@ -41,7 +41,8 @@ def test_the_untrained_actor_follows_the_base_motion():
 
 def test_the_least_of_both_critics_is_the_value():
     torch.manual_seed(1)
-    critic, obs, act = Critics(16), torch.randn(7, N_FEATURES), torch.zeros(7, 5)
+    critic = Critics(QNetwork(16, N_FEATURES, 5), QNetwork(16, N_FEATURES, 5))
+    obs, act = torch.randn(7, N_FEATURES), torch.zeros(7, 5)
     q1, q2 = critic(obs, act)
     assert torch.equal(critic.least(obs, act), torch.minimum(q1, q2).squeeze(1))
 
@@ -108,7 +109,7 @@ def ddpg() -> BatchTD3:
 def test_ddpg_is_td3_with_one_critic_and_updates_every_sixty_steps(ddpg):
     ddpg.learn(720)
     assert ddpg._n_updates == (720 - 120) // 60
-    assert critics_of(ddpg.critic).n_critics == 1
+    assert len(list(critics_of(ddpg.critic).children())) == 1
     linear = [m for m in ddpg.actor.mu.modules() if isinstance(m, torch.nn.Linear)]
     assert len(linear) == 11
     critic = ddpg.critic.optimizer.param_groups[0]["lr"]

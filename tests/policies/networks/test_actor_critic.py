@@ -7,7 +7,7 @@ import torch
 from torch import nn
 
 from app.policies.configs.pick import PICK, REACH_ONLY, THESIS, PickPreset
-from app.policies.networks.actor_critic import Critics, MeanCritics
+from app.policies.networks.actor_critic import Critics, MeanCritics, QNetwork
 from app.policies.networks.pick import NormedActor, actor_of, critics_for
 from app.policies.networks.quantiles import QuantileCritics
 
@@ -15,7 +15,7 @@ from app.policies.networks.quantiles import QuantileCritics
 def test_targets_are_the_least_or_the_mean_of_the_values():
     obs, act = torch.randn(7, 4), torch.randn(7, 2)
     for kind, pooled in ((Critics, torch.amin), (MeanCritics, torch.mean)):
-        critics = kind(16, 4, 2, n_critics=3)
+        critics = kind(*(QNetwork(16, 4, 2) for _ in range(3)))
         values = torch.cat(critics(obs, act), dim=1)
         assert torch.allclose(critics.targets(obs, act), pooled(values, dim=1, keepdim=True))
 

@@ -6,7 +6,8 @@ import pytest
 import torch
 from torch import nn
 
-from app.policies.networks.ddpg import DDPGActor, DDPGCritics, LateActionQ, RunningNormalisation
+from app.policies.networks.actor_critic import Critics
+from app.policies.networks.ddpg import DDPGActor, LateActionQ, RunningNormalisation
 
 
 def linear_layers(module: nn.Module) -> list[nn.Linear]:
@@ -57,7 +58,7 @@ def test_observations_are_normalised_by_their_running_moments_and_clipped():
 
 def test_networks_share_one_normalisation_and_checkpoints_keep_it():
     norm = RunningNormalisation(3)
-    actor, critics = DDPGActor(8, 3, 2, 2, norm), DDPGCritics(8, 3, 2, 1, 2, norm)
+    actor, critics = DDPGActor(8, 3, 2, 2, norm), Critics(LateActionQ(8, 3, 2, 2, norm))
     obs, act = torch.randn(50, 3) * 4.0 + 1.0, torch.zeros(50, 2)
     before = critics.least(obs, act)
     norm.update(obs)

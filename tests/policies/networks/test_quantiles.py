@@ -4,12 +4,13 @@ import numpy as np
 import pytest
 import torch
 
+from app.policies.networks.actor_critic import QNetwork
 from app.policies.networks.quantiles import QuantileCritics, quantile_loss
 
 
 def test_targets_leave_out_the_highest_quantiles_of_all_critics():
     torch.manual_seed(0)
-    critics = QuantileCritics(16, 4, 2, n_critics=3, n_quantiles=5, dropped=2)
+    critics = QuantileCritics(*(QNetwork(16, 4, 2, n_values=5) for _ in range(3)), dropped=2)
     obs, act = torch.randn(7, 4), torch.randn(7, 2)
     with torch.no_grad():
         everything = torch.cat(critics(obs, act), dim=1)
@@ -23,7 +24,7 @@ def test_targets_leave_out_the_highest_quantiles_of_all_critics():
 
 def test_quantiles_of_a_known_distribution_are_learned():
     torch.manual_seed(1)
-    critics = QuantileCritics(32, 1, 1, n_critics=1, n_quantiles=9, dropped=0)
+    critics = QuantileCritics(QNetwork(32, 1, 1, n_values=9), dropped=0)
     adam = torch.optim.Adam(critics.parameters(), 3e-3)
     obs, act = torch.zeros(256, 1), torch.zeros(256, 1)
     for _ in range(600):
@@ -40,7 +41,7 @@ def test_quantiles_of_a_known_distribution_are_learned():
 
 def test_weights_scale_the_loss_of_their_rows():
     torch.manual_seed(2)
-    critics = QuantileCritics(8, 2, 1)
+    critics = QuantileCritics(*(QNetwork(8, 2, 1, n_values=25) for _ in range(2)), dropped=2)
     obs, act, target = torch.randn(6, 2), torch.randn(6, 1), torch.randn(6, 3)
     even, _ = critics.loss(obs, act, target, torch.ones(6, 1))
     plain, _ = critics.loss(obs, act, target, None)
