@@ -1,7 +1,6 @@
 """The pick scenario as Gymnasium environments, single and vectorised."""
 
 from collections.abc import Sequence
-from typing import Any
 
 from gymnasium.vector import AutoresetMode
 
@@ -117,8 +116,6 @@ class PickEnv(SingleEnv):
     desired speeds instead of coefficients (``pick/kernels/observation.py``,
     ``pick/kernels/reward.py``).
     """
-
-    metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 20}
 
     def __init__(
         self,

@@ -1,7 +1,6 @@
 """The reach scenario as Gymnasium environments, single and vectorised."""
 
 from collections.abc import Sequence
-from typing import Any
 
 from gymnasium.vector import AutoresetMode
 
@@ -134,8 +133,6 @@ class ReachEnv(SingleEnv):
     Source: thesis chapter 4, docs/method.md 2.1 to 2.3. Deviates: features are added to the raw
     state (4.30), actions are desired speeds instead of coefficients, no action is *unfeasible*.
     """
-
-    metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 50}
 
     def __init__(
         self,

@@ -25,6 +25,8 @@ class SingleEnv(gymnasium.Env[NDArray[Any], Any]):
         InvalidInput: The render mode is unknown.
     """
 
+    metadata: dict[str, Any] = {"render_modes": ["rgb_array"]}
+
     def __init__(self, task: BatchTask, render_mode: str | None) -> None:
         self._task = task
         self.action_space, self.observation_space = task.action_space, task.observation_space

@@ -157,8 +157,6 @@ class SortingEnv(SingleEnv):
     map are not printed and chosen here; the failure map is observed.
     """
 
-    metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": RENDER_FPS}
-
     def __init__(
         self,
         cell: str | Cell = "sorting-e0",
