@@ -7,7 +7,6 @@ one in the file; other curves are kept.
 import argparse
 import json
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -18,22 +17,6 @@ from app.provenance import describe
 from tools.docs.training_curves import read
 
 Json = dict[str, Any]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class CurveStudy:
-    """Learning curves of one scenario."""
-
-    results: Path
-    """Result file."""
-    command: str
-    """Command stated in the result."""
-    seed: int
-    """Seed of the episodes."""
-    of_run: Callable[[Path, int | None], Json]
-    """Return the curve of a run; the number may replace that of the episodes."""
-    of_stock: Callable[[str, Path], Json]
-    """Return the curve of another learner from its name and a JSON Lines file."""
 
 
 def lines(path: Path) -> list[Json]:
@@ -72,16 +55,32 @@ def add_curves(path: Path, command: str, seed: int, new: Sequence[Json]) -> None
     path.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
 
 
-def collect(study: CurveStudy, title: str) -> None:
-    """Evaluate the runs named on the command line and write their curves."""
+def collect(
+    title: str,
+    results: Path,
+    command: str,
+    seed: int,
+    of_run: Callable[[Path, int | None], Json],
+    of_stock: Callable[[str, Path], Json],
+) -> None:
+    """Evaluate the runs named on the command line and write their curves.
+
+    Args:
+        title: Description of the command.
+        results: Result file.
+        command: Command stated in the result.
+        seed: Seed of the episodes.
+        of_run: Returns the curve of a run; the number may replace that of the episodes.
+        of_stock: Returns the curve of another learner from its name and a JSON Lines file.
+    """
     parser = argparse.ArgumentParser(description=title)
     parser.add_argument("runs", nargs="*", type=Path, metavar="RUN")
     parser.add_argument("--stock", action="append", default=[], metavar="NAME=FILE")
     parser.add_argument("--episodes", type=int, help="per target or pair")
     options = parser.parse_args()
     torch.set_num_threads(1)
-    new = [study.of_run(folder, options.episodes) for folder in options.runs]
+    new = [of_run(folder, options.episodes) for folder in options.runs]
     for one in options.stock:
         name, _, file = one.partition("=")
-        new.append(study.of_stock(name, Path(file)))
-    add_curves(study.results, study.command, study.seed, new)
+        new.append(of_stock(name, Path(file)))
+    add_curves(results, command, seed, new)

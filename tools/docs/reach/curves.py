@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from app.policies.evaluation.reach.bench import ReachBench
-from tools.docs.learning_curves import CurveStudy, collect, lines, policies
+from tools.docs.learning_curves import collect, lines, policies
 
 RESULTS = Path(__file__).resolve().parents[3] / "docs/results/reach-curves.json"
 SEED = 77
@@ -67,12 +67,10 @@ def curve_of_stock(name: str, path: Path) -> Json:
 
 if __name__ == "__main__":
     collect(
-        CurveStudy(
-            results=RESULTS,
-            command="python -m tools.docs.reach.curves RUN ...",
-            seed=SEED,
-            of_run=curve_of_run,
-            of_stock=curve_of_stock,
-        ),
         "Collect learning curves of reaching.",
+        results=RESULTS,
+        command="python -m tools.docs.reach.curves RUN ...",
+        seed=SEED,
+        of_run=curve_of_run,
+        of_stock=curve_of_stock,
     )

@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullFormatter
 
-from tools.docs.reach.style import INK, MODES, PURPLE, Json, bars, percent
+from tools.docs.reach.style import INK, MODES, PURPLE, Json, draw_rates, percent
 from tools.docs.world.plots import BLUE, GREEN, GREY, ORANGE, RED, panels
 
 PEOPLE = {"direct": "nearest person", "direct-rollout": "nearest, rollout"}
@@ -50,25 +50,17 @@ def others(people: Sequence[Json], speeds: Json | None, trackers: Json | None) -
 
 def _people(axis: Axes, results: Sequence[Json]) -> None:
     shown = [
-        (*MODES[mode][1:], PEOPLE.get(mode, MODES[mode][0]), _by_people(results[0], mode))
+        ((PEOPLE.get(mode, MODES[mode][0]), *MODES[mode][1:]), _by_people(results[0], mode))
         for mode in dict.fromkeys(
             one["inference_mode"] for one in results[0]["settings"]["rows"].values()
         )
     ]
     for other in results[1:]:  # one inference mode per further policy
-        words, colour, mark = MODES.get(other["label"], (other["label"], INK, "v"))
-        shown.append((colour, mark, words, _by_people(other, "direct")))
-    for k, (colour, mark, words, own) in enumerate(shown):
-        axis.errorbar(
-            [n + 0.06 * (k - 0.5 * (len(shown) - 1)) for n, _ in own],
-            [rate["mean"] for _, rate in own],
-            bars([rate for _, rate in own]),
-            fmt=f"{mark}-",
-            color=colour,
-            ms=4.5,
-            elinewidth=0.9,
-            label=words,
-        )
+        look = MODES.get(other["label"], (other["label"], INK, "v"))
+        shown.append((look, _by_people(other, "direct")))
+    for k, (look, own) in enumerate(shown):
+        x = [n + 0.06 * (k - 0.5 * (len(shown) - 1)) for n, _ in own]
+        draw_rates(axis, x, [rate for _, rate in own], look)
     axis.set(title="Several people", xlabel="people in the cell", ylabel="success")
     axis.xaxis.set_major_locator(FixedLocator(range(5)))
     percent(axis.yaxis)

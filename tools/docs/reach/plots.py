@@ -23,7 +23,7 @@ from matplotlib.patches import Circle, Rectangle
 from app.sim.people.kernels.pedestrian import WALKING
 from app.sim.people.pedestrian import PedestrianSettings
 from tools.docs.reach.other_plots import curves, others, smoothness
-from tools.docs.reach.style import INK, MODES, PURPLE, Json, bars, percent
+from tools.docs.reach.style import INK, MODES, PURPLE, Json, draw_rates, percent
 from tools.docs.reach.tables import policy_of, siblings
 from tools.docs.world.plots import BLUE, GREEN, GREY, MISSES, ORANGE, RED, panels, save
 from tools.docs.world.walks import Walk, walk
@@ -199,7 +199,10 @@ def between_targets(results: Sequence[Json]) -> Figure:
             left.plot([100.0 * gain["low"], 100.0 * gain["high"]], [k, k], color=colour, lw=2.0)
             left.plot(100.0 * gain["mean"], k, mark, color=colour, ms=6)
             if not several or mode == own_mode(result):
-                _by_distance(right, row["between"], 2.5 * number, colour, mark, words)
+                groups, aside = row["between"], 2.5 * number
+                x = [500.0 * (one["low_m"] + one["high_m"]) + aside for one in groups]
+                rates = [one["success"] for one in groups]
+                draw_rates(right, x, rates, (words, colour, mark))
     left.axvline(0.0, color=GREY, lw=1.0)
     left.axvline(-0.5, color=RED, lw=1.0, ls=":")
     left.set_yticks([-k for k in range(len(labels))], labels)
@@ -213,23 +216,6 @@ def between_targets(results: Sequence[Json]) -> Figure:
     if several:
         right.legend(loc="lower left")
     return figure
-
-
-def _by_distance(
-    axis: Axes, groups: Sequence[Json], aside: float, colour: str, mark: str, words: str
-) -> None:
-    """Draw success by the distance to the nearest target, shifted by ``aside`` [mm]."""
-    rates = [one["success"] for one in groups]
-    axis.errorbar(
-        [500.0 * (one["low_m"] + one["high_m"]) + aside for one in groups],
-        [rate["mean"] for rate in rates],
-        bars(rates),
-        fmt=f"{mark}-",
-        color=colour,
-        ms=4.5,
-        elinewidth=0.9,
-        label=words,
-    )
 
 
 def walks(four: Sequence[Walk], rules: PedestrianSettings) -> Figure:

@@ -5,12 +5,10 @@ from typing import Any
 
 import numpy as np
 from matplotlib.ticker import FuncFormatter
-from numpy.typing import NDArray
 
 from tools.docs.world.plots import BLUE, GREEN, ORANGE
 
 Json = dict[str, Any]
-Grid = NDArray[np.float64]
 PURPLE, INK = "#7c5aa6", "#374151"
 MODES = {
     "direct": ("direct", BLUE, "o"),
@@ -28,8 +26,21 @@ def percent(axis: Any) -> None:
     axis.set_major_formatter(FuncFormatter(lambda value, _place: f"{100.0 * value:.4g} %"))
 
 
-def bars(rates: Sequence[Json]) -> Grid:
-    """Return the lengths of error bars below and above rates, shape (2, n)."""
-    return np.array(
-        [[one["mean"] - one["low"], one["high"] - one["mean"]] for one in rates]
-    ).T.clip(0.0)
+def draw_rates(
+    axis: Any, x: Sequence[float], rates: Sequence[Json], look: tuple[str, str, str]
+) -> None:
+    """Draw rates and their 95 % intervals over ``x``; ``look`` is label, colour and marker."""
+    label, colour, mark = look
+    middle, low, high = (
+        np.array([one[key] for one in rates]) for key in ("mean", "low", "high")
+    )
+    axis.errorbar(
+        x,
+        middle,
+        np.array([middle - low, high - middle]).clip(0.0),
+        fmt=f"{mark}-",
+        color=colour,
+        ms=4.5,
+        elinewidth=0.9,
+        label=label,
+    )

@@ -11,7 +11,6 @@ A curve has ``played``, the greedy evaluations during training, and ``pairs``, o
 stored policy.
 """
 
-from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -23,25 +22,13 @@ from app.policies.inference.sorting_policy import SortingPolicy
 from app.sim.core.arrays import Vec
 from app.sim.sorting.batch import fail_of
 from app.sim.sorting.state import SortingShape
-from tools.docs.learning_curves import CurveStudy, collect, lines, policies
+from tools.docs.learning_curves import collect, lines, policies
 
 RESULTS = Path(__file__).resolve().parents[3] / "docs/results/sorting-curves.json"
 SEED = 77
 """Seed of the episodes; not used in training."""
 STOCK = "stock Stable-Baselines3 DQN"
 Json = dict[str, Any]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class CurvePoint:
-    """Success and return of a policy over all pairs, with equal weights."""
-
-    success: float
-    """Success rate."""
-    mean_return: float
-    """Mean sum of rewards per episode, not discounted."""
-    return_sd: float
-    """Standard deviation of that sum over episodes."""
 
 
 def curve_episodes(shape: SortingShape) -> int:
@@ -55,8 +42,10 @@ def curve_point(
     fail: Vec,
     episodes_per_pair: int,
     seed: int,
-) -> CurvePoint:
-    """Evaluate a policy on every pair.
+) -> dict[str, float]:
+    """Return success rate, mean return and its standard deviation, all pairs alike.
+
+    Returns are not discounted.
 
     Args:
         values: Q of every move, from observations.
@@ -67,11 +56,11 @@ def curve_point(
     """
     batches = grid_batches(shape, fail, episodes_per_pair, seed, 0.0)
     found = joined([run_episodes(batch, greedy(values)) for batch in batches])
-    return CurvePoint(
-        success=float(found.success.mean()),
-        mean_return=float(found.rewards.mean()),
-        return_sd=float(found.rewards.std()),
-    )
+    return {
+        "success": float(found.success.mean()),
+        "mean_return": float(found.rewards.mean()),
+        "return_sd": float(found.rewards.std()),
+    }
 
 
 def curve_of_run(folder: Path, episodes: int | None) -> Json:
@@ -94,7 +83,7 @@ def curve_of_run(folder: Path, episodes: int | None) -> Json:
             "episodes_per_pair": n,
         }
         step = manifest["step"]
-        pairs.append({"step": step, "cpu_s": spent.get(step), **asdict(point)})
+        pairs.append({"step": step, "cpu_s": spent.get(step), **point})
     played = [_point(one, one["step"], one["reward"]) for one in points]
     return {**named, "played": played, "pairs": pairs}
 
@@ -116,12 +105,10 @@ def _point(one: Json, step: int, mean_return: float) -> Json:
 
 if __name__ == "__main__":
     collect(
-        CurveStudy(
-            results=RESULTS,
-            command="python -m tools.docs.sorting.curves RUN ...",
-            seed=SEED,
-            of_run=curve_of_run,
-            of_stock=curve_of_stock,
-        ),
         "Collect learning curves of sorting.",
+        results=RESULTS,
+        command="python -m tools.docs.sorting.curves RUN ...",
+        seed=SEED,
+        of_run=curve_of_run,
+        of_stock=curve_of_stock,
     )

@@ -145,6 +145,6 @@ def test_with_fallback_a_cycling_policy_reaches_every_goal():
 def test_the_curve_counts_every_pair_alike():
     point = curve_point(values_of(exactly, SHAPE), SHAPE, FAIL, 4, 9)
     lost = curve_point(values_of(in_circles, SHAPE), SHAPE, FAIL, 4, 9)
-    assert point.success == 1.0 and lost.success < 0.5
-    assert point.mean_return > 0.0 > lost.mean_return
-    assert 0.0 < point.return_sd < lost.return_sd
+    assert point["success"] == 1.0 and lost["success"] < 0.5
+    assert point["mean_return"] > 0.0 > lost["mean_return"]
+    assert 0.0 < point["return_sd"] < lost["return_sd"]
