@@ -32,6 +32,7 @@ from app.sim.reach.motion_types import MotionDecision, MotionQuestion
 from app.sim.robot.actions import ActionSettings
 from app.sim.safety.layer import SafetySettings
 from tests.policies.reach_actor import RandomActor
+from tests.sim.driven_batches import drive
 
 CELL = load_cell("shared-workspace")
 HOME = np.array(CELL.robot.home_q)
@@ -51,12 +52,7 @@ def question(**changes: Any) -> MotionQuestion:
 def driven(n_envs: int, people: tuple[str, ...], **other: Any) -> ReachBatch:
     """A batch some periods into its episodes."""
     settings = ReachSettings(people=people, goals="box", **other)
-    batch = ReachBatch(CELL, n_envs, 7, settings)
-    batch.reset()
-    rng = np.random.default_rng(8)
-    for _ in range(25):
-        batch.step(rng.uniform(-1, 1, (n_envs, 6)).astype(np.float32), auto_reset=False)
-    return batch
+    return drive(ReachBatch(CELL, n_envs, 7, settings), 25, seed=8, auto_reset=False)
 
 
 def question_of(batch: ReachBatch, e: int) -> MotionQuestion:

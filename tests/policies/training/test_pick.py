@@ -12,6 +12,7 @@ from app.sim.pick.curriculum_batch import CurriculumPickBatch
 from app.sim.pick.monitored_batch import MonitoredPickBatch
 from app.sim.scenario.kernels.episode import COLLISION, TIMEOUT
 from tests.policies.conftest import Recorder, preset_of
+from tests.sim.driven_batches import drive
 
 CELL = load_cell("pick-and-place")
 
@@ -41,10 +42,7 @@ def test_monitored_preset_steps_under_the_layer_with_the_settings_of_the_cell():
     assert isinstance(batch, MonitoredPickBatch)
     assert batch.safety.protective_distance == CELL.safety.protective_distance == 0.0
     assert settings_of(preset) == settings_of(PickPreset())
-    batch.reset()
-    rng = np.random.default_rng(0)
-    for _ in range(100):
-        batch.step(rng.uniform(-1.0, 1.0, (16, 5)).astype(np.float32))
+    drive(batch, 100, seed=0)
     assert batch.episode.sum() > 0
     runs = batch.runs()
     ended = batch.episode > 0

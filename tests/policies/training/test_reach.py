@@ -17,20 +17,10 @@ from app.sim.envs.tasks import ArmTask
 from app.sim.reach.batch import ReachBatch, ReachSettings
 from app.sim.reach.monitored.batch import MonitoredReachBatch
 from app.state_dict import under
+from tests.policies import conftest
 from tests.policies.conftest import Recorder, preset_of
 
-TINY = {
-    "learning.total_steps": 1536,
-    "learning.n_envs": 16,
-    "learning.buffer_size": 2000,
-    "learning.batch_size": 32,
-    "learning.learning_starts": 256,
-    "learning.actor_frozen_updates": 8,
-    "networks.width": 32,
-    "learning.progress_steps": 256,
-    "learning.progress_episodes": 8,
-    "learning.checkpoint_steps": 512,
-}
+TINY = {**conftest.TINY, "learning.progress_episodes": 8}
 
 
 @pytest.fixture(scope="module")

@@ -25,19 +25,7 @@ from app.sim.cells.cell import load_cell
 from tests.policies.conftest import preset_of
 from tests.policies.object_graph import leaves
 
-ARM = {
-    "learning.total_steps": 1024,
-    "learning.n_envs": 8,
-    "learning.buffer_size": 2000,
-    "learning.batch_size": 16,
-    "learning.learning_starts": 128,
-    "learning.actor_frozen_updates": 4,
-    "learning.progress_steps": 64,
-    "learning.checkpoint_steps": 256,
-    "networks.width": 16,
-}
-REACH = {**ARM, "learning.progress_steps": 512, "learning.checkpoint_steps": 512}
-SORTING = {
+SMALL = {
     "learning.total_steps": 1024,
     "learning.n_envs": 8,
     "learning.buffer_size": 2000,
@@ -45,9 +33,11 @@ SORTING = {
     "learning.learning_starts": 128,
     "learning.progress_steps": 512,
     "learning.checkpoint_steps": 512,
-    "learning.progress_episodes": 10,
     "networks.width": 16,
 }
+SORTING = {**SMALL, "learning.progress_episodes": 10}
+REACH = {**SMALL, "learning.actor_frozen_updates": 4}
+ARM = {**REACH, "learning.progress_steps": 64, "learning.checkpoint_steps": 256}
 DDPG = {
     **REACH,
     "learning.progress_episodes": 2,

@@ -17,6 +17,7 @@ from app.sim.pick.kernels.observation_layout import LAYOUT
 from app.sim.robot.kernels import actions
 from app.sim.robot.kernels.joints import JointPath
 from app.sim.scene.scene import arm_of, people_of
+from tests.sim.driven_batches import check_limits, check_rows, random_actions
 
 TEN_SECONDS = PickSettings(time_limit_s=10.0)
 
@@ -26,22 +27,9 @@ def cell() -> Cell:
     return load_cell()
 
 
-def random_actions(n_steps: int, n_envs: int) -> np.ndarray:
-    """Held for a second each, so that the robot gets about."""
-    rng = np.random.default_rng(81)
-    held = rng.uniform(-1, 1, (n_steps // 20 + 1, n_envs, 5))
-    return np.repeat(held, 20, axis=0)[:n_steps].astype(np.float32)
-
-
 def test_rows_do_not_depend_on_how_many_there_are(cell: Cell) -> None:
     few, many = PickBatch(cell, 3, 5, TEN_SECONDS), PickBatch(cell, 9, 5, TEN_SECONDS)
-    np.testing.assert_array_equal(few.reset(), many.reset()[:3])
-    for act in random_actions(500, 9):
-        one, two = few.step(act[:3]), many.step(act)
-        np.testing.assert_array_equal(one.obs, two.obs[:3])
-        np.testing.assert_array_equal(one.rew, two.rew[:3])
-        np.testing.assert_array_equal(one.ended, two.ended[:3])
-    assert few.state.episode.sum() > 3
+    check_rows(few, many, slice(3), 500)
 
 
 def test_same_seed_gives_the_same_bits_and_another_seed_does_not(cell: Cell) -> None:
@@ -52,19 +40,7 @@ def test_same_seed_gives_the_same_bits_and_another_seed_does_not(cell: Cell) -> 
 
 
 def test_limits_hold_through_whole_episodes(cell: Cell) -> None:
-    batch = PickBatch(cell, 64, 5, TEN_SECONDS)
-    batch.reset()
-    mount, qd0 = cell.robot, batch.state.qd.copy()
-    for act in random_actions(400, 64):
-        result = batch.step(np.sign(act).astype(np.float32))
-        q, qd = batch.state.q, batch.state.qd
-        assert (q >= np.array(mount.q_min) - 1e-9).all()
-        assert (q <= np.array(mount.q_max) + 1e-9).all()
-        assert (np.abs(qd) <= np.array(mount.qd_max) + 1e-9).all()
-        going_on = result.ended == 0
-        acc = np.abs(qd - qd0)[going_on] / mount.dt
-        assert (acc <= np.array(mount.qdd_max) + 1e-9).all()
-        qd0 = qd.copy()
+    check_limits(PickBatch(cell, 64, 5, TEN_SECONDS), 400)
 
 
 def test_starts_keep_the_required_clearance_from_the_person(cell: Cell) -> None:
@@ -138,7 +114,7 @@ def test_single_state_functions_do_what_the_batch_does(cell: Cell) -> None:
     batch = PickBatch(cell, 6, 13, TEN_SECONDS)
     batch.reset()
     state, people, observer = batch.state, batch.world.people, CandidateObserver(cell)
-    for act in random_actions(40, 6):
+    for act in random_actions(40, batch):
         q, qd, person = state.q.copy(), state.qd.copy(), state.people.q.copy()
         result = batch.step(act, auto_reset=False)
         for e in np.flatnonzero(state.outcome == 0):

@@ -18,7 +18,7 @@ from app.sim.reach.batch import (
     with_workplace,
 )
 from app.sim.robot.actions import ActionSettings
-from app.sim.robot.kernels.kinematics import ik_vertical_batch
+from tests.sim.driven_batches import check_limits, check_rows, random_actions, straight
 
 SUCCESS, COLLISION, TIMEOUT, UNFEASIBLE = range(1, 5)
 CROWD = ("worker", "walker", "constant", "fixed-speed")
@@ -27,19 +27,6 @@ CROWD = ("worker", "walker", "constant", "fixed-speed")
 @pytest.fixture(scope="module")
 def cell() -> Cell:
     return load_cell("shared-workspace")
-
-
-def random_actions(n_steps: int, n_envs: int) -> np.ndarray:
-    """Held for a fifth of a second each, so that the robot gets about."""
-    rng = np.random.default_rng(81)
-    held = rng.uniform(-1, 1, (n_steps // 10 + 1, n_envs, 6))
-    return np.repeat(held, 10, axis=0)[:n_steps].astype(np.float32)
-
-
-def straight(batch: ReachBatch) -> np.ndarray:
-    """Joint moves toward a posture at the goal."""
-    posture, _ = ik_vertical_batch(batch.arm.lengths, batch.arm.limits, batch.state.goal)
-    return np.clip(3.0 * (posture - batch.state.q), -1, 1).astype(np.float32)
 
 
 def run_to_the_end(batch: ReachBatch) -> np.ndarray:
@@ -55,13 +42,7 @@ def run_to_the_end(batch: ReachBatch) -> np.ndarray:
 def test_rows_do_not_depend_on_how_many_there_are(cell: Cell, people: tuple[str, ...]) -> None:
     settings = ReachSettings(people=people, start="authors")
     few, many = ReachBatch(cell, 3, 5, settings, 4), ReachBatch(cell, 9, 5, settings)
-    np.testing.assert_array_equal(few.reset(), many.reset()[4:7])
-    for act in random_actions(600, 9):
-        one, two = few.step(act[4:7]), many.step(act)
-        np.testing.assert_array_equal(one.obs, two.obs[4:7])
-        np.testing.assert_array_equal(one.rew, two.rew[4:7])
-        np.testing.assert_array_equal(one.ended, two.ended[4:7])
-    assert few.state.episode.sum() > 3
+    check_rows(few, many, slice(4, 7), 600)
 
 
 def test_same_seed_gives_the_same_bits_and_another_seed_does_not(cell: Cell) -> None:
@@ -74,18 +55,7 @@ def test_same_seed_gives_the_same_bits_and_another_seed_does_not(cell: Cell) -> 
 @pytest.mark.parametrize("degree", [2, 3])
 def test_limits_hold_through_whole_episodes(cell: Cell, degree: int) -> None:
     settings = ReachSettings(action=ActionSettings(degree=degree))
-    batch = ReachBatch(cell, 64, 5, settings)
-    batch.reset()
-    mount, qd0 = cell.robot, batch.state.qd.copy()
-    for act in random_actions(300, 64):
-        result = batch.step(np.sign(act).astype(np.float32))
-        q, qd = batch.state.q, batch.state.qd
-        assert (q >= np.array(mount.q_min) - 1e-9).all()
-        assert (q <= np.array(mount.q_max) + 1e-9).all()
-        assert (np.abs(qd) <= np.array(mount.qd_max) + 1e-9).all()
-        acc = np.abs(qd - qd0)[result.ended == 0] / mount.dt
-        assert (acc <= np.array(mount.qdd_max) + 1e-9).all()
-        qd0 = qd.copy()
+    check_limits(ReachBatch(cell, 64, 5, settings), 300)
 
 
 def test_robot_starts_at_home_and_at_rest(cell: Cell) -> None:
@@ -200,7 +170,7 @@ def test_periods_without_contact_are_clear_in_between_too(cell: Cell) -> None:
 def test_thesis_reward_costs_distance_and_acceleration(cell: Cell) -> None:
     batch = ReachBatch(cell, 5, 3, ReachSettings(people=()))
     batch.reset()
-    for act in random_actions(20, 5):
+    for act in random_actions(20, batch):
         qd0 = batch.state.qd.copy()
         rew = batch.step(act, auto_reset=False).rew
         c = (batch.state.qd - qd0) / (2.0 * cell.robot.dt)

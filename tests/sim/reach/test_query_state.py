@@ -20,17 +20,14 @@ from app.sim.perception.observed_people import person_from_cylinder
 from app.sim.reach.batch import ReachBatch, ReachSettings
 from app.sim.reach.query_state import QueryState
 from app.sim.robot.measured_state import Joints
+from tests.sim.driven_batches import drive
 
 CELL = load_cell("shared-workspace")
 
 
 def driven(people: tuple[str, ...], view: str) -> ReachBatch:
-    batch = ReachBatch(CELL, 5, 2, ReachSettings(people=people, observation=view))
-    batch.reset()
-    rng = np.random.default_rng(8)
-    for _ in range(20):
-        batch.step(rng.uniform(-1, 1, (5, 6)).astype(np.float32))
-    return batch
+    settings = ReachSettings(people=people, observation=view)
+    return drive(ReachBatch(CELL, 5, 2, settings), 20, seed=8)
 
 
 def people_of(batch: ReachBatch, e: int) -> list[Person]:

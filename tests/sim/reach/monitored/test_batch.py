@@ -12,11 +12,11 @@ from app.sim.collision.contact import clearance
 from app.sim.people.kernels.pedestrian import AGE, N_PAST, PAST_RADIUS, PAST_SPEED
 from app.sim.reach.batch import ReachBatch, ReachSettings
 from app.sim.reach.monitored.batch import MonitoredReachBatch
-from app.sim.robot.kernels.kinematics import ik_vertical_batch
 from app.sim.safety.layer import SafetyLayer, safety_settings
 from app.sim.scenario.kernels.episode import COLLISION, RUNNING, SUCCESS, TIMEOUT
 from app.sim.scenario.monitoring import MonitoringSettings
 from app.sim.scene.scene import NO_CYLINDERS, people_of
+from tests.sim.driven_batches import straight
 
 pytestmark = pytest.mark.xdist_group("monitored-reaching")
 
@@ -25,11 +25,6 @@ SAFETY = safety_settings(CELL)
 BOX = ReachSettings(goals="box")
 ALONE = replace(BOX, people=())
 STILL = 0.0
-
-
-def straight(batch: ReachBatch) -> np.ndarray:
-    posture, _ = ik_vertical_batch(batch.arm.lengths, batch.arm.limits, batch.state.goal)
-    return np.clip(3.0 * (posture - batch.state.q), -1, 1).astype(np.float32)
 
 
 def to_the_end(batch: ReachBatch, still: bool = False) -> None:
