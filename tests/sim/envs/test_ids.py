@@ -1,4 +1,4 @@
-"""Every id with people passes both checkers, and equals rows of its batch bit for bit."""
+"""Every id passes both checkers; those with people equal rows of their batch bit for bit."""
 
 import gymnasium
 import numpy as np
@@ -6,7 +6,7 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 
 from app.sim.cells.cell import load_cell
-from app.sim.envs import PEOPLE_IDS
+from app.sim.envs import IDS, PEOPLE_IDS
 from app.sim.envs.single_env import SingleEnv
 from app.sim.envs.vector_env import BatchVectorEnv
 from app.sim.people.human_motion_config import HumanMotionConfig
@@ -86,15 +86,25 @@ def test_id_names_who_is_there(env_id: str) -> None:
     assert tuple(person.kind for person in env.batch.cell.people) == PEOPLE[env_id]
 
 
-@pytest.mark.parametrize("env_id", PEOPLE_IDS)
+@pytest.mark.parametrize("env_id", IDS)
 def test_environment_passes_gymnasiums_check(env_id: str) -> None:
     check_env(gymnasium.make(env_id).unwrapped)
 
 
-@pytest.mark.parametrize("env_id", PEOPLE_IDS)
+@pytest.mark.parametrize("env_id", IDS)
 def test_environment_passes_stable_baselines3s_check(env_id: str) -> None:
     checker = pytest.importorskip("stable_baselines3.common.env_checker")
     checker.check_env(gymnasium.make(env_id).unwrapped)
+
+
+@pytest.mark.parametrize("env_id", ["tandem/Pick-v0", "tandem/Reach-v0", "tandem/SortingE0-v0"])
+def test_every_episode_can_be_started_again_by_its_number(env_id: str) -> None:
+    env, other = (gymnasium.make(env_id).unwrapped for _ in range(2))
+    env.reset(seed=3)
+    third = [env.reset()[0] for _ in range(3)][-1]
+    again, info = other.reset(seed=3, options={"episode": 3})
+    np.testing.assert_array_equal(again, third)
+    assert info["episode_number"] == 3
 
 
 @pytest.mark.parametrize("env_id", PEOPLE_IDS)

@@ -1,4 +1,4 @@
-"""The Gymnasium environment keeps both checkers' rules and the scenario's promises."""
+"""The pick environment keeps the promises of the scenario."""
 
 import gymnasium
 import numpy as np
@@ -28,15 +28,6 @@ def test_registered_id_makes_the_environment() -> None:
     env.close()
 
 
-def test_environment_passes_gymnasiums_check() -> None:
-    check_env(gymnasium.make("tandem/Pick-v0").unwrapped)
-
-
-def test_environment_passes_stable_baselines3s_check() -> None:
-    checker = pytest.importorskip("stable_baselines3.common.env_checker")
-    checker.check_env(gymnasium.make("tandem/Pick-v0").unwrapped)
-
-
 def test_episodes_equal_row_zero_of_a_batch_bit_for_bit() -> None:
     env, batch = PickEnv(), PickBatch(load_cell(), 5, 9, WHOLE_PICK)
     expected, (obs, _) = batch.reset(), env.reset(seed=9)
@@ -50,15 +41,6 @@ def test_episodes_equal_row_zero_of_a_batch_bit_for_bit() -> None:
             obs, _ = env.reset()
         expected = result.obs
     assert batch.state.episode[0] >= 1
-
-
-def test_every_episode_can_be_started_again_by_its_number() -> None:
-    env = PickEnv()
-    env.reset(seed=3)
-    third = [env.reset()[0] for _ in range(3)][-1]
-    again, info = PickEnv().reset(seed=3, options={"episode": 3})
-    np.testing.assert_array_equal(again, third)
-    assert info["episode_number"] == 3
 
 
 def test_unseeded_environments_differ() -> None:

@@ -45,15 +45,6 @@ def test_time_out_ends_and_a_further_step_asks_for_a_reset(
         env.step(still)
 
 
-def test_every_episode_can_be_started_again_by_its_number() -> None:
-    env = ReachEnv()
-    env.reset(seed=3)
-    third = [env.reset()[0] for _ in range(3)][-1]
-    again, info = ReachEnv().reset(seed=3, options={"episode": 3})
-    np.testing.assert_array_equal(again, third)
-    assert info["episode_number"] == 3
-
-
 def test_unknown_cell_and_people_are_refused_with_the_known_ones() -> None:
     with pytest.raises(NotFound, match="shared-workspace"):
         ReachEnv("no-such-cell")
