@@ -8,6 +8,7 @@ from app.policies.configs.presets import Preset
 from app.policies.training.memory_files import MemoryFiles
 from app.policies.training.progress import Progress
 from app.policies.training.train import train
+from app.sim.cells.cell import Cell
 
 TINY = {
     "learning.total_steps": 1536,
@@ -39,10 +40,11 @@ class Recorder:
         self.checkpoints = []
         self._stop_at, self._memory = stop_at, memory
 
-    def run(self, preset: Preset, resume=None, seed: int = 3):
+    def run(self, preset: Preset, resume=None, seed: int = 3, cell: Cell | None = None):
         return train(
             preset,
             seed=seed,
+            cell=cell,
             memory=self._memory,
             resume=resume,
             on_progress=self.progress.append,

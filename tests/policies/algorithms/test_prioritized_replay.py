@@ -31,6 +31,14 @@ def add(buffer: PrioritisedReplay, t: int, done: bool = False, cut_off: bool = F
     buffer.add(here, there, np.zeros(N_ENVS), reward, ended, infos)
 
 
+def filled(n: int, **settings: float) -> PrioritisedReplay:
+    """Return a memory of the transitions from 0 to n - 1."""
+    buffer = memory(**settings)
+    for t in range(n):
+        add(buffer, t)
+    return buffer
+
+
 def drawn_from(buffer: PrioritisedReplay, t: int):
     """Return one drawn transition that begins at t, as numbers."""
     sample = buffer.draw(256, 0.4)
@@ -60,18 +68,13 @@ def test_a_return_sums_discounted_rewards(third, expected):
 
 @pytest.mark.parametrize("n_added", [6, 8, 11])
 def test_a_return_does_not_run_over_the_head_of_the_buffer(n_added):
-    buffer = memory(n_steps=3)
-    for t in range(n_added):
-        add(buffer, t)
-    newest = n_added - 1
+    buffer, newest = filled(n_added, n_steps=3), n_added - 1
     assert drawn_from(buffer, newest) == (newest + 1.0, newest + 1, 0.5)
     assert drawn_from(buffer, newest - 1)[1:] == (newest + 1, 0.25)
 
 
 def test_transitions_are_drawn_in_proportion_to_their_priorities():
-    buffer = memory()
-    for t in range(8):
-        add(buffer, t)
+    buffer = filled(8)
     buffer.update(np.arange(16), np.arange(16) / 10.0)
     counts = np.zeros(16)
     for _ in range(400):
@@ -81,9 +84,7 @@ def test_transitions_are_drawn_in_proportion_to_their_priorities():
 
 
 def test_importance_weights_undo_the_chances():
-    buffer = memory()
-    for t in range(8):
-        add(buffer, t)
+    buffer = filled(8)
     errors = np.linspace(0.1, 1.6, 16)
     buffer.update(np.arange(16), errors)
     sample = buffer.draw(64, 1.0)
@@ -94,9 +95,7 @@ def test_importance_weights_undo_the_chances():
 
 
 def test_without_alpha_all_are_drawn_evenly():
-    buffer = memory(alpha=0.0)
-    for t in range(8):
-        add(buffer, t)
+    buffer = filled(8, alpha=0.0)
     buffer.update(np.arange(16), np.arange(16) * 5.0)
     counts = np.bincount(buffer.draw(1600, 0.4).indices, minlength=16)
     assert (np.abs(counts - 100) <= 1).all()

@@ -7,9 +7,8 @@ from app.policies.checkpoints import pretrained
 from app.policies.checkpoints.checkpoint import load
 from app.policies.checkpoints.trained_cell import cell_of, is_for, manifest_fields
 from app.policies.inference.task_selection import TaskChooser
-from app.policies.training.train import train
 from app.sim.cells.cell import load_cell
-from tests.policies.conftest import TINY, preset_of
+from tests.policies.conftest import TINY, Recorder, preset_of
 from tests.support import workshop
 
 
@@ -17,14 +16,7 @@ from tests.support import workshop
 def own_policy():
     """The policy of a tiny training in a cell of the user's own."""
     preset = preset_of("pick-td3", TINY, {"cell": "workshop", "learning.total_steps": 1024})
-    return train(
-        preset,
-        seed=1,
-        on_progress=lambda _: None,
-        on_checkpoint=lambda *_: None,
-        should_stop=lambda: False,
-        cell=workshop.cell(),
-    ).checkpoint
+    return Recorder().run(preset, seed=1, cell=workshop.cell()).checkpoint
 
 
 def test_shipped_cell_goes_by_its_name():
@@ -67,11 +59,4 @@ def test_carried_cell_is_checked_like_any_other():
 
 def test_cell_without_cubes_cannot_be_trained_in(tiny_preset):
     with pytest.raises(InvalidInput, match="cannot be used for picking"):
-        train(
-            tiny_preset,
-            seed=1,
-            on_progress=lambda _: None,
-            on_checkpoint=lambda *_: None,
-            should_stop=lambda: False,
-            cell=load_cell("sorting-e0"),
-        )
+        Recorder().run(tiny_preset, cell=load_cell("sorting-e0"))
