@@ -10,66 +10,27 @@ from app.policies.inference.controllers import (
     inference_modes_of,
 )
 from app.policies.inference.rollout import ssm_constraint_of
-from app.sim.core.arrays import Vec
-from app.sim.reach.batch import GoalRule, ReachBatch, ViewName
+from app.sim.reach.batch import ReachBatch
 from app.sim.reach.reach_actor import ReachActor
-from app.sim.robot.actions import ActionSettings
 from app.sim.safety.layer import SafetySettings
 
 
 class TrainedReachPolicy:
-    """One policy and its controllers by inference mode; for one thread at a time."""
+    """One policy and its controllers by inference mode; for one thread at a time.
+
+    Its other attributes are those of the policy.
+    """
 
     def __init__(self, actor: ReachActor) -> None:
-        self._actor = actor
+        self.checkpoint, self.title = actor.checkpoint, actor.title
+        self.cell, self.cell_sha256 = actor.cell, actor.cell_sha256
+        self.view, self.action = actor.view, actor.action
+        self.goals, self.targets = actor.goals, actor.targets
         self._controllers: dict[str, Controller] = {
             mode: controller_of(actor, mode) for mode in inference_modes_of(actor)
         }
-
-    @property
-    def checkpoint(self) -> str:
-        """SHA-256 of the checkpoint."""
-        return self._actor.checkpoint
-
-    @property
-    def title(self) -> str:
-        """Short description."""
-        return self._actor.title
-
-    @property
-    def cell(self) -> str:
-        """Name of the training cell."""
-        return self._actor.cell
-
-    @property
-    def cell_sha256(self) -> str:
-        """Identity of the training cell's content."""
-        return self._actor.cell_sha256
-
-    @property
-    def view(self) -> ViewName:
-        """Kind of observation."""
-        return self._actor.view
-
-    @property
-    def action(self) -> ActionSettings:
-        """Meaning of the actions."""
-        return self._actor.action
-
-    @property
-    def goals(self) -> GoalRule:
-        """Set of the training goals."""
-        return self._actor.goals
-
-    @property
-    def targets(self) -> Vec | None:
-        """Training targets [m], shape (n, 3); None for a whole box."""
-        return self._actor.targets
-
-    @property
-    def inference_modes(self) -> tuple[str, ...]:
+        self.inference_modes = tuple(self._controllers)
         """Available inference modes."""
-        return tuple(self._controllers)
 
     def acts(
         self, batch: ReachBatch, inference_mode: str, safety: SafetySettings | None

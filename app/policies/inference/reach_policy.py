@@ -91,6 +91,8 @@ class ReachPolicy(TrainedPolicy):
         manifest = checkpoint.manifest
         preset = read_config(ReachPreset, manifest["preset"], "manifest.preset")
         super().__init__(checkpoint)
+        self.trained_range: Mapping[str, Mapping[str, list[float]]] = manifest["trained_range"]
+        """Minimum and maximum of each state variable in training."""
         self.view: ViewName = preset.episode.observation
         """Kind of observation."""
         expect_layout(checkpoint, LAYOUTS[self.view], N_ACT)
@@ -125,14 +127,6 @@ class ReachPolicy(TrainedPolicy):
         self._few = self.kernel_network
         self._actor: CompiledActor | None = None
         self._answers: Callable[..., None] | None = None
-
-    @property
-    def trained_range(self) -> Mapping[str, Mapping[str, list[float]]]:
-        """Minimum and maximum of each state variable in training."""
-        ranges: Mapping[str, Mapping[str, list[float]]] = self._checkpoint.manifest[
-            "trained_range"
-        ]
-        return ranges
 
     @property
     def kernel_network(self) -> Network | None:

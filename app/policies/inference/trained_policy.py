@@ -12,28 +12,14 @@ class TrainedPolicy:
     """
 
     def __init__(self, checkpoint: Checkpoint) -> None:
-        self._checkpoint = checkpoint
-        self._cell = cell_of(checkpoint.manifest)
-        self._cell_sha256 = self._cell.sha256
-
-    @property
-    def checkpoint(self) -> str:
-        """SHA-256 of the checkpoint."""
-        return self._checkpoint.sha256
-
-    @property
-    def title(self) -> str:
-        """Name of the preset and number of training steps."""
-        manifest = self._checkpoint.manifest
+        manifest = checkpoint.manifest
         name = manifest["preset"].get("name", "policy")
-        return f"{name}, {manifest['step'] / 1e6:.2f} M steps"
-
-    @property
-    def cell(self) -> str:
+        self._cell = cell_of(manifest)
+        self.checkpoint: str = checkpoint.sha256
+        """SHA-256 of the checkpoint."""
+        self.title = f"{name}, {manifest['step'] / 1e6:.2f} M steps"
+        """Name of the preset and number of training steps."""
+        self.cell = self._cell.name
         """Name of the work cell of the training."""
-        return self._cell.name
-
-    @property
-    def cell_sha256(self) -> str:
+        self.cell_sha256 = self._cell.sha256
         """Identity of the content of that cell."""
-        return self._cell_sha256
