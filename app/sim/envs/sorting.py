@@ -19,14 +19,13 @@ from app.sim.sorting.kernels.task import FAILURE_SCALE, TIMEOUT
 from app.sim.sorting.state import SortingShape
 
 NAMES = np.array(OUTCOMES, dtype=object)
-RENDER_FPS = 4
-"""Attempts per second of a video."""
 
 
 class SortingTask:
     """Sorting tasks of a cell."""
 
-    render_fps = RENDER_FPS
+    render_fps = 4
+    """Attempts per second of a video."""
 
     def __init__(self, cell: Cell, batch: SortingBatch) -> None:
         self._cell, self.batch = cell, batch

@@ -109,15 +109,13 @@ class ArmTask:
             otherwise it truncates it.
     """
 
+    batch: SteppedBatch
+    """The environments."""
+
     def __init__(self, batch: PickBatch | ReachEnvironments, *, sees_time: bool) -> None:
-        self._stepped, self._sees_time = batch, sees_time
+        self.batch, self._sees_time = batch, sees_time
         self.action_space = _box(1.0, batch.n_act)
         self.observation_space = _box(OBS_BOUND, batch.obs_size)
-
-    @property
-    def batch(self) -> SteppedBatch:
-        """The environments."""
-        return self._stepped
 
     def actions(self, given: Any) -> NDArray[np.float32]:
         """Return actions as the batch takes them, shape (n_envs, n_act).
@@ -126,7 +124,7 @@ class ArmTask:
         the batch: reshaped, it would give joints the actions of others.
         """
         act = np.asarray(given, dtype=np.float32)
-        return act[None] if act.ndim == 1 and self._stepped.n_envs == 1 else act
+        return act[None] if act.ndim == 1 and self.batch.n_envs == 1 else act
 
     def cut(self, ended: Rows) -> Mask:
         """Return whether outcomes truncate an episode, shape (n_envs,)."""
@@ -137,14 +135,10 @@ class ArmTask:
 class RobotTask(ArmTask):
     """A batch of robots, people and targets."""
 
+    batch: PickBatch | ReachBatch
+
     def __init__(self, batch: PickBatch | ReachBatch) -> None:
         super().__init__(batch, sees_time=batch.settings.observation != "state")
-        self._cells = batch
-
-    @property
-    def batch(self) -> PickBatch | ReachBatch:
-        """The environments."""
-        return self._cells
 
     def infos(self) -> Infos:
         """Return ``info``, an entry per environment."""
