@@ -74,8 +74,6 @@ class MotionLibrary:
     """Right and left palms of the keyframes [m], shape (n, 2, 3)."""
     of_station: Index
     """First keyframe and count of each body, place and hand, (n_bodies, n_places + 1, 2, 2)."""
-    n_stations: int
-    """Number of stations, cubes first; home is the place after them."""
     n_cubes: int
     """Number of cubes."""
     bodies: Vec
@@ -134,7 +132,6 @@ def motion_library(
         postures=postures,
         hands=hands,
         of_station=of_station,
-        n_stations=len(cell.pick_stations),
         n_cubes=len(cell.stations_of("cube")),
         bodies=vectors,
         samples=samples,

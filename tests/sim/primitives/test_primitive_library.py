@@ -100,10 +100,12 @@ def test_gain_leaves_the_sample_free_where_it_already_meets_the_nodes(
         np.testing.assert_allclose(rows.reshape(36, -1) @ gain, np.eye(36), atol=1e-6)
 
 
-def test_segments_join_home_cubes_and_docks_with_both_hands(library: MotionLibrary) -> None:
+def test_segments_join_home_cubes_and_docks_with_both_hands(
+    cell: Cell, library: MotionLibrary
+) -> None:
     there = library.segments[..., 0] >= 0
-    home, cubes = library.n_stations, range(library.n_cubes)
-    docks = range(library.n_cubes, library.n_stations)
+    home, cubes = len(cell.pick_stations), range(library.n_cubes)
+    docks = range(library.n_cubes, home)
     expected = np.zeros_like(there)
     for a, b in [(home, c) for c in cubes] + [(home, d) for d in docks]:
         expected[a, b] = expected[b, a] = True
