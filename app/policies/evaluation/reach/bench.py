@@ -61,11 +61,6 @@ Measure = Callable[[Variant, ReachEpisodes], Json]
 """Further measures of a row."""
 
 
-def no_measures(_variant: Variant, _episodes: ReachEpisodes) -> Json:
-    """Return no further measures."""
-    return {}
-
-
 def suffix_of(mode: InferenceMode) -> str:
     """Return the suffix of row names: empty without rollout."""
     return ROLLOUT if mode.rollout else ""
@@ -147,7 +142,9 @@ class ReachBench:
         goals = self.target_goals(per_target * len(self.targets))
         return self.run(self.variant("clearance", goals, mode))
 
-    def measure(self, variants: Sequence[Variant], more: Measure = no_measures) -> None:
+    def measure(
+        self, variants: Sequence[Variant], more: Measure = lambda _variant, _episodes: {}
+    ) -> None:
         """Run variants and add the row of each."""
         for variant in variants:
             episodes = self.run(variant)
