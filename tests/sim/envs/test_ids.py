@@ -1,12 +1,17 @@
 """Every id passes both checkers; those with people equal rows of their batch bit for bit."""
 
+from dataclasses import replace
+
 import gymnasium
 import numpy as np
 import pytest
+from gymnasium.error import ResetNeeded
 from gymnasium.utils.env_checker import check_env
 
 from app.sim.cells.cell import load_cell
 from app.sim.envs import IDS, PEOPLE_IDS
+from app.sim.envs.pick import PickEnv
+from app.sim.envs.reach import ReachEnv
 from app.sim.envs.single_env import SingleEnv
 from app.sim.envs.vector_env import BatchVectorEnv
 from app.sim.people.human_motion_config import HumanMotionConfig
@@ -105,6 +110,48 @@ def test_every_episode_can_be_started_again_by_its_number(env_id: str) -> None:
     again, info = other.reset(seed=3, options={"episode": 3})
     np.testing.assert_array_equal(again, third)
     assert info["episode_number"] == 3
+
+
+@pytest.mark.parametrize(
+    ("env_id", "kind"), [("tandem/Pick-v0", PickEnv), ("tandem/Reach-v0", ReachEnv)]
+)
+def test_registered_id_makes_the_environment_of_its_settings(
+    env_id: str, kind: type[SingleEnv]
+) -> None:
+    env = gymnasium.make(env_id, settings=short(env_id, "features"))
+    _, info = env.reset(seed=4)
+    assert type(env.unwrapped) is kind
+    assert info["time_left_s"] == 1.0
+    env.close()
+
+
+@pytest.mark.parametrize(
+    ("env_id", "observation", "late"),
+    [
+        ("tandem/Pick-v0", "features", False),
+        ("tandem/Pick-v0", "body", False),
+        ("tandem/Pick-v0", "state", True),
+        ("tandem/Reach-v0", "features", False),
+        ("tandem/Reach-v0", "state", True),
+    ],
+)
+def test_time_out_truncates_only_where_the_time_left_is_not_observed(
+    env_id: str, observation: str, late: bool
+) -> None:
+    limit_s = 0.1 if "Pick" in env_id else 0.04
+    settings = replace(short(env_id, observation), time_limit_s=limit_s)
+    env = gymnasium.make(env_id, settings=settings, people=()).unwrapped
+    many = gymnasium.make_vec(env_id, 4, settings=settings, people=())
+    env.reset(seed=1), many.reset(seed=1)
+    still = np.zeros(many.action_space.shape, dtype=np.float32)
+    for over in (False, True):
+        *_, terminated, truncated, info = env.step(still[0])
+        assert (terminated, truncated) == (over and not late, over and late)
+        _, _, ends, cuts, _ = many.step(still)
+        assert (ends == terminated).all() and (cuts == truncated).all()
+    assert info["outcome"] == "timeout"
+    with pytest.raises(ResetNeeded, match="reset"):
+        env.step(still[0])
 
 
 @pytest.mark.parametrize("env_id", PEOPLE_IDS)

@@ -1,15 +1,12 @@
 """The pick environment keeps the promises of the scenario."""
 
-import gymnasium
 import numpy as np
 import pytest
-from gymnasium.error import ResetNeeded
 from gymnasium.utils.env_checker import check_env
 
-import app.sim.envs  # noqa: F401  (registers the ids)
 from app.errors import NotFound, SimulationError
 from app.sim.cells.cell import load_cell
-from app.sim.envs.pick import PickEnv, PickVectorEnv
+from app.sim.envs.pick import PickEnv
 from app.sim.human.anthropometry import MEDIAN, percentile_body
 from app.sim.people.human_motion_config import HumanMotionConfig
 from app.sim.pick.batch import WHOLE_PICK, PickBatch, PickSettings
@@ -18,14 +15,6 @@ from app.sim.pick.kernels.observation_layout import N_FEATURES, N_WITH_BODY
 
 def actions(n: int) -> np.ndarray:
     return np.random.default_rng(71).uniform(-1, 1, (n, 5)).astype(np.float32)
-
-
-def test_registered_id_makes_the_environment() -> None:
-    env = gymnasium.make("tandem/Pick-v0", settings=PickSettings(time_limit_s=10.0))
-    _, info = env.reset(seed=4)
-    assert isinstance(env.unwrapped, PickEnv)
-    assert info["time_left_s"] == 10.0
-    env.close()
 
 
 def test_episodes_equal_row_zero_of_a_batch_bit_for_bit() -> None:
@@ -45,17 +34,6 @@ def test_episodes_equal_row_zero_of_a_batch_bit_for_bit() -> None:
 
 def test_unseeded_environments_differ() -> None:
     assert not np.array_equal(PickEnv().reset()[0], PickEnv().reset()[0])
-
-
-def test_time_out_terminates_and_a_further_step_asks_for_a_reset() -> None:
-    env = PickEnv(settings=PickSettings(time_limit_s=0.1))
-    env.reset(seed=1)
-    still = np.zeros(5, dtype=np.float32)
-    ends = [env.step(still)[2:] for _ in range(2)]
-    assert [(end[0], end[1]) for end in ends] == [(False, False), (True, False)]
-    assert ends[-1][2]["outcome"] == "timeout"
-    with pytest.raises(ResetNeeded, match="reset"):
-        env.step(still)
 
 
 def test_nan_action_is_refused() -> None:
@@ -91,19 +69,3 @@ def test_observation_ends_with_the_size_of_the_person(size) -> None:
         np.testing.assert_array_equal(obs[N_FEATURES:], size.vector(floor_z).astype(np.float32))
         np.testing.assert_array_equal(obs[:N_FEATURES], known)
         obs, known = env.step(act)[0], plain.step(act)[0]
-
-
-@pytest.mark.parametrize(
-    ("observation", "late"), [("features", False), ("body", False), ("state", True)]
-)
-def test_time_out_truncates_only_where_the_time_left_is_not_observed(
-    observation: str, late: bool
-) -> None:
-    settings = PickSettings(time_limit_s=0.05, observation=observation)
-    one, many = (kind(settings=settings, people=()) for kind in (PickEnv, PickVectorEnv))
-    one.reset(seed=1)
-    many.reset(seed=1)
-    still = np.zeros(5, dtype=np.float32)
-    assert one.step(still)[2:4] == (not late, late)
-    terminated, truncated = many.step(still[None])[2:4]
-    assert (terminated[0], truncated[0]) == (not late, late)

@@ -50,17 +50,6 @@ def test_rows_that_did_not_end_have_no_final_observation() -> None:
     assert [name is not None for name in infos["final_info"]["outcome"]] == list(ended)
 
 
-@pytest.mark.parametrize(("observation", "late"), [("features", False), ("state", True)])
-def test_time_out_truncates_only_where_the_time_left_is_not_observed(
-    observation: str, late: bool
-) -> None:
-    settings = ReachSettings(time_limit_s=0.02, observation=observation)
-    env = ReachVectorEnv(4, settings=settings, people=())
-    env.reset(seed=3)
-    _, _, terminated, truncated, _ = env.step(STILL)
-    assert (terminated != late).all() and (truncated == late).all()
-
-
 def test_gymnasiums_own_wrappers_work() -> None:
     env = DictInfoToList(
         RecordEpisodeStatistics(
