@@ -6,7 +6,8 @@ from typing import Any
 from tools.docs.headline import percent, share
 
 Json = dict[str, Any]
-CASES, CALIBRATION, MONITORED = "pick-cases", "risk-calibration", "pick-ssm"
+CASES, VARIANTS = "pick-cases", "pick-case-variants"
+CALIBRATION, MONITORED = "risk-calibration", "pick-ssm"
 
 
 def has_own_table(result: Json) -> bool:
@@ -36,6 +37,31 @@ def _cases(rows: list[Json]) -> list[list[str]]:
                 share(beside["nearest"]),
                 ", ".join(alone),
             ]
+        )
+    return lines
+
+
+def _variants(rows: list[Json]) -> list[list[str]]:
+    rates = {
+        "as_expected": "as expected",
+        "first": "first choice",
+        "switches": "switches",
+        "end": "end",
+        "success": "success",
+        "expected_goal_alone": "success, expected goal alone",
+        "as_expected_where_possible": "as expected where that succeeds",
+    }
+    beside = {
+        "other_goal_alone": "success, other goal alone",
+        "nearest": "success, nearest",
+        "nearest_as_expected": "as expected, nearest",
+    }
+    lines = [["", "variants", "runs", *rates.values(), *beside.values()]]
+    for row in rows:
+        known = (percent(row[key]) if row[key] else "" for key in rates)
+        others = (share(row[key]) for key in beside)
+        lines.append(
+            [f"`{row['name']}`", str(row["variants"]), f"{row['runs']:,}", *known, *others]
         )
     return lines
 
@@ -101,6 +127,7 @@ def _mean(value: Json | None) -> str:
 
 TABLES: Mapping[str, Callable[[list[Json]], list[list[str]]]] = {
     CASES: _cases,
+    VARIANTS: _variants,
     CALIBRATION: _calibration,
     MONITORED: _monitored,
 }

@@ -17,6 +17,7 @@ from app.policies.evaluation.pick import calibration, people, tracker, worst_peo
 from app.policies.evaluation.pick import cases as pick_cases
 from app.policies.evaluation.pick import ssm as pick_ssm
 from app.policies.evaluation.pick import tasks as pick
+from app.policies.evaluation.pick.case_variants import run_case_variants
 from app.policies.evaluation.reach.oracle import run_oracle
 from app.policies.evaluation.reach.people import run_constant, run_people, run_speeds
 from app.policies.evaluation.reach.random_goals import run_random
@@ -39,6 +40,7 @@ PROTOCOLS: Mapping[str, Protocol] = MappingProxyType(
         "pick-choice": pick.run_choice,
         "pick-choice-hard": pick.run_choice_hard,
         "pick-cases": pick_cases.run_cases,
+        "pick-case-variants": run_case_variants,
         "pick-rest": people.run_rest,
         "risk-calibration": calibration.run_calibration,
         "pick-tracker": tracker.run_tracker,
@@ -81,9 +83,10 @@ MAX_SORTING_EPISODES = 10_000
 FEWER_EPISODES: Mapping[str, int] = MappingProxyType(
     {**dict.fromkeys(OF_SORTING, MAX_SORTING_EPISODES), "reach-targets": 2_000}
     | {"reach-smoothness": 5_000, "reach-ssm": 20_000, "reach-oracle": 200}
-    | {"sorting-people": 2_000, "sorting-cycle-time": 2_000}
+    | {"sorting-people": 2_000, "sorting-cycle-time": 2_000, "pick-case-variants": 1_000}
 )
-"""Maximum number of episodes where they count per pair or target, or paths are stored."""
+"""Maximum number of episodes where they count per pair, target or variant, or where paths are
+stored."""
 
 
 def evaluate(
@@ -142,7 +145,7 @@ def default_checkpoint(name: str) -> str:
 
 
 def most_episodes(name: str) -> int:
-    """Return the maximum number of episodes of a protocol; of each pair, test or target."""
+    """Return the maximum number of episodes of a protocol, or of each pair, test or target."""
     return FEWER_EPISODES.get(name, MAX_EPISODES)
 
 

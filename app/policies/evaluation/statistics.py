@@ -54,6 +54,25 @@ def mean_of(values: ArrayLike) -> dict[str, float] | None:
     return {"mean": mean, "low": float(low), "high": float(high)}
 
 
+def clustered(shares: ArrayLike) -> dict[str, float] | None:
+    """Return the mean of clusters' shares and its 95 % interval; None without clusters.
+
+    The interval is Student's t over the clusters, cut at 0 and 1, so that dependent episodes of
+    a cluster do not narrow it. It has no width where all clusters have the same share.
+
+    Args:
+        shares: Share of episodes counted in each cluster, shape (n,).
+    """
+    x = np.asarray(shares, dtype=np.float64)
+    if len(x) == 0:
+        return None
+    mean, half = float(x.mean()), 0.0
+    if len(x) > 1:
+        error = float(x.std(ddof=1)) / len(x) ** 0.5
+        half = float(scipy.stats.t.ppf(0.975, len(x) - 1)) * error
+    return {"mean": mean, "low": max(0.0, mean - half), "high": min(1.0, mean + half)}
+
+
 def mcnemar(first: ArrayLike, second: ArrayLike) -> dict[str, float]:
     """Compare two success rates on the same episodes by McNemar's exact test.
 

@@ -127,6 +127,11 @@ class ReachScript:
     def __init__(self, start: Vec, duration: Vec, postures: Vec) -> None:
         self._start, self._duration, self._postures = start, duration, postures
 
+    @property
+    def end_s(self) -> float:
+        """End of the last move [s]."""
+        return float(self._start[-1] + self._duration[-1])
+
     def at(self, t: float) -> tuple[Vec, Vec]:
         """Return joint positions [m, rad] and speeds [m/s, rad/s] at ``t`` [s], (18,) each."""
         q, qd = np.empty(18), np.empty(18)

@@ -3,6 +3,10 @@
 batch         The pick scenario of thesis chapter 5: one robot, one person, cubes and docks
 candidate_observer
               Observations of one state for each of several candidates
+case_geometry
+              Which goal of a case study is nearer, and when the person blocks which
+case_variants
+              Variants of the four case studies, enumerated without a policy
 case_verdict  Whether what happened in a case study is what it is for: expected, observed,
               verdict
 cases         The four case studies of task selection (docs/method.md 3.6, thesis table 5.3)

@@ -10,6 +10,7 @@ import numpy as np
 
 from app.errors import NotFound
 from app.sim.cells.cell import Cell
+from app.sim.core.arrays import Vec
 from app.sim.human.model import Hand
 from app.sim.people.reach_script import ReachScript, reach_script
 
@@ -136,8 +137,13 @@ def cases_of(cell: Cell) -> tuple[Case, ...]:
     return CASES if cell.name == CASES_CELL else ()
 
 
+def palms_of(cell: Cell, case: Case) -> Vec:
+    """Return the palm of the working hand at the start and at the end [m], shape (2, 3)."""
+    places = [case.human_from, case.human_to or case.human_from]
+    return np.array([np.add(cell.station(one).position, case.palm_offset) for one in places])
+
+
 def script_of(cell: Cell, case: Case) -> ReachScript:
     """Return the person's movement in a case study."""
-    places = [case.human_from, case.human_to or case.human_from]
-    palms = [np.add(cell.station(place).position, case.palm_offset) for place in places]
-    return reach_script(cell, case.hand, (palms[0], palms[1]), case.pelvis_x, case.delay_s)
+    first, last = palms_of(cell, case)
+    return reach_script(cell, case.hand, (first, last), case.pelvis_x, case.delay_s)

@@ -1,8 +1,8 @@
-"""Wilson intervals and McNemar's test against published values."""
+"""Wilson and clustered intervals, and McNemar's test, against published values."""
 
 import pytest
 
-from app.policies.evaluation.statistics import mcnemar, wilson
+from app.policies.evaluation.statistics import clustered, mcnemar, wilson
 
 
 def test_the_interval_matches_a_published_example():
@@ -31,3 +31,12 @@ def test_mcnemar_counts_the_pairs_that_differ():
     assert (found["only_first"], found["only_second"]) == (9, 1)
     assert found["p"] == pytest.approx(22 / 1024)
     assert mcnemar(first, first) == {"only_first": 0, "only_second": 0, "p": 1.0}
+
+
+def test_the_interval_over_clusters_is_that_of_students_t():
+    """t(0.975, 4) = 2.776; the standard error of these five shares is sqrt(0.025 / 5)."""
+    found = clustered([0.3, 0.4, 0.5, 0.6, 0.7])
+    assert found["mean"] == pytest.approx(0.5)
+    assert found["high"] - 0.5 == pytest.approx(2.776 * (0.025 / 5) ** 0.5, abs=1e-4)
+    assert clustered([0.0, 1.0]) == {"mean": 0.5, "low": 0.0, "high": 1.0}
+    assert clustered([]) is None

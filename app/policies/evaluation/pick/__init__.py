@@ -1,6 +1,7 @@
 """Evaluation of the pick scenario.
 
 calibration      Protocol ``risk-calibration``: predicted probabilities against rates
+case_variants    Protocol ``pick-case-variants``: variants that no policy selected
 cases            Protocol ``pick-cases``: the four case studies
 episodes         Run pick episodes to their ends under a selection rule
 people           Protocols ``pick-people``, ``pick-mocap``, ``pick-yielding``,

@@ -4,7 +4,7 @@ Each episode is one environment of a batch and stops when it ends. Episode ``k``
 the same start under every rule, so that rules are compared on the same episodes.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -120,6 +120,15 @@ class Episodes:
         """Whether each episode succeeded, shape (n,)."""
         success: NDArray[np.bool_] = self.outcome == kernel.SUCCESS
         return success
+
+    def part(self, rows: Sequence[int]) -> "Episodes":
+        """Return some of the episodes, without trajectories."""
+        return Episodes(
+            outcome=self.outcome[rows],
+            duration_s=self.duration_s[rows],
+            switches=self.switches[rows],
+            trajectories=(),
+        )
 
     def row(self, name: str) -> dict[str, object]:
         """Return the result row of these episodes, rates with 95 % intervals."""

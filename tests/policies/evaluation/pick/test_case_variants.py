@@ -1,0 +1,38 @@
+"""Protocol ``pick-case-variants``: rows are means over variants."""
+
+import numpy as np
+import pytest
+
+from app.policies.checkpoints import pretrained
+from app.policies.evaluation.pick.case_variants import row_of, shares_of
+from app.policies.evaluation.pick.cases import CaseBench
+from app.sim.pick.case_variants import variants_of
+from app.sim.pick.cases import find_case
+
+
+def test_rows_are_means_over_variants_and_no_clause_is_below_the_verdict():
+    bench, case = CaseBench(pretrained.load("pick"), 5), find_case("case-3")
+    some = variants_of(bench.cell, case)[::60]
+    found, _ = bench.run([(one, np.random.default_rng(k)) for k, one in enumerate(some)], 4)
+    shares = [shares_of(one) for one in found]
+    row = row_of("some", 4, shares)
+    assert (row["n"], row["variants"], row["runs"]) == (4, len(some), 4 * len(some))
+    assert row["as_expected"]["mean"] == pytest.approx(
+        np.mean([one["as_expected"] for one in shares])
+    )
+    for one in shares:
+        clauses = ("first", "switches", "end", "success")
+        assert one["as_expected"] <= min(one[name] for name in clauses)
+        assert one["success"] + one["collision"] + one["timeout"] == pytest.approx(1.0)
+        assert (one["as_expected_where_possible"] is None) == (one["expected_goal_alone"] == 0)
+
+
+def test_cases_run_together_are_the_same_layouts_as_alone():
+    """The robot that takes the goal under a resting hand fails, in each place of the batch."""
+    bench = CaseBench(pretrained.load("pick"), 5)
+    order = ("case-2", "case-1", "case-2")
+    found, _ = bench.run([(find_case(name), np.random.default_rng(7)) for name in order], 5)
+    assert [one.case.id for one in found] == list(order)
+    for one in (found[0], found[2]):
+        assert not one.alone["cube2"].any() and one.alone["cube0"].all()
+    assert found[1].alone["cube0"].all() and found[1].alone["cube4"].all()
