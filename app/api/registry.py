@@ -10,6 +10,8 @@ from collections import OrderedDict
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any, Generic, Protocol, TypeVar
 
+from starlette.concurrency import run_in_threadpool
+
 from app.errors import Damaged, InvalidInput, NotFound
 from app.store.checkpoints import list_aliases, put_checkpoint, remove_alias, set_alias
 from app.store.engine import Store
@@ -138,7 +140,7 @@ class PolicyRegistry(Generic[P]):
         self._lock = threading.Lock()
         self._policies: OrderedDict[str, P] = OrderedDict()
 
-    def loaded(self, reference: str | None) -> P | None:
+    def _loaded(self, reference: str | None) -> P | None:
         """Return a policy by SHA-256 or alias if it is in memory, without disk access."""
         sha256 = self._names.aliases.get(reference or self._default, reference)
         with self._lock:
@@ -173,7 +175,7 @@ class PolicyRegistry(Generic[P]):
             CheckpointMismatch: It is a policy of another kind.
             Damaged: It is damaged, and not shipped.
         """
-        policy = self.loaded(reference)
+        policy = self._loaded(reference)
         if policy is not None:
             return policy
         record, tensors = self._names.read(reference or self._default)
@@ -183,3 +185,15 @@ class PolicyRegistry(Generic[P]):
             while len(self._policies) > MAX_POLICIES:
                 self._policies.popitem(last=False)
         return policy
+
+    async def get(self, reference: str | None) -> P:
+        """Return a policy as :meth:`load` does; one that is not in memory is read on a thread.
+
+        Args:
+            reference: SHA-256 or alias; the default policy if None.
+
+        Raises:
+            ServiceError: As for :meth:`load`.
+        """
+        policy = self._loaded(reference)
+        return await run_in_threadpool(self.load, reference) if policy is None else policy

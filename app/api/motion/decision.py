@@ -27,7 +27,7 @@ async def answer(request: MotionRequest, services: Services) -> Data:
     """
     services.readiness.require()
     cell = await services.known_cell(request.cell)
-    decider = await _decider(request.checkpoint, services)
+    decider = await services.reach_policies.get(request.checkpoint)
     require_cell(cell, decider.actor.cell, decider.actor.cell_sha256)
 
     def decided() -> Data:
@@ -37,19 +37,6 @@ async def answer(request: MotionRequest, services: Services) -> Data:
     # A decision takes less time than a change of thread usually does, on the event loop.
     found = await run_in_threadpool(decided) if take_time(request.people) else decided()
     services.metrics.count_outside(PATH, found["outside"], found["state_outside"])
-    return found
-
-
-async def _decider(name: str | None, services: Services) -> MotionDecider:
-    """Return a reach policy by name, by default the shipped one.
-
-    Raises:
-        InvalidInput: No checkpoint has that name.
-        CheckpointMismatch: It is no reach policy.
-    """
-    found = services.reach_policies.loaded(name)
-    if found is None:
-        found = await run_in_threadpool(services.reach_policies.load, name)
     return found
 
 

@@ -33,9 +33,7 @@ async def plan_move(request: PlanRequest, services: ServicesDep) -> PlanAnswer:
     services.readiness.require()
     cell = await services.known_cell(request.cell)
     names, fail = names_of(cell), fail_of(cell)
-    policy = services.task_policies.loaded(request.checkpoint)
-    if policy is None:
-        policy = await run_in_threadpool(services.task_policies.load, request.checkpoint)
+    policy = await services.task_policies.get(request.checkpoint)
     require_task_policy(policy, cell, services)
 
     def answer() -> PlanAnswer:

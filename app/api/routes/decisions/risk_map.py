@@ -31,9 +31,7 @@ async def map_risk(request: RiskMapRequest, services: ServicesDep) -> RiskMapAns
     services.readiness.require()
     cell = await services.known_cell(request.cell)
     q, qd, candidates = request.to_domain()
-    policy = services.task_policies.loaded(request.checkpoint)
-    if policy is None:
-        policy = await run_in_threadpool(services.task_policies.load, request.checkpoint)
+    policy = await services.task_policies.get(request.checkpoint)
     require_task_policy(policy, cell, services)
 
     def answer() -> RiskMapAnswer:

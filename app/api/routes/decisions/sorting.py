@@ -76,7 +76,4 @@ async def _policy_of(request: SortingRequest, services: Services) -> SortingValu
         name = request.cell if request.cell in services.checkpoints.aliases else None
     if name is None or request.decider == "planner":
         return None
-    policy = services.sorting_policies.loaded(name)
-    if policy is None:
-        policy = await run_in_threadpool(services.sorting_policies.load, name)
-    return policy
+    return await services.sorting_policies.get(name)

@@ -33,9 +33,7 @@ async def select_task(request: TaskSelectionRequest, services: ServicesDep) -> D
     services.readiness.require()
     cell = await services.known_cell(request.cell)
     q, qd, candidates = request.to_domain()
-    policy = services.task_policies.loaded(request.checkpoint)
-    if policy is None:
-        policy = await run_in_threadpool(services.task_policies.load, request.checkpoint)
+    policy = await services.task_policies.get(request.checkpoint)
     require_task_policy(policy, cell, services)
     decide = partial(
         policy.decide,
