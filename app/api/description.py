@@ -7,9 +7,11 @@ that layers and server give to any request are added here, all as ``application/
 import http
 from typing import Any
 
-from fastapi import FastAPI
+from fastapi import FastAPI, Response
 from fastapi.routing import APIRoute
+from pydantic import BaseModel
 
+from app.api.bodies import FILE_TYPES
 from app.api.problems import MEDIA_TYPE, Problem
 from app.api.security import COOKIE
 
@@ -43,10 +45,39 @@ CREATED: dict[str, Any] = {
     }
 }
 """An answer with the path of its resource."""
+FILE_BODY: dict[str, Any] = {
+    "requestBody": {
+        "required": True,
+        "content": {
+            kind: {"schema": {"type": "string", "format": "binary"}} for kind in FILE_TYPES
+        },
+    }
+}
+"""A body that is a file itself."""
 MISMATCH: dict[int | str, dict[str, Any]] = {
     409: {"description": "The checkpoint is of another kind, or does not fit the cell"}
 }
 """The problem of a request that names a checkpoint or uses the cell's."""
+
+
+def stored_responses(model: type[BaseModel], same: str) -> dict[int | str, dict[str, Any]]:
+    """Return the answers to a request that stores a resource.
+
+    Args:
+        model: The resource.
+        same: What is stored already with status 200, as text.
+    """
+    return {
+        200: {"model": model, "description": f"{same} is stored already", **CREATED},
+        201: CREATED,
+        507: {},
+    }
+
+
+def set_stored(response: Response, location: str, *, new: bool) -> None:
+    """Set status and ``Location`` of an answer of :func:`stored_responses`."""
+    response.status_code = 201 if new else 200
+    response.headers["Location"] = location
 
 
 def operation_id(route: APIRoute) -> str:

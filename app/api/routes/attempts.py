@@ -11,7 +11,7 @@ from fastapi.encoders import jsonable_encoder
 from starlette.concurrency import run_in_threadpool
 from starlette.responses import Response
 
-from app.api.bodies import FILE_TYPES
+from app.api.description import FILE_BODY
 from app.api.schemas.jobs import (
     AttemptEnd,
     AttemptHeartbeat,
@@ -42,16 +42,6 @@ CONTENT: dict[int | str, dict[str, Any]] = {
     **HELD,
     200: {"content": {FILE: {}}, "description": "the file"},
 }
-BODY: dict[str, Any] = {
-    "requestBody": {
-        "required": True,
-        "content": {
-            kind: {"schema": {"type": "string", "format": "binary"}} for kind in FILE_TYPES
-        },
-    }
-}
-"""The body is the file itself."""
-
 router = APIRouter(prefix="/v1/jobs/{job_id}/attempts/{attempt}", tags=["attempts"])
 FILES = {
     f"{router.prefix}/checkpoints": MAX_UPLOAD,
@@ -155,7 +145,7 @@ def get_attempt_state(
     "/checkpoints",
     status_code=204,
     summary="Store a policy and a state",
-    openapi_extra=BODY,
+    openapi_extra=FILE_BODY,
     responses={
         **WRITTEN,
         409: {"description": "The attempt no longer holds the job, or the format is another"},
@@ -186,7 +176,7 @@ async def record_checkpoint(
     "/files/{sha256}",
     status_code=204,
     summary="Store a file of a replay memory",
-    openapi_extra=BODY,
+    openapi_extra=FILE_BODY,
     responses=WRITTEN,
 )
 async def put_attempt_file(

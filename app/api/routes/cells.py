@@ -5,7 +5,7 @@ from typing import Any
 from fastapi import APIRouter, Request, Response
 from starlette.concurrency import run_in_threadpool
 
-from app.api.description import CREATED
+from app.api.description import set_stored, stored_responses
 from app.api.schemas.cells import CellList, CellPublic, cell_schema
 from app.api.services import Services, ServicesDep
 from app.errors import Conflict
@@ -47,10 +47,8 @@ def get_cell(name: str, services: ServicesDep) -> CellPublic:
     summary="Add a work cell of your own",
     openapi_extra=BODY,
     responses={
-        200: {"model": CellPublic, "description": "The same cell is stored already", **CREATED},
-        201: CREATED,
+        **stored_responses(CellPublic, "The same cell"),
         409: {"description": "Another cell has the name, or too many are stored"},
-        507: {},
     },
 )
 async def create_cell(
@@ -59,9 +57,8 @@ async def create_cell(
     """Check a cell and store it; the same cell again answers 200; `errors` has all faults."""
     content = await request.body()
     cell = await run_in_threadpool(read_cell, content)
-    if not await run_in_threadpool(services.cells.add, cell):
-        response.status_code = 200
-    response.headers["Location"] = f"/v1/cells/{cell.name}"
+    new = await run_in_threadpool(services.cells.add, cell)
+    set_stored(response, f"{router.prefix}/{cell.name}", new=new)
     return CellPublic.from_domain(cell)
 
 

@@ -6,8 +6,7 @@ from fastapi import APIRouter, Query, Request
 from starlette.concurrency import run_in_threadpool
 from starlette.responses import Response
 
-from app.api.bodies import FILE_TYPES
-from app.api.description import CREATED
+from app.api.description import FILE_BODY, set_stored, stored_responses
 from app.api.registry import PolicyRegistry
 from app.api.schemas.checkpoints import CheckpointList, CheckpointPublic, Recalibration
 from app.api.services import Services, ServicesDep
@@ -31,13 +30,11 @@ FILES = {router.prefix: MAX_FILE}
 """Route that takes a file, and the largest one [bytes]."""
 BODY: dict[str, Any] = {
     "requestBody": {
-        "required": True,
+        **FILE_BODY["requestBody"],
         "description": "the manifest in one line of JSON, followed by the safetensors file",
-        "content": {
-            kind: {"schema": {"type": "string", "format": "binary"}} for kind in FILE_TYPES
-        },
     }
 }
+STORED = stored_responses(CheckpointPublic, "The same checkpoint")
 
 
 @router.get("", summary="List the checkpoints")
@@ -60,14 +57,8 @@ def list_checkpoints(
     summary="Upload a checkpoint",
     openapi_extra=BODY,
     responses={
-        200: {
-            "model": CheckpointPublic,
-            "description": "The same checkpoint is stored already",
-            **CREATED,
-        },
-        201: CREATED,
+        **STORED,
         409: {"description": "Its format, layout or tensors are not of this version"},
-        507: {},
     },
 )
 async def upload_checkpoint(
@@ -81,18 +72,14 @@ async def upload_checkpoint(
     """Check a policy completely and store it; the same one again answers 200."""
     services.readiness.require()
     with services.upload():
-        found = await run_in_threadpool(_store, await request.body(), sha256, services)
-    checkpoint, new = found
-    if not new:
-        response.status_code = 200
-    response.headers["Location"] = f"{router.prefix}/{checkpoint.sha256}"
-    return checkpoint
+        content = await request.body()
+        return await run_in_threadpool(_store, content, sha256, services, response)
 
 
 def _store(
-    content: bytes, sha256: str | None, services: Services
-) -> tuple[CheckpointPublic, bool]:
-    """Check an upload and store it; return whether it is new."""
+    content: bytes, sha256: str | None, services: Services, response: Response
+) -> CheckpointPublic:
+    """Check an upload and store it."""
     found = read_upload(content)
     if sha256 not in (None, found.sha256):
         rule = f"is not the id of the uploaded checkpoint, {found.sha256}"
@@ -103,11 +90,11 @@ def _store(
         SORTING: services.sorting_policies,
     }
     registries[purpose_of(found.manifest)].check(found.manifest, found.tensors)
-    return _keep(found, services)
+    return _keep(found, services, response)
 
 
-def _keep(found: Checkpoint, services: Services) -> tuple[CheckpointPublic, bool]:
-    """Store a checkpoint; return whether it is new."""
+def _keep(found: Checkpoint, services: Services, response: Response) -> CheckpointPublic:
+    """Store a checkpoint; set status and ``Location`` of the answer."""
     try:
         checkpoints.get_checkpoint(services.store, found.sha256)
         new = False
@@ -115,22 +102,15 @@ def _keep(found: Checkpoint, services: Services) -> tuple[CheckpointPublic, bool
         new = True
     entry = NewCheckpoint(sha256=found.sha256, manifest=found.manifest, tensors=found.tensors)
     record = checkpoints.put_checkpoint(services.store, entry)
-    return CheckpointPublic.from_domain(record), new
+    set_stored(response, f"{router.prefix}/{record.sha256}", new=new)
+    return CheckpointPublic.from_domain(record)
 
 
 @router.post(
     "/{reference}/recalibration",
     status_code=201,
     summary="Recalibrate the outcome probabilities of a checkpoint",
-    responses={
-        200: {
-            "model": CheckpointPublic,
-            "description": "The same checkpoint is stored already",
-            **CREATED,
-        },
-        201: CREATED,
-        507: {},
-    },
+    responses=STORED,
 )
 def recalibrate_checkpoint(
     reference: str, request: Recalibration, services: ServicesDep, response: Response
@@ -141,10 +121,7 @@ def recalibrate_checkpoint(
     """
     record, tensors = read_sound(services.store, reference)
     found = recalibrated(load_checkpoint(record.manifest, tensors), *request.to_domain())
-    checkpoint, new = _keep(found, services)
-    response.status_code = 201 if new else 200
-    response.headers["Location"] = f"{router.prefix}/{checkpoint.sha256}"
-    return checkpoint
+    return _keep(found, services, response)
 
 
 @router.get("/{reference}", summary="One checkpoint, by SHA-256 or alias")

@@ -1,12 +1,11 @@
 """Recordings of human motion: import a file, list, show, remove."""
 
-from typing import Annotated, Any
+from typing import Annotated
 
 from fastapi import APIRouter, Depends, Query, Request, Response
 from starlette.concurrency import run_in_threadpool
 
-from app.api.bodies import FILE_TYPES
-from app.api.description import CREATED
+from app.api.description import FILE_BODY, set_stored, stored_responses
 from app.api.schemas.recordings import RecordingItem, RecordingList, RecordingPublic
 from app.api.services import Services, ServicesDep
 from app.sim.mocap.importer import FORMATS, MAX_BYTES
@@ -18,15 +17,6 @@ router = APIRouter(prefix="/v1/recordings", tags=["recordings"])
 
 FILES = {router.prefix: MAX_BYTES}
 """Route that takes files, and the largest file [bytes]."""
-BODY: dict[str, Any] = {
-    "requestBody": {
-        "required": True,
-        "content": {
-            kind: {"schema": {"type": "string", "format": "binary"}} for kind in FILE_TYPES
-        },
-    }
-}
-"""The body is the file itself."""
 UNIT = f"{', '.join(UNITS)}, or metres per unit"
 """Choices of a unit."""
 
@@ -72,16 +62,10 @@ def get_recording(name: str, services: ServicesDep) -> RecordingPublic:
     "",
     status_code=201,
     summary="Import a recording",
-    openapi_extra=BODY,
+    openapi_extra=FILE_BODY,
     responses={
-        200: {
-            "model": RecordingPublic,
-            "description": "The same file is stored already",
-            **CREATED,
-        },
-        201: CREATED,
+        **stored_responses(RecordingPublic, "The same file"),
         409: {"description": "Another file has the name, or too many are stored"},
-        507: {},
     },
 )
 async def create_recording(
@@ -99,9 +83,7 @@ async def create_recording(
 ) -> RecordingPublic:
     """Import the file in the body and store it; the same file again answers 200."""
     record, new = await _import(request, services, file_name, name, options)
-    if not new:
-        response.status_code = 200
-    response.headers["Location"] = f"{router.prefix}/{record.name}"
+    set_stored(response, f"{router.prefix}/{record.name}", new=new)
     return RecordingPublic.from_domain(record)
 
 
