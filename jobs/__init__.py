@@ -3,7 +3,7 @@
 access             Access of a worker to its job: read it, report, end it
 attempt            One attempt of a job in its own process: arguments, logging, exit status
 cell_catalog       Work cells by name: the shipped ones, and the user's own from the database
-checkpoints        Reading of stored checkpoints; a damaged shipped one is restored
+checkpoints        Checkpoints and the store: a damaged shipped one is restored where it is read
 comparison         Comparison of jobs: the fields that differ, and learning curves with a band
                    over seeds
 composed/          Jobs made of jobs: sweeps and reports

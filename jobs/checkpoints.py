@@ -1,9 +1,10 @@
-"""Reading of stored checkpoints; a damaged shipped one is restored."""
+"""Checkpoints and the store: a damaged shipped one is restored where it is read."""
 
 import logging
 
 from app.errors import Damaged
 from app.policies.checkpoints import pretrained
+from app.policies.checkpoints.checkpoint import Checkpoint
 from app.store.checkpoints import put_checkpoint, read_checkpoint
 from app.store.engine import Store
 from app.store.records import CheckpointRecord, NewCheckpoint
@@ -37,5 +38,11 @@ def shipped(alias: str) -> NewCheckpoint:
         NotFound: None is shipped under that alias.
         Damaged: The package's file is damaged.
     """
-    found = pretrained.load(alias)
-    return NewCheckpoint(sha256=found.sha256, manifest=found.manifest, tensors=found.tensors)
+    return to_store(pretrained.load(alias))
+
+
+def to_store(checkpoint: Checkpoint) -> NewCheckpoint:
+    """Return a checkpoint as the store takes it."""
+    return NewCheckpoint(
+        sha256=checkpoint.sha256, manifest=checkpoint.manifest, tensors=checkpoint.tensors
+    )

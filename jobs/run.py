@@ -24,9 +24,10 @@ from app.policies.training.progress import Progress
 from app.policies.training.state import TrainingState
 from app.policies.training.train import train as train_policy
 from app.settings import Settings, load_settings
-from app.store.records import Claim, NewCheckpoint, ResumeState
+from app.store.records import Claim, ResumeState
 from jobs.access import JobAccess, open_access
 from jobs.attempt import run_attempt
+from jobs.checkpoints import to_store
 from jobs.inputs import JobInputs, StoreInputs
 from jobs.spec import EvaluateSpec, parse_spec
 from jobs.worker import JobWorker, Runner
@@ -52,7 +53,7 @@ def train(inputs: JobInputs, worker: JobWorker) -> dict[str, Any]:
     def on_checkpoint(step: int, policy: Checkpoint, state: TrainingState | None) -> None:
         assert state is not None
         resume = ResumeState(step=step, manifest=state.manifest, tensors=state.tensors)
-        worker.record_checkpoint(step, _new(policy), resume)
+        worker.record_checkpoint(step, to_store(policy), resume)
         saved.append(policy.sha256)
 
     preset = presets.resolve(job.preset, job.overrides)
@@ -67,7 +68,7 @@ def train(inputs: JobInputs, worker: JobWorker) -> dict[str, Any]:
         cell=inputs.cell(preset),
     )
     if not saved:  # interrupted between the last checkpoint and the end
-        worker.record_checkpoint(result.step, _new(result.checkpoint), None)
+        worker.record_checkpoint(result.step, to_store(result.checkpoint), None)
         saved.append(result.checkpoint.sha256)
     return {"checkpoint": saved[-1], "step": result.step}
 
@@ -81,10 +82,6 @@ def _usable(memory: MemoryFiles, stored: ResumeState) -> bool:
         logger.warning("the state at step %d cannot be used: %s", stored.step, error)
         return False
     return True
-
-
-def _new(policy: Checkpoint) -> NewCheckpoint:
-    return NewCheckpoint(sha256=policy.sha256, manifest=policy.manifest, tensors=policy.tensors)
 
 
 def evaluate(inputs: JobInputs, worker: JobWorker) -> dict[str, Any]:

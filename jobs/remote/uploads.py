@@ -22,6 +22,7 @@ from app.policies.training.file_store import FileFolder
 from app.store import attempts, fencing
 from app.store.engine import Store
 from app.store.records import Claim, JobRecord, NewCheckpoint, ResumeState
+from jobs.checkpoints import to_store
 from jobs.resume_files import folder_of
 
 MAX_STATE_MANIFEST = 4 * 1024 * 1024
@@ -108,10 +109,7 @@ class WorkerUploads:
                 if not self._folder(claim).path(name).is_file():
                     rule = "is no file of this job: send it first"
                     raise InvalidInput(f"state.manifest.memory[{place}]", name, rule)
-        new = NewCheckpoint(
-            sha256=policy.sha256, manifest=policy.manifest, tensors=policy.tensors
-        )
-        attempts.record_checkpoint(self._store, claim, step, new, state)
+        attempts.record_checkpoint(self._store, claim, step, to_store(policy), state)
         with self._lock:
             fencing.peek(self._store, claim)
             manifests = attempts.resume_manifests(self._store, claim.job_id)

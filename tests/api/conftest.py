@@ -9,6 +9,7 @@ import pytest
 from fastapi import FastAPI
 from fastapi.testclient import TestClient
 
+from app.api.services import Services
 from app.main import create_app
 from app.settings import Settings
 from tests.api.described import Answered, undescribed
@@ -32,6 +33,11 @@ def client(tmp_path_factory: pytest.TempPathFactory) -> Iterator[TestClient]:
         wait_until_ready(one)
         one.event_hooks = {"response": [require_description(app)]}
         yield one
+
+
+def services_of(client: TestClient) -> Services:
+    """Return the parts of the service that a client asks."""
+    return client.app.state.services  # type: ignore[attr-defined, no-any-return]
 
 
 def require_description(app: FastAPI) -> Callable[[Answered], None]:

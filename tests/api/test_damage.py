@@ -18,8 +18,8 @@ from app.policies.checkpoints.checkpoint import Checkpoint
 from app.settings import Settings
 from app.store.checkpoints import put_checkpoint, read_checkpoint, set_alias
 from app.store.engine import Store
-from app.store.records import NewCheckpoint
-from tests.api.conftest import ADDRESS, wait_until_ready
+from jobs.checkpoints import to_store
+from tests.api.conftest import ADDRESS, services_of, wait_until_ready
 from tests.support.damage import JSON, TENSORS, Change, cut, damage, flip
 
 SEEDS = count(1000)
@@ -55,8 +55,7 @@ def keep(store: Store, alias: str, shipped: str = "pick") -> str:
     """Store a copy of a shipped policy as one of a user's own; return its SHA-256."""
     found = pretrained.load(shipped)
     made = Checkpoint({**found.manifest, "seed": next(SEEDS)}, found.tensors)
-    new = NewCheckpoint(sha256=made.sha256, manifest=made.manifest, tensors=made.tensors)
-    put_checkpoint(store, new)
+    put_checkpoint(store, to_store(made))
     set_alias(store, alias, made.sha256)
     return made.sha256
 
@@ -91,7 +90,7 @@ def test_start_heals_shipped_checkpoints_and_names_the_others(service: TestClien
 def test_every_reader_of_a_damaged_checkpoint_gets_an_error(
     service: TestClient, data: Path, column: str, change: Change
 ) -> None:
-    store = service.app.state.services.store  # type: ignore[attr-defined]
+    store = services_of(service).store
     alias = f"mine-{next(SEEDS)}"
     sha256 = keep(store, alias)
     damage(data / "tandem.db", "checkpoints", column, f"sha256 = '{sha256}'", change)
@@ -128,7 +127,7 @@ def test_deleted_checkpoint_is_named_as_damaged_no_longer(
 def test_damaged_policies_of_other_kinds_are_not_loaded(
     service: TestClient, data: Path, alias: str
 ) -> None:
-    services = service.app.state.services  # type: ignore[attr-defined]
+    services = services_of(service)
     registry = services.reach_policies if alias == "reach" else services.sorting_policies
     sha256 = keep(services.store, f"my-{alias}", alias)
     damage(data / "tandem.db", "checkpoints", "tensors", f"sha256 = '{sha256}'", flip(500))
@@ -146,14 +145,14 @@ def test_shipped_checkpoint_is_healed_where_it_is_read(
     answer = service.get(f"/v1/checkpoints/{alias}/tensors")
     assert (answer.status_code, answer.headers["etag"]) == (200, f'"{sha256}"')
     assert load(answer.content)
-    store = service.app.state.services.store  # type: ignore[attr-defined]
+    store = services_of(service).store
     assert read_checkpoint(store, alias)[1] == answer.content
 
 
 def test_damaged_policies_are_passed_over_where_none_is_named(
     service: TestClient, data: Path
 ) -> None:
-    store = service.app.state.services.store  # type: ignore[attr-defined]
+    store = services_of(service).store
     sha256 = keep(store, "newest")
     damage(data / "tandem.db", "checkpoints", "tensors", f"sha256 = '{sha256}'", flip(-5))
     shown = service.put("/v1/worlds/main/cell", json={"cell": "pick-and-place"})

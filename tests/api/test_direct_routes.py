@@ -17,7 +17,7 @@ from app.api.application import decision_routes
 from app.api.bodies import BodyRules
 from app.api.direct_routes import DirectRoutes
 from app.api.schemas import examples
-from tests.api.conftest import ADDRESS
+from tests.api.conftest import ADDRESS, services_of
 
 SORTING = {name: examples.PLAN[name] for name in ("cell", "objects", "goal")}
 BODIES: dict[str, dict[str, Any]] = {
@@ -60,7 +60,7 @@ TEXTS = (
 def plain(client: TestClient) -> Iterator[TestClient]:
     """The same functions as plain routes of FastAPI, on the same service."""
     app = FastAPI()
-    app.state.services = client.app.state.services  # type: ignore[attr-defined]
+    app.state.services = services_of(client)
     problems.install(app)
     routes = decision_routes()
     assert [one.path for one in routes] == list(BODIES)

@@ -11,6 +11,7 @@ from app.api.security import headers_of
 from app.errors import InvalidInput
 from app.main import create_app
 from app.settings import Settings
+from tests.api.conftest import services_of
 
 TOKEN = "a-token-of-some-length"
 OPEN_FOR = {
@@ -218,7 +219,7 @@ def test_signing_in_with_anything_else_is_refused(guarded: TestClient, body: byt
 
 
 def test_health_tells_strangers_nothing_but_up_and_ready(guarded: TestClient) -> None:
-    services = guarded.app.state.services  # type: ignore[attr-defined]
+    services = services_of(guarded)
     services.readiness.ready, services.readiness.reason = False, "compiling: a secret"
     for path in ("/healthz", "/readyz"):
         for headers in ({}, {"Authorization": "Bearer wrong"}):

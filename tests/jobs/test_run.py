@@ -14,8 +14,9 @@ from app.policies.checkpoints.trained_cell import is_for
 from app.settings import Settings
 from app.store import attempts, checkpoints, events, job_actions, jobs, metrics
 from app.store.engine import Store
-from app.store.records import Claim, NewCheckpoint
+from app.store.records import Claim
 from jobs.cell_catalog import CellCatalog
+from jobs.checkpoints import to_store
 from jobs.recording_catalog import RecordingCatalog
 from jobs.spec import parse_spec
 from jobs.supervisor import Supervisor
@@ -185,8 +186,7 @@ def test_evaluation_beside_stored_recordings_tells_row_by_row(store: Store) -> N
     for name, seed in (("nods", 0), ("waves", 1)):
         recordings.add(csv_text(working(100, seed=seed)).encode(), "clip.csv", name)
     policy = pretrained.load("pick")
-    new = NewCheckpoint(sha256=policy.sha256, manifest=policy.manifest, tensors=policy.tensors)
-    checkpoints.put_checkpoint(store, new)
+    checkpoints.put_checkpoint(store, to_store(policy))
     body = {"kind": "evaluate", "protocol": "pick-mocap", "checkpoint": policy.sha256}
     spec = parse_spec({**body, "episodes": 4, "recordings": ["waves", "nods"]}).new_job()
     job = wait_until_final(store, jobs.create_job(store, spec).id)
@@ -205,8 +205,7 @@ def test_evaluation_beside_stored_recordings_tells_row_by_row(store: Store) -> N
 @SQLITE_ONLY
 def test_evaluation_beside_a_recording_that_is_gone_fails_by_name(store: Store) -> None:
     policy = pretrained.load("pick")
-    new = NewCheckpoint(sha256=policy.sha256, manifest=policy.manifest, tensors=policy.tensors)
-    checkpoints.put_checkpoint(store, new)
+    checkpoints.put_checkpoint(store, to_store(policy))
     body = {"kind": "evaluate", "protocol": "pick-mocap", "recordings": ["waves"]}
     spec = parse_spec({**body, "checkpoint": policy.sha256, "episodes": 4}).new_job()
     job = wait_until_final(store, jobs.create_job(store, spec).id)
@@ -221,10 +220,7 @@ def test_evaluation_of_sorting_tells_row_by_row_and_refuses_a_policy_that_picks(
 ) -> None:
     ids = []
     for policy in (untrained(), pretrained.load("pick")):
-        stored = NewCheckpoint(
-            sha256=policy.sha256, manifest=policy.manifest, tensors=policy.tensors
-        )
-        checkpoints.put_checkpoint(store, stored)
+        checkpoints.put_checkpoint(store, to_store(policy))
         body = {"kind": "evaluate", "protocol": "sorting-tests", "episodes": 2}
         spec = parse_spec({**body, "checkpoint": policy.sha256}).new_job()
         ids.append(jobs.create_job(store, spec).id)

@@ -22,8 +22,7 @@ from app.policies.checkpoints.checkpoint import load as load_checkpoint
 from app.policies.checkpoints.upload import MAX_FILE, read_upload
 from app.policies.inference.recalibration import recalibrated
 from app.store import checkpoints
-from app.store.records import NewCheckpoint
-from jobs.checkpoints import read_sound
+from jobs.checkpoints import read_sound, to_store
 
 router = APIRouter(prefix="/v1/checkpoints", tags=["checkpoints"])
 FILES = {router.prefix: MAX_FILE}
@@ -100,8 +99,7 @@ def _keep(found: Checkpoint, services: Services, response: Response) -> Checkpoi
         new = False
     except NotFound:
         new = True
-    entry = NewCheckpoint(sha256=found.sha256, manifest=found.manifest, tensors=found.tensors)
-    record = checkpoints.put_checkpoint(services.store, entry)
+    record = checkpoints.put_checkpoint(services.store, to_store(found))
     set_stored(response, f"{router.prefix}/{record.sha256}", new=new)
     return CheckpointPublic.from_domain(record)
 

@@ -3,8 +3,8 @@ from typing import Any
 import pytest
 from fastapi.testclient import TestClient
 
-from app.api.services import Services
 from app.main import acting_in
+from tests.api.conftest import services_of
 
 TRAIN = {"kind": "train", "preset": "pick-td3", "seed": 1, "priority": -100}
 
@@ -178,12 +178,6 @@ def test_acting_checkpoints_are_known_with_their_place(client: TestClient) -> No
     worlds = services_of(client).worlds
     acting = client.get("/v1/worlds/main").json()["checkpoint"]
     assert acting_in(worlds)[acting] == "world main"
-
-
-def services_of(client: TestClient) -> Services:
-    app: Any = client.app
-    services: Services = app.state.services
-    return services
 
 
 def test_jobs_are_compared_by_what_differs(client: TestClient, ended: dict[str, Any]) -> None:

@@ -6,6 +6,7 @@ from fastapi.testclient import TestClient
 
 from app.store.jobs import create_job
 from app.store.records import NewJob
+from tests.api.conftest import services_of
 from tests.sim.recorded_person import csv_text, working
 
 TINY = {
@@ -176,7 +177,7 @@ def test_list_shows_each_change_at_once(client: TestClient) -> None:
 def test_list_shows_the_parts_of_one_job_only(client: TestClient) -> None:
     whole = client.post("/v1/jobs", json=TRAIN).json()["id"]
     client.post(f"/v1/jobs/{whole}/cancel")
-    store = client.app.state.services.store  # type: ignore[attr-defined]
+    store = services_of(client).store
     part = create_job(store, NewJob(kind="count", spec={}, part_of=whole, trial=1)).id
     client.post(f"/v1/jobs/{part}/cancel")
     items = client.get("/v1/jobs", params={"part_of": whole}).json()["items"]

@@ -9,7 +9,8 @@ from fastapi.testclient import TestClient
 from app.policies.configs import presets
 from app.policies.training.train import train
 from app.store.checkpoints import put_checkpoint
-from app.store.records import NewCheckpoint
+from jobs.checkpoints import to_store
+from tests.api.conftest import services_of
 from tests.support import workshop
 
 TINY = {
@@ -37,8 +38,7 @@ def checkpoint(client: TestClient) -> str:
         should_stop=lambda: False,
         cell=workshop.cell(),
     ).checkpoint
-    new = NewCheckpoint(sha256=made.sha256, manifest=made.manifest, tensors=made.tensors)
-    put_checkpoint(client.app.state.services.store, new)  # type: ignore[attr-defined]
+    put_checkpoint(services_of(client).store, to_store(made))
     return made.sha256
 
 

@@ -10,6 +10,7 @@ from fastapi.testclient import TestClient
 from app.api.services import MAX_UPLOADS
 from app.sim.human.model import Q_MAX
 from app.sim.mocap.importer import MAX_BYTES
+from tests.api.conftest import services_of
 from tests.sim.mocap.test_importer import with_leap
 from tests.sim.recorded_person import bvh_text, csv_text, working
 
@@ -65,7 +66,7 @@ def test_posted_recording_is_kept_listed_and_removed(
 def test_runs_of_a_posted_recording_are_there_for_the_service(
     client: TestClient, posted: dict[str, Any]
 ) -> None:
-    services = client.app.state.services  # type: ignore[attr-defined]
+    services = services_of(client)
     runs = services.recordings.get(posted["name"])
     assert [run.first_frame for run in runs] == [run["first"] for run in posted["clean_runs"]]
     assert all(run.q.shape == (len(run.times), 18) for run in runs)
@@ -250,7 +251,7 @@ def test_file_of_no_stated_type_is_taken(client: TestClient) -> None:
 
 
 def test_only_so_many_files_are_taken_in_at_once(client: TestClient) -> None:
-    uploads = client.app.state.services.uploads  # type: ignore[attr-defined]
+    uploads = services_of(client).uploads
     for _ in range(MAX_UPLOADS):
         assert uploads.acquire(blocking=False)
     try:
@@ -267,7 +268,7 @@ def test_refused_files_leave_room_for_the_next(client: TestClient) -> None:
         assert post(client, b"", file_name="a.bvh").status_code == 422
     chunks = (b" " * (1 << 20) for _ in range(33))
     client.post("/v1/recordings?file_name=a.bvh", content=chunks, headers=FILE)
-    uploads = client.app.state.services.uploads  # type: ignore[attr-defined]
+    uploads = services_of(client).uploads
     for _ in range(MAX_UPLOADS):
         assert uploads.acquire(blocking=False)
     uploads.release(MAX_UPLOADS)

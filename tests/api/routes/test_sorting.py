@@ -11,7 +11,8 @@ from app.policies.configs import presets
 from app.policies.configs.sorting import SortingPreset
 from app.policies.training.sorting import start
 from app.sim.cells.cell import load_cell
-from app.store.records import NewCheckpoint
+from jobs.checkpoints import to_store
+from tests.api.conftest import services_of
 
 URL = "/v1/sorting"
 JSON = {"Content-Type": "application/json"}
@@ -39,8 +40,7 @@ def checkpoint(client: TestClient) -> str:
     )
     assert isinstance(preset, SortingPreset)
     made = start(preset, 4, load_cell("sorting-e0"))[0].policy()
-    new = NewCheckpoint(sha256=made.sha256, manifest=made.manifest, tensors=made.tensors)
-    client.app.state.services.checkpoints.publish(ALIAS, new)  # type: ignore[attr-defined]
+    services_of(client).checkpoints.publish(ALIAS, to_store(made))
     return made.sha256
 
 

@@ -17,6 +17,7 @@ from app.store.database.tables import jobs as jobs_table
 from app.store.engine import Store
 from app.store.records import Claim, NewCheckpoint, ResumeState
 from jobs.access import EndOfAttempt
+from jobs.checkpoints import to_store
 from jobs.inputs import StoreInputs
 from jobs.recording_catalog import RecordingCatalog
 from jobs.remote.access import ServiceAccess
@@ -35,7 +36,7 @@ from tests.support.failing_proxy import FailingProxy, failing_proxy
 pytestmark = SQLITE_ONLY
 SPEC = {"kind": "train", "preset": "sorting-e0-dqn", "seed": 1}
 POLICY = untrained()
-NEW = NewCheckpoint(sha256=POLICY.sha256, manifest=POLICY.manifest, tensors=POLICY.tensors)
+NEW = to_store(POLICY)
 ROWS = save({"rewards": np.arange(3.0)})
 ROWS_SHA256 = sha256(ROWS).hexdigest()
 

@@ -4,7 +4,8 @@ import pytest
 from fastapi.testclient import TestClient
 
 from app.policies.checkpoints.checkpoint import Checkpoint, pack
-from app.store.records import NewCheckpoint
+from jobs.checkpoints import to_store
+from tests.api.conftest import services_of
 from tests.api.routes.motion.motion_requests import BOX, GRID, JERK
 from tests.policies.untrained import untrained_reach
 
@@ -21,13 +22,12 @@ def with_ranges(checkpoint: Checkpoint) -> Checkpoint:
 
 @pytest.fixture(scope="package")
 def policies(client: TestClient) -> dict[str, str]:
-    names = client.app.state.services.checkpoints  # type: ignore[attr-defined]
+    names = services_of(client).checkpoints
     made = {
         GRID: with_ranges(untrained_reach()),
         BOX: with_ranges(untrained_reach(goals="box")),
         JERK: untrained_reach(degree=3),
     }
     for alias, one in made.items():
-        new = NewCheckpoint(sha256=one.sha256, manifest=one.manifest, tensors=one.tensors)
-        names.publish(alias, new)
+        names.publish(alias, to_store(one))
     return {alias: one.sha256 for alias, one in made.items()}

@@ -9,6 +9,7 @@ from fastapi.testclient import TestClient
 from starlette.testclient import WebSocketTestSession
 from starlette.websockets import WebSocketDisconnect
 
+from tests.api.conftest import services_of
 from tests.api.routes.motion.motion_requests import BAD, SOCKET, STREAM, TASK, asked, refused
 
 pytestmark = pytest.mark.usefixtures("policies")
@@ -116,7 +117,7 @@ def test_a_socket_outlives_text_and_integers_that_nothing_takes(
 
 
 def test_a_stopping_server_ends_its_sockets(client: TestClient) -> None:
-    stopping = client.app.state.services.stopping  # type: ignore[attr-defined]
+    stopping = services_of(client).stopping
     with client.websocket_connect(SOCKET) as one:
         one.send_json(TASK)
         assert one.receive_json()["inference_mode"] == "interpolated"

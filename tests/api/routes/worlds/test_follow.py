@@ -4,6 +4,7 @@ from fastapi.testclient import TestClient
 
 from app.live.commands import SetPolicy
 from app.store.checkpoints import drop_job_checkpoints
+from tests.api.conftest import services_of
 from tests.api.routes.worlds.test_worlds import COMMANDS, WORLD, until
 
 LEARNING = {
@@ -49,7 +50,7 @@ def test_following_ends_when_another_policy_is_chosen_or_asked_to(client: TestCl
     assert client.delete(f"{WORLD}/follow").status_code == 204
     assert follow_of(client) is None
     assert client.put(f"{WORLD}/follow", json=body).json()["active"]
-    world = client.app.state.services.worlds["main"]  # type: ignore[attr-defined]
+    world = services_of(client).worlds["main"]
     world.handle.submit(SetPolicy(checkpoint=None))  # as the 3D viewer, not by the API
     until(client, lambda _: not follow_of(client)["active"])
     assert follow_of(client)["reason"] == "another policy was chosen"
@@ -69,7 +70,7 @@ def test_own_policy_acts_again_where_a_restarted_training_lost_its_checkpoints(
         lambda world: world["checkpoint"] == follow_of(client)["checkpoint"] is not None,
         within_s=240.0,  # a worker starts first
     )
-    services = client.app.state.services  # type: ignore[attr-defined]
+    services = services_of(client)
     with services.follows.lock:  # nobody looks meanwhile
         client.post(f"/v1/jobs/{job['id']}/cancel")
         client.get(f"/v1/jobs/{job['id']}/events")  # ends with the job

@@ -8,10 +8,10 @@ import pytest
 from fastapi.testclient import TestClient
 
 from app.api.registry import REACH_ALIAS
-from app.api.services import Services
 from app.policies.checkpoints import pretrained
 from app.store.checkpoints import put_checkpoint
-from app.store.records import NewCheckpoint
+from jobs.checkpoints import to_store
+from tests.api.conftest import services_of
 from tests.policies.untrained import untrained_reach
 
 WORLD = "/v1/worlds/main"
@@ -76,12 +76,9 @@ def test_goal_safety_and_people_are_changed(client: TestClient) -> None:
 
 
 def test_policy_is_named_and_queried_in_its_inference_modes(client: TestClient) -> None:
-    services: Services = client.app.state.services  # type: ignore[attr-defined]
+    services = services_of(client)
     made = untrained_reach(width=32)
-    put_checkpoint(
-        services.store,
-        NewCheckpoint(sha256=made.sha256, manifest=made.manifest, tensors=made.tensors),
-    )
+    put_checkpoint(services.store, to_store(made))
     assert send(client, tag="set-policy", checkpoint=made.sha256).status_code == 202
     acting = until(client, lambda one: one["checkpoint"] == made.sha256)
     assert acting["reach"]["inference_mode"] == "interpolated-rollout"
