@@ -19,7 +19,7 @@ from app.store.database.tables import events, job_checkpoints, jobs, metrics, re
 from app.store.engine import Store
 from app.store.events import append_event
 from app.store.fencing import change_state, fenced_update
-from app.store.jobs import job_from_row, read_job
+from app.store.jobs import read_job, select_jobs
 from app.store.records import COMPOSED, Claim, JobRecord, NewCheckpoint, ResumeState
 
 logger = logging.getLogger(__name__)
@@ -216,9 +216,9 @@ def resume_manifests(store: Store, job_id: str) -> tuple[Mapping[str, Any], ...]
 
 def running_jobs(store: Store) -> tuple[RunningJob, ...]:
     """Return the running jobs that have a worker."""
-    query = sa.select(jobs).where(jobs.c.state == "running", jobs.c.kind.not_in(COMPOSED))
+    running = jobs.c.state == "running"
     with store.reading() as connection:
-        found = [job_from_row(row) for row in connection.execute(query).mappings()]
+        found = select_jobs(connection, running, jobs.c.kind.not_in(COMPOSED))
     return tuple(
         RunningJob(
             claim=Claim(job_id=job.id, attempt=job.attempt),

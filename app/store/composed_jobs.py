@@ -15,7 +15,7 @@ from app.store.database.tables import jobs, metrics
 from app.store.engine import Store
 from app.store.events import append_event
 from app.store.fencing import change_state
-from app.store.jobs import job_from_row, read_job
+from app.store.jobs import read_job, select_jobs
 from app.store.jobs import request_cancel as cancel_job
 from app.store.records import JobRecord
 
@@ -23,12 +23,14 @@ from app.store.records import JobRecord
 def open_jobs(store: Store, kind: str) -> tuple[JobRecord, ...]:
     """Return the jobs of a kind that have not ended, oldest first."""
     active = jobs.c.state.in_(("queued", "running"))
-    return _found(store, sa.select(jobs).where(active, jobs.c.kind == kind))
+    with store.reading() as connection:
+        return tuple(select_jobs(connection, active, jobs.c.kind == kind))
 
 
 def parts_of(store: Store, job_id: str) -> tuple[JobRecord, ...]:
     """Return the trainings and evaluations of a job, oldest first."""
-    return _found(store, sa.select(jobs).where(jobs.c.part_of == job_id))
+    with store.reading() as connection:
+        return tuple(select_jobs(connection, jobs.c.part_of == job_id))
 
 
 def start(store: Store, job_id: str) -> None:
@@ -97,9 +99,3 @@ def mark_pruned(store: Store, job_id: str) -> None:
     with store.writing() as connection:
         mine = jobs.c.id == job_id
         connection.execute(sa.update(jobs).where(mine).values(ended_by="pruned"))
-
-
-def _found(store: Store, query: sa.Select[Any]) -> tuple[JobRecord, ...]:
-    with store.reading() as connection:
-        rows = connection.execute(query.order_by(jobs.c.number)).mappings().all()
-    return tuple(job_from_row(row) for row in rows)

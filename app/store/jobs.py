@@ -92,10 +92,8 @@ def get_job(store: Store, job_id: str) -> JobRecord:
 
 def find_job(store: Store, job_id: str) -> JobRecord | None:
     """Return one job; None where it was deleted."""
-    query = sa.select(jobs).where(jobs.c.id == job_id)
     with store.reading() as connection:
-        row = connection.execute(query).mappings().first()
-    return None if row is None else job_from_row(row)
+        return next(iter(select_jobs(connection, jobs.c.id == job_id)), None)
 
 
 def list_jobs(
@@ -160,7 +158,7 @@ def _page(
     query = query.where(*where)
     with store.reading() as connection:
         rows = connection.execute(query).mappings().all()
-    items = tuple(job_from_row(row) for row in rows[:limit])
+    items = tuple(_record(row) for row in rows[:limit])
     more = len(rows) > limit
     return Page(items=items, next_cursor=encode_cursor(items[-1].number) if more else None)
 
@@ -209,11 +207,18 @@ def read_job(connection: sa.Connection, job_id: str, *, for_update: bool = False
     row = connection.execute(query).mappings().first()
     if row is None:
         raise NotFound("job", job_id)
-    return job_from_row(row)
+    return _record(row)
 
 
-def job_from_row(row: Mapping[Any, Any]) -> JobRecord:
-    """Return the record of a row."""
+def select_jobs(
+    connection: sa.Connection, *conditions: sa.ColumnElement[bool]
+) -> list[JobRecord]:
+    """Return the jobs that meet all conditions, in a transaction, oldest first."""
+    query = sa.select(jobs).where(*conditions).order_by(jobs.c.number)
+    return [_record(row) for row in connection.execute(query).mappings()]
+
+
+def _record(row: Mapping[Any, Any]) -> JobRecord:
     fields = dict(row)
     if fields["state"] == "running" and fields["cancel_requested"]:
         fields["state"] = "cancelling"
@@ -248,9 +253,7 @@ def _check_single(connection: sa.Connection, new: NewJob) -> None:
     """Refuse a second repetition of a job while an equal one waits or runs."""
     read_job(connection, str(new.parent), for_update=True)  # one at a time
     active = jobs.c.state.in_(("queued", "running"))
-    query = sa.select(jobs).where(jobs.c.parent == new.parent, active)
-    for row in connection.execute(query).mappings():
-        equal = job_from_row(row)
+    for equal in select_jobs(connection, jobs.c.parent == new.parent, active):
         if dict(equal.spec) == dict(new.spec):
             rule = (
                 f"of job {equal.number}, which repeats the same job with the same values: wait "
@@ -272,9 +275,7 @@ def _cancel(connection: sa.Connection, job: JobRecord) -> None:
 def _by_key(connection: sa.Connection, key: str | None) -> JobRecord | None:
     if key is None:
         return None
-    query = sa.select(jobs).where(jobs.c.idempotency_key == key)
-    row = connection.execute(query).mappings().first()
-    return None if row is None else job_from_row(row)
+    return next(iter(select_jobs(connection, jobs.c.idempotency_key == key)), None)
 
 
 def _same_submission(earlier: JobRecord, new: NewJob) -> JobRecord:

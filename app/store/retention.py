@@ -10,7 +10,7 @@ from app.store.checkpoints import drop_job_checkpoints, find_checkpoint, sole_ch
 from app.store.database.reserve import write_with_reserve
 from app.store.database.tables import checkpoints, jobs, resume_states
 from app.store.engine import Store
-from app.store.jobs import job_from_row, read_job
+from app.store.jobs import read_job, select_jobs
 from app.store.records import COMPOSED, FINAL_STATES, JobRecord
 from app.store.references import unfinished
 
@@ -133,10 +133,7 @@ def _deleted(store: Store, job_id: str, acting: Mapping[str, str]) -> bool:
 
 def _require_no_part(connection: sa.Connection, job: JobRecord) -> None:
     """Check that a job is no part of a sweep or report that has not ended."""
-    query = sa.select(jobs).where(jobs.c.id == job.part_of, jobs.c.id.in_(_OPEN))
-    row = connection.execute(query).mappings().first()
-    if row is not None:
-        whole = job_from_row(row)
+    for whole in select_jobs(connection, jobs.c.id == job.part_of, jobs.c.id.in_(_OPEN)):
         rule = (
             f"of job {job.number}: {whole.kind} {whole.number} has not ended and needs it; "
             f"cancel {whole.number} first"
