@@ -52,7 +52,7 @@ from jobs.cell_catalog import CellCatalog
 from jobs.checkpoints import shipped
 from jobs.composed.reports import Reports
 from jobs.composed.sweeps import Sweeps
-from jobs.executor import Executor, LocalProcess
+from jobs.executor import LocalProcess
 from jobs.import_process import ImportProcess
 from jobs.recording_catalog import RecordingCatalog
 from jobs.remote.uploads import WorkerUploads
@@ -232,7 +232,7 @@ class Service:
                 names.mark_damaged(damage)
 
 
-def executor_of(settings: Settings, database_url: str) -> Executor:
+def executor_of(settings: Settings, database_url: str) -> LocalProcess:
     """Return the executor of jobs: a Ray cluster, or processes of this machine.
 
     Args:

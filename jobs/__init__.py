@@ -7,7 +7,7 @@ checkpoints        Checkpoints and the store: a damaged shipped one is restored 
 comparison         Comparison of jobs: the fields that differ, and learning curves with a band
                    over seeds
 composed/          Jobs made of jobs: sweeps and reports
-executor           Executors of attempts: the interface, and one local process per attempt
+executor           Executor of attempts: one local process per attempt
 import_process     Import of a file in its own process: ``python -m jobs.import_process``
 inputs             Inputs of a job: its cell, checkpoint and recordings, and the files of its
                    replay memory

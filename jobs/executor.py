@@ -1,7 +1,7 @@
-"""Executors of attempts: the interface, and one local process per attempt.
+"""Executor of attempts: one local process per attempt.
 
-The child ends with its parent (``jobs.start``), so that a killed server leaves
-no training behind.
+The child ends with its parent (``jobs.start``), so that a killed server leaves no training
+behind. An attempt on a Ray cluster has a local process, too (``jobs.remote.ray_driver``).
 """
 
 import os
@@ -10,7 +10,6 @@ import subprocess
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
 
 from app.store.records import Claim
 from jobs.start import child_command
@@ -40,33 +39,10 @@ class Exit:
         return f"{ended}\n{self.tail}".rstrip()
 
 
-class Handle(Protocol):
-    """A started attempt of an executor."""
-
-    @property
-    def claim(self) -> Claim:
-        """The attempt."""
-
-
-class Executor(Protocol):
-    """Starts, polls and stops attempts."""
-
-    def start(self, claim: Claim) -> Handle:
-        """Start an attempt; returns at once."""
-
-    def poll(self, handle: Handle) -> Exit | None:
-        """Return the end of the attempt; None while it runs."""
-
-    def stop(self, handle: Handle, *, force: bool) -> None:
-        """Stop the attempt at its next step, or at once by force; returns at once."""
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LocalHandle:
-    """A child process."""
+    """The child process of an attempt."""
 
-    claim: Claim
-    """The attempt."""
     process: subprocess.Popen[bytes]
     """The process; its id is not reused before it is reaped here."""
     log: Path
@@ -110,7 +86,7 @@ class LocalProcess:
             self._environment["TANDEM_DATABASE_URL"] = database_url
 
     def start(self, claim: Claim) -> LocalHandle:
-        """Start a worker process for the attempt."""
+        """Start a worker process for the attempt; returns at once."""
         self._logs.mkdir(parents=True, exist_ok=True)
         log = self._logs / f"{claim.job_id}.log"
         attempt = ("--job", claim.job_id, "--attempt", str(claim.attempt))
@@ -125,21 +101,18 @@ class LocalProcess:
                 start_new_session=True,  # Ctrl-C goes to the server, which stops its workers
             )
             return LocalHandle(
-                claim=claim,
                 process=process,
                 log=log,
                 log_start=os.fstat(output.fileno()).st_size,
             )
 
-    def poll(self, handle: Handle) -> Exit | None:
+    def poll(self, handle: LocalHandle) -> Exit | None:
         """Return the end of the process; None while it runs."""
-        assert isinstance(handle, LocalHandle)
         code = handle.process.poll()
         return None if code is None else Exit(code=code, tail=_tail(handle))
 
-    def stop(self, handle: Handle, *, force: bool) -> None:
-        """Send SIGTERM, or SIGKILL by force."""
-        assert isinstance(handle, LocalHandle)
+    def stop(self, handle: LocalHandle, *, force: bool) -> None:
+        """Send SIGTERM, after which a worker stops at its next step, or SIGKILL by force."""
         if force:
             handle.process.kill()
         else:

@@ -50,10 +50,14 @@ Seed = Annotated[int, Field(ge=0, le=MAX_SEED)]
 Name = Annotated[str, Field(min_length=1, max_length=64)]
 
 
-class JobLabels(BaseModel):
-    """What people write on a job; it changes nothing of what the job computes."""
+class _Strict(BaseModel):
+    """Base without unknown fields, non-finite numbers and values of another JSON type."""
 
     model_config = ConfigDict(extra="forbid", allow_inf_nan=False, frozen=True, strict=True)
+
+
+class JobLabels(_Strict):
+    """What people write on a job; it changes nothing of what the job computes."""
 
     name: Annotated[str, Field(pattern=r"^[^\x00-\x1f]*$", max_length=80)] | None = Field(
         None, description="a name for people, one line"
@@ -74,10 +78,8 @@ class JobLabels(BaseModel):
         }
 
 
-class Budget(BaseModel):
+class Budget(_Strict):
     """What a job may use before it ends and keeps its state; part of no spec."""
-
-    model_config = ConfigDict(extra="forbid", allow_inf_nan=False, frozen=True, strict=True)
 
     step_budget: Annotated[int, Field(ge=1, le=MAX_STEPS)] | None = Field(
         None,
@@ -101,7 +103,7 @@ class JobChanges(JobLabels, Budget):
 
 
 class _Spec(JobLabels):
-    """A body without unknown fields, non-finite numbers and values of another JSON type."""
+    """Base of the specs of all kinds."""
 
     def _body(self) -> dict[str, Any]:
         """Return the spec to store: the given fields, without labels and budgets."""
@@ -177,10 +179,8 @@ class EvaluateSpec(_Spec):
         return NewJob(kind=self.kind, spec=spec, seed=self.seed, **self.labels())
 
 
-class Range(BaseModel):
+class Range(_Strict):
     """Values of one field of a sweep: from ``low`` to ``high``, or some ``choices``."""
-
-    model_config = ConfigDict(extra="forbid", allow_inf_nan=False, frozen=True, strict=True)
 
     low: float | None = Field(None, description="least value")
     high: float | None = Field(None, description="greatest value")
@@ -209,10 +209,8 @@ class Range(BaseModel):
         return {"low": self.low, "high": self.high}
 
 
-class Objective(BaseModel):
+class Objective(_Strict):
     """What the trials of a sweep are compared by: a rate of an evaluation."""
-
-    model_config = ConfigDict(extra="forbid", allow_inf_nan=False, frozen=True, strict=True)
 
     protocol: Name = Field(description="an evaluation of the preset's scenario")
     quantity: Literal["success", "collision", "timeout"] = Field(

@@ -33,7 +33,7 @@ from app.store.database.schema import check_schema
 from app.store.engine import Store
 from app.store.records import Claim
 from jobs.composed.composer import Composer
-from jobs.executor import Executor, Exit, Handle, LocalProcess
+from jobs.executor import Exit, LocalHandle, LocalProcess
 from jobs.resume_files import remove_unneeded
 from jobs.retention import Retention
 
@@ -85,7 +85,7 @@ OTHER_SERVER = "another server runs the jobs"
 class _Worker:
     """A running attempt. Times are on the monotonic clock, which stops during suspend."""
 
-    handle: Handle
+    handle: LocalHandle
     span: Span
     heartbeat_at: datetime | None = None
     heartbeat_seen: float
@@ -100,7 +100,7 @@ class Supervisor:
     Args:
         data_dir: The data folder: holds the server's lock and the logs of the jobs.
         max_running: Largest number of running jobs.
-        executor: Runs the attempts; local processes by default.
+        executor: Starts the processes of attempts; workers of this machine by default.
         min_free_bytes: Free space of the disk below which no job starts [bytes].
         retention: Removes old jobs whenever one has ended.
         tracer: Makes a span of each attempt.
@@ -112,7 +112,7 @@ class Supervisor:
         data_dir: Path,
         *,
         max_running: int = 1,
-        executor: Executor | None = None,
+        executor: LocalProcess | None = None,
         timeouts: Timeouts | None = None,
         min_free_bytes: int = MIN_FREE_BYTES,
         retention: Retention | None = None,
@@ -131,7 +131,7 @@ class Supervisor:
         self._retention = retention
         self.composed: tuple[Composer, ...] = ()
         """What advances jobs made of jobs; set before the start."""
-        self.on_lease: Callable[[], object] = _nothing
+        self.on_lease: Callable[[], object] = lambda: None
         """Called when the lease was taken: another server may have changed the database."""
         self._workers: dict[Claim, _Worker] = {}
         self._orphans_queued = False
@@ -379,10 +379,6 @@ class Supervisor:
             reserve.fill_reserve(self._store)
         except StorageFull as error:
             logger.error("%s", error)
-
-
-def _nothing() -> None:
-    """Do nothing."""
 
 
 def _end(span: Span, ended: Exit | None) -> None:

@@ -20,7 +20,7 @@ from app.store.engine import Store
 from app.store.records import Claim
 from jobs import worker as jobs_worker
 from jobs.access import StoreAccess
-from jobs.executor import Handle, LocalProcess
+from jobs.executor import LocalHandle, LocalProcess
 from jobs.supervisor import Supervisor
 from jobs.worker import JobWorker
 from tests.jobs.counting_worker import count
@@ -131,7 +131,7 @@ class Exhausted(LocalProcess):
         super().__init__(store.url, data_dir, "tests.jobs.counting_worker")
         self.left, self.error = 4, error
 
-    def start(self, claim: Claim) -> Handle:
+    def start(self, claim: Claim) -> LocalHandle:
         if self.left:
             self.left -= 1
             raise OSError(self.error, os.strerror(self.error))
