@@ -10,11 +10,9 @@ from typing import Any
 
 import pytest
 
-from app.main import create_app
 from app.policies.checkpoints import pretrained
 from app.policies.evaluation.registry import PROTOCOLS
-from app.settings import Settings
-from tests.api.live_server import running, wait_until_ready
+from tests.api.live_server import served
 
 ROOT = Path(__file__).resolve().parent.parent
 TEXT = (ROOT / "docs" / "http.md").read_text("utf-8")
@@ -40,9 +38,7 @@ SAMPLES = [json.loads(one) for one in re.findall(r"```json\n(.*?)```", TEXT, re.
 def address(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
     if shutil.which("curl") is None:
         pytest.skip("needs curl")
-    app = create_app(Settings(data=tmp_path_factory.mktemp("examples")))
-    with running(app) as (_, found):
-        wait_until_ready(found)
+    with served(tmp_path_factory.mktemp("examples")) as found:
         yield found
 
 

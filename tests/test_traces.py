@@ -1,4 +1,3 @@
-import time
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +11,7 @@ from app.main import create_app
 from app.settings import Settings
 from app.traces import VARIABLES, provider_of_environment
 from tests.api.conftest import wait_until_ready
-from tests.jobs.machinery import WAIT_S
+from tests.jobs.machinery import wait_until
 
 ADDRESS = "http://127.0.0.1:8000"
 
@@ -25,10 +24,7 @@ def test_request_decision_and_job_attempt_have_spans(tmp_path: Path) -> None:
         state: dict[str, Any] = client.get("/v1/worlds/main").json()["state"]
         client.post("/v1/task-selection", json=state)
         job = client.post("/v1/jobs", json={"kind": "evaluate", "protocol": "pick-single"})
-        give_up = time.monotonic() + WAIT_S
-        while client.get(job.headers["location"]).json()["attempt"] == 0:
-            assert time.monotonic() < give_up
-            time.sleep(0.05)
+        wait_until(lambda: client.get(job.headers["location"]).json()["attempt"])
         client.post(job.headers["location"] + "/cancel")
     spans = {span.name: span for span in exporter.get_finished_spans()}
     request, decision = spans["POST /v1/task-selection"], spans["decision"]

@@ -1,6 +1,5 @@
 """One running service for the tests of this folder: real store, supervisor, policy and cell."""
 
-import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -13,17 +12,15 @@ from app.api.services import Services
 from app.main import create_app
 from app.settings import Settings
 from tests.api.described import Answered, undescribed
-from tests.api.live_server import WARM_UP_S
+from tests.api.live_server import WARM_UP_S, served
+from tests.support.waiting import wait_until
 
 ADDRESS = "http://127.0.0.1:8000"
 
 
 def wait_until_ready(client: TestClient) -> None:
     """Wait for the kernels and the live cell."""
-    give_up = time.monotonic() + WARM_UP_S
-    while (answer := client.get("/readyz")).status_code != 200:
-        assert time.monotonic() < give_up, answer.text
-        time.sleep(0.05)
+    wait_until(lambda: client.get("/readyz").is_success, within_s=WARM_UP_S)
 
 
 @pytest.fixture(scope="package")
@@ -49,6 +46,13 @@ def require_description(app: FastAPI) -> Callable[[Answered], None]:
         assert fault is None, fault
 
     return check
+
+
+@pytest.fixture(scope="module")
+def address(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    """The address of a server of the module's own."""
+    with served(tmp_path_factory.mktemp("served")) as found:
+        yield found
 
 
 @pytest.fixture

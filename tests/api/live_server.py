@@ -2,16 +2,19 @@
 
 import contextlib
 import threading
-import time
 from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
 
 from fastapi import FastAPI
 
 from app.cli.preflight import address_of, listen
 from app.cli.uvicorn_server import Server, new_server
+from app.main import create_app
+from app.settings import Settings
 from tests.support import patient_http
+from tests.support.waiting import wait_until
 
-START_S = 30.0
 WARM_UP_S = 900.0
 """On a loaded machine, with every kernel to compile [s]."""
 
@@ -23,10 +26,8 @@ def running(app: FastAPI, *, root_path: str = "") -> Iterator[tuple[Server, str]
     server = new_server(app, root_path=root_path)
     thread = threading.Thread(target=server.run, kwargs={"sockets": [sock]})
     thread.start()
-    give_up = time.monotonic() + START_S
-    while not server.started:
-        assert thread.is_alive() and time.monotonic() < give_up
-        time.sleep(0.02)
+    wait_until(lambda: server.started or not thread.is_alive())
+    assert server.started
     try:
         yield server, address_of(sock)
     finally:
@@ -37,8 +38,13 @@ def running(app: FastAPI, *, root_path: str = "") -> Iterator[tuple[Server, str]
 
 def wait_until_ready(address: str, headers: dict[str, str] | None = None) -> None:
     """Wait for the kernels and the live cell."""
-    give_up = time.monotonic() + WARM_UP_S
     url = f"{address}/readyz"
-    while (answer := patient_http.get(url, headers=headers)).status_code != 200:
-        assert time.monotonic() < give_up, answer.text
-        time.sleep(0.05)
+    wait_until(lambda: patient_http.get(url, headers=headers).is_success, within_s=WARM_UP_S)
+
+
+@contextlib.contextmanager
+def served(data: Path, **settings: Any) -> Iterator[str]:
+    """Run a whole service on a free port; yields its address once it is ready."""
+    with running(create_app(Settings(data=data, **settings))) as (_, address):
+        wait_until_ready(address)
+        yield address

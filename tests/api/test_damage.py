@@ -1,6 +1,5 @@
 """Damaged checkpoints are never used, and errors name them."""
 
-import time
 from collections.abc import Iterator
 from itertools import count
 from pathlib import Path
@@ -21,6 +20,7 @@ from app.store.engine import Store
 from jobs.checkpoints import to_store
 from tests.api.conftest import ADDRESS, services_of, wait_until_ready
 from tests.support.damage import JSON, TENSORS, Change, cut, damage, flip
+from tests.support.waiting import wait_until
 
 SEEDS = count(1000)
 PLACES = {
@@ -76,10 +76,9 @@ def named(answer: Any, alias: str, sha256: str) -> bool:
 
 
 def test_start_heals_shipped_checkpoints_and_names_the_others(service: TestClient) -> None:
-    give_up = time.monotonic() + 60.0
-    while (ready := service.get("/readyz").json())["status"] == "ready":
-        assert time.monotonic() < give_up
-        time.sleep(0.05)
+    ready = wait_until(
+        lambda: service.get("/readyz").json(), lambda answer: answer["status"] != "ready"
+    )
     assert ready == {"status": "degraded", "damaged": ["mine"]}
     assert service.get("/healthz").status_code == 200
     answer = service.post("/v1/task-selection", json=state_of(service))

@@ -7,10 +7,8 @@ import pytest
 from app.api.schemas.trackers import TrackerCreate
 from app.client import Client, Refused
 from app.live.commands import PauseClock, ResumeClock
-from app.main import create_app
-from app.settings import Settings
 from jobs.spec import EvaluateSpec
-from tests.api.live_server import running, wait_until_ready
+from tests.api.live_server import served
 from tests.support.workshop import definition
 from tools.generate_client import TARGET, render
 
@@ -19,9 +17,7 @@ TOKEN = "a-token-of-some-length"
 
 @pytest.fixture(scope="module")
 def address(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
-    app = create_app(Settings(data=tmp_path_factory.mktemp("client"), token=TOKEN))
-    with running(app) as (_, found):
-        wait_until_ready(found)
+    with served(tmp_path_factory.mktemp("client"), token=TOKEN) as found:
         yield found
 
 

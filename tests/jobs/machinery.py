@@ -2,9 +2,9 @@
 
 import subprocess
 import sys
-import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -15,10 +15,12 @@ from app.store.records import JobRecord, NewJob
 from jobs.executor import PROJECT_ROOT
 from jobs.supervisor import Timeouts
 from tests.jobs.counting_worker import CHECKPOINT_EVERY, FACTOR, GRID, MODULUS
+from tests.support import waiting
 
 PATIENCE = Timeouts(tick_s=0.05, cancel_s=1.0, shutdown_s=5.0)
 WAIT_S = 600.0
 """Far above what anything takes, compiling kernels included; only a hang reaches it."""
+wait_until = partial(waiting.wait_until, within_s=WAIT_S)
 
 
 def queue(
@@ -35,22 +37,12 @@ def queue(
 
 
 def wait_for(store: Store, job_id: str, reached: Callable[[JobRecord], bool]) -> JobRecord:
-    deadline = time.monotonic() + WAIT_S
-    while time.monotonic() < deadline:
-        job = jobs.get_job(store, job_id)
-        if reached(job):
-            return job
-        assert not job.is_final, f"ended without getting there: {job}"
-        time.sleep(0.02)
-    raise AssertionError(f"not reached within {WAIT_S} s: {job}")
+    def reached_or_final(job: JobRecord) -> bool:
+        found = reached(job)
+        assert found or not job.is_final, f"ended without getting there: {job}"
+        return found
 
-
-def wait_until(reached: Callable[[], bool]) -> None:
-    """Wait until something is reached."""
-    deadline = time.monotonic() + WAIT_S
-    while not reached():
-        assert time.monotonic() < deadline
-        time.sleep(0.02)
+    return wait_until(lambda: jobs.get_job(store, job_id), reached_or_final)
 
 
 def wait_until_final(store: Store, job_id: str) -> JobRecord:

@@ -1,11 +1,10 @@
 import subprocess
 import sys
-import time
 
 import pytest
 
 from jobs.executor import PROJECT_ROOT
-from tests.jobs.machinery import WAIT_S, is_running
+from tests.jobs.machinery import is_running, wait_until
 
 SERVER = """
 import subprocess, sys, time
@@ -25,7 +24,4 @@ def test_child_that_still_imports_ends_with_its_server(age_s: float) -> None:
         pid = int(server.stdout.readline())
         server.stdout.readline()
         server.kill()
-    deadline = time.monotonic() + WAIT_S
-    while is_running(pid):
-        assert time.monotonic() < deadline
-        time.sleep(0.02)
+    wait_until(lambda: not is_running(pid))

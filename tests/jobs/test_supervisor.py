@@ -1,6 +1,5 @@
 import os
 import signal
-import time
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
@@ -23,6 +22,7 @@ from tests.jobs.machinery import (
     queue,
     supervisor_process,
     wait_for,
+    wait_until,
     wait_until_final,
     worker_pids,
 )
@@ -216,8 +216,7 @@ def test_server_paused_beyond_its_lease_stops_its_worker_and_waits(
         start_patiently(second)
         wait_for(store, job_id, lambda job: job.step == 65)
         paused.send_signal(signal.SIGCONT)
-        while is_running(pid):
-            time.sleep(0.02)
+        wait_until(lambda: not is_running(pid))
         job = jobs.get_job(store, job_id)
         assert (job.state, job.attempt, job.failures) == ("running", 2, 0)
         second.stop()
@@ -275,9 +274,6 @@ def test_worker_that_cannot_be_started_fails_the_job(
 def test_log_of_a_job_carries_its_id_in_each_line(store: Store, tmp_path: Path) -> None:
     job_id = queue(store, steps=20)
     wait_until_final(store, job_id)
-    started = time.monotonic()
     log = tmp_path / "logs" / f"{job_id}.log"
-    while "succeeded" not in log.read_text() and time.monotonic() - started < 10:
-        time.sleep(0.02)
-    lines = log.read_text().splitlines()
+    lines = wait_until(log.read_text, lambda text: "succeeded" in text).splitlines()
     assert lines and all(f"job_id={job_id} attempt=1" in line for line in lines)

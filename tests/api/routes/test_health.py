@@ -1,6 +1,7 @@
 import sqlite3
-import time
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 from fastapi.testclient import TestClient
@@ -8,8 +9,10 @@ from fastapi.testclient import TestClient
 from app.errors import Conflict
 from app.main import create_app
 from app.settings import Settings
+from tests.api.conftest import ADDRESS, wait_until_ready
+from tests.api.live_server import WARM_UP_S
+from tests.support.waiting import wait_until
 
-ADDRESS = "http://127.0.0.1:8000"
 SMALL = {"learning": {"n_envs": 8, "batch_size": 16}, "networks": {"width": 16}}
 """A training that begins and ends quickly; it is stopped long before its end."""
 
@@ -29,10 +32,7 @@ def test_service_says_that_it_warms_up_and_then_decides(cold_app_settings: Setti
         assert cold.get("/v1/worlds/main").status_code == 503
         assert cold.post("/v1/task-selection", json={}).status_code in (422, 503)
         assert cold.get("/").status_code == 200
-        give_up = time.monotonic() + 300.0
-        while cold.get("/readyz").status_code != 200:
-            assert time.monotonic() < give_up
-            time.sleep(0.05)
+        wait_until_ready(cold)
         assert cold.get("/v1/worlds/main").status_code == 200
 
 
@@ -60,23 +60,15 @@ def test_list_of_jobs_says_that_the_database_is_locked_and_the_start_waits(
         other = sqlite3.connect(file, isolation_level=None, timeout=60.0)
         other.execute("BEGIN IMMEDIATE")
 
-        def wait_for(waiting: str | None) -> None:
-            give_up = time.monotonic() + 300.0
-            while cold.get("/v1/jobs").json()["waiting"] != waiting:
-                assert time.monotonic() < give_up
-                time.sleep(0.05)
+        def listed(holds: Callable[[dict[str, Any]], bool]) -> dict[str, Any]:
+            return wait_until(lambda: cold.get("/v1/jobs").json(), holds, within_s=WARM_UP_S)
 
-        wait_for("database locked")
+        listed(lambda page: page["waiting"] == "database locked")
         refused = cold.post("/v1/jobs", json=body)
         assert (refused.status_code, refused.headers["retry-after"]) == (503, "2")
         assert refused.json()["type"] == "urn:tandem:problem:storage-unavailable"
         other.execute("ROLLBACK")
         other.close()
-        wait_for(None)
-        (job,) = cold.get("/v1/jobs").json()["items"]
-        give_up = time.monotonic() + 300.0
-        while job["state"] == "queued":
-            assert time.monotonic() < give_up
-            time.sleep(0.05)
-            (job,) = cold.get("/v1/jobs").json()["items"]
+        listed(lambda page: page["waiting"] is None)
+        (job,) = listed(lambda page: page["items"][0]["state"] != "queued")["items"]
         assert (job["id"], job["state"], job["failures"]) == (posted["id"], "running", 0)

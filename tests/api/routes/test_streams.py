@@ -5,20 +5,11 @@ from pathlib import Path
 from typing import Any
 
 import httpx
-import pytest
 
 from app.main import create_app
 from app.settings import Settings
 from tests.api.live_server import running, wait_until_ready
 from tests.support import patient_http
-
-
-@pytest.fixture(scope="module")
-def address(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
-    app = create_app(Settings(data=tmp_path_factory.mktemp("streams")))
-    with running(app) as (_, found):
-        wait_until_ready(found)
-        yield found
 
 
 def events(response: httpx.Response) -> Iterator[tuple[str, str, Any]]:

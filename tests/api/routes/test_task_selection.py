@@ -1,9 +1,10 @@
 import json
-import time
 from typing import Any
 
 import pytest
 from fastapi.testclient import TestClient
+
+from tests.support.waiting import wait_until
 
 URL = "/v1/task-selection"
 JSON = {"Content-Type": "application/json"}
@@ -35,10 +36,9 @@ def test_answer_names_the_choice_every_value_and_the_checkpoint(
 def test_state_of_a_world_gives_the_choice_and_values_that_the_world_shows(
     client: TestClient,
 ) -> None:
-    give_up = time.monotonic() + 60.0
-    while (world := client.get("/v1/worlds/main").json())["status"] != "moving":
-        assert time.monotonic() < give_up, world
-        time.sleep(0.02)
+    world = wait_until(
+        lambda: client.get("/v1/worlds/main").json(), lambda now: now["status"] == "moving"
+    )
     assert world["state"]["robot"] == world["robot"]
     for posted, shown in zip(world["state"]["people"], world["people"], strict=True):
         assert all(posted[name] == shown[name] for name in ("q", "qd", "size"))

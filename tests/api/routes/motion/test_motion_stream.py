@@ -2,7 +2,6 @@
 
 import json
 import threading
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -18,6 +17,7 @@ from app.api.sockets import MAX_MESSAGE, MAX_MESSAGE_BYTES, TOO_LARGE
 from app.main import create_app
 from app.settings import Settings
 from tests.api.live_server import running, wait_until_ready
+from tests.support.waiting import wait_until
 
 PATIENCE_S = 120.0
 NEVER_MS = 10_000
@@ -35,10 +35,7 @@ def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Services,
 def services(server: tuple[Services, str]) -> Iterator[Services]:
     """The parts of the running service, with the load of one that has just started."""
     found = server[0]
-    end = time.monotonic() + PATIENCE_S
-    while found.motion_load.share() > 0.0:
-        assert time.monotonic() < end, "a socket is still counted"
-        time.sleep(0.02)
+    wait_until(lambda: found.motion_load.share() == 0.0)
     found.motion_load = MotionLoad()
     yield found
 
@@ -66,10 +63,7 @@ def received(socket: ClientConnection) -> dict[str, Any]:
 
 def wait_until_deciding(services: Services) -> None:
     """Wait until a request is in the decision that is held."""
-    end = time.monotonic() + PATIENCE_S
-    while not services.motion_load.turn.locked():
-        assert time.monotonic() < end, "no request has arrived"
-        time.sleep(0.01)
+    wait_until(services.motion_load.turn.locked)
 
 
 def close_of(socket: ClientConnection) -> tuple[int, str]:
@@ -221,7 +215,4 @@ def test_client_that_leaves_while_its_request_is_decided_is_forgotten(
         send(socket)
         wait_until_deciding(services)
         threading.Thread(target=socket.close).start()
-    end = time.monotonic() + PATIENCE_S
-    while services.motion_load.n_open:
-        assert time.monotonic() < end, "the socket is still counted"
-        time.sleep(0.02)
+    wait_until(lambda: services.motion_load.n_open == 0)

@@ -1,5 +1,4 @@
 import time
-from collections.abc import Iterator
 from contextlib import ExitStack
 from pathlib import Path
 
@@ -22,14 +21,6 @@ from tests.support.listening_ports import listening_ports
 
 TOKEN = "a-token-of-some-length"
 PROTOCOL = Subprotocol(f"viser-v{viser.__version__}")
-
-
-@pytest.fixture(scope="module")
-def address(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
-    app = create_app(Settings(data=tmp_path_factory.mktemp("viewer")))
-    with running(app) as (_, found):
-        wait_until_ready(found)
-        yield found
 
 
 def open_socket(
