@@ -5,7 +5,7 @@ from fastapi.testclient import TestClient
 from app.live.commands import SetPolicy
 from app.store.checkpoints import drop_job_checkpoints
 from tests.api.conftest import services_of
-from tests.api.routes.worlds.test_worlds import COMMANDS, WORLD, until
+from tests.api.routes.worlds.live_world import WORLD, send, until
 
 LEARNING = {
     "total_steps": 1280,
@@ -37,14 +37,14 @@ def test_newest_checkpoint_of_a_training_acts_until_its_end(client: TestClient) 
     until(client, lambda world: world["checkpoint"] == last)
     refused = client.put(f"{WORLD}/follow", json={"job": job["id"]})
     assert (refused.status_code, refused.json()["field"]) == (409, "state")
-    client.post(COMMANDS, json={"tag": "set-policy", "checkpoint": "pick"})
+    send(client, tag="set-policy", checkpoint="pick")
 
 
 def test_following_ends_when_another_policy_is_chosen_or_asked_to(client: TestClient) -> None:
     job = client.post("/v1/jobs", json={**TRAIN, "priority": -100}).json()
     body = {"job": job["id"]}
     assert client.put(f"{WORLD}/follow", json=body).json()["active"]
-    client.post(COMMANDS, json={"tag": "set-policy", "checkpoint": "pick"})
+    send(client, tag="set-policy", checkpoint="pick")
     assert follow_of(client)["reason"] == "another policy was chosen"
     assert client.put(f"{WORLD}/follow", json=body).json()["active"]
     assert client.delete(f"{WORLD}/follow").status_code == 204
@@ -54,14 +54,14 @@ def test_following_ends_when_another_policy_is_chosen_or_asked_to(client: TestCl
     world.handle.submit(SetPolicy(checkpoint=None))  # as the 3D viewer, not by the API
     until(client, lambda _: not follow_of(client)["active"])
     assert follow_of(client)["reason"] == "another policy was chosen"
-    client.post(COMMANDS, json={"tag": "set-policy", "checkpoint": "pick"})
+    send(client, tag="set-policy", checkpoint="pick")
     client.post(f"/v1/jobs/{job['id']}/cancel")
 
 
 def test_own_policy_acts_again_where_a_restarted_training_lost_its_checkpoints(
     client: TestClient,
 ) -> None:
-    client.post(COMMANDS, json={"tag": "set-policy", "checkpoint": "pick"})
+    send(client, tag="set-policy", checkpoint="pick")
     long = {"learning": {**LEARNING, "total_steps": 128_000}}
     job = client.post("/v1/jobs", json={**TRAIN, "overrides": long}).json()
     client.put(f"{WORLD}/follow", json={"job": job["id"]})

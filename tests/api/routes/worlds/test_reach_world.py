@@ -1,7 +1,6 @@
 """The live world in a reach cell, over HTTP."""
 
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Any
 
 import pytest
@@ -12,10 +11,8 @@ from app.policies.checkpoints import pretrained
 from app.store.checkpoints import put_checkpoint
 from jobs.checkpoints import to_store
 from tests.api.conftest import services_of
+from tests.api.routes.worlds.live_world import COMMANDS, WORLD, send, until
 from tests.policies.untrained import untrained_reach
-
-WORLD = "/v1/worlds/main"
-COMMANDS = f"{WORLD}/commands"
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -25,18 +22,6 @@ def reach_cell(client: TestClient) -> Iterator[None]:
     send(client, tag="set-policy", checkpoint=None)
     yield
     client.put(f"{WORLD}/cell", json={"cell": "pick-and-place"}).raise_for_status()
-
-
-def send(client: TestClient, **command: Any) -> Any:
-    return client.post(COMMANDS, json=command)
-
-
-def until(client: TestClient, holds: Callable[[dict[str, Any]], bool]) -> dict[str, Any]:
-    give_up = time.monotonic() + 60.0
-    while not holds(world := client.get(WORLD).json()):
-        assert time.monotonic() < give_up, world["message"]
-        time.sleep(0.02)
-    return world
 
 
 def test_world_shows_goal_safety_layer_and_cylinders(client: TestClient) -> None:

@@ -1,14 +1,12 @@
 """The live world in a sorting cell, over HTTP."""
 
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Any
 
 import pytest
 from fastapi.testclient import TestClient
 
-WORLD = "/v1/worlds/main"
-COMMANDS = f"{WORLD}/commands"
+from tests.api.routes.worlds.live_world import COMMANDS, WORLD, send, until
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -30,18 +28,6 @@ def at_rest(client: TestClient) -> None:
         client,
         lambda now: now["sorting"]["goal"] == [] and not before.keys() & pieces(now).keys(),
     )
-
-
-def send(client: TestClient, **command: Any) -> Any:
-    return client.post(COMMANDS, json=command)
-
-
-def until(client: TestClient, holds: Callable[[dict[str, Any]], bool]) -> dict[str, Any]:
-    give_up = time.monotonic() + 30.0
-    while not holds(world := client.get(WORLD).json()):
-        assert time.monotonic() < give_up, world["sorting"]
-        time.sleep(0.02)
-    return world
 
 
 def pieces(world: dict[str, Any]) -> dict[str, Any]:

@@ -1,33 +1,18 @@
-import time
-from collections.abc import Callable
 from typing import Any
 
 import pytest
 from fastapi.testclient import TestClient
 
+from tests.api.routes.worlds.live_world import COMMANDS, WORLD, send, until
 from tests.sim.recorded_person import csv_text, working
 from tests.support import workshop
-
-WORLD = "/v1/worlds/main"
-COMMANDS = f"{WORLD}/commands"
-
-
-def until(
-    client: TestClient, holds: Callable[[dict[str, Any]], bool], within_s: float = 20.0
-) -> dict[str, Any]:
-    """Return the world's snapshot once ``holds`` says so."""
-    give_up = time.monotonic() + within_s
-    while not holds(world := client.get(WORLD).json()):
-        assert time.monotonic() < give_up, world
-        time.sleep(0.02)
-    return world
 
 
 @pytest.fixture(autouse=True)
 def fresh(client: TestClient) -> None:
-    client.post(COMMANDS, json={"tag": "set-mode", "mode": "manual"})
-    client.post(COMMANDS, json={"tag": "reset"})
-    client.post(COMMANDS, json={"tag": "resume"})
+    send(client, tag="set-mode", mode="manual")
+    send(client, tag="reset")
+    send(client, tag="resume")
     until(client, lambda world: not world["paused"] and world["mode"] == "manual")
 
 
@@ -39,42 +24,42 @@ def test_worlds_are_listed_with_their_viewer(client: TestClient) -> None:
 def test_clock_runs_until_it_is_paused(client: TestClient) -> None:
     start = client.get(WORLD).json()["tick"]
     until(client, lambda world: world["tick"] > start)
-    accepted = client.post(COMMANDS, json={"tag": "pause"})
+    accepted = send(client, tag="pause")
     assert accepted.status_code == 202
     paused = until(client, lambda world: world["paused"])
     assert client.get(WORLD).json()["tick"] == paused["tick"]
 
 
 def test_step_advances_a_paused_world_by_one_period(client: TestClient) -> None:
-    client.post(COMMANDS, json={"tag": "pause"})
+    send(client, tag="pause")
     before = until(client, lambda world: world["paused"])
-    client.post(COMMANDS, json={"tag": "step"})
+    send(client, tag="step")
     after = until(client, lambda world: world["tick"] > before["tick"])
     assert after["tick"] == before["tick"] + 1
     assert after["t_s"] - before["t_s"] == pytest.approx(0.05)
 
 
 def test_clock_runs_faster_when_asked_and_not_at_any_speed(client: TestClient) -> None:
-    client.post(COMMANDS, json={"tag": "set-speed", "factor": 2})
+    send(client, tag="set-speed", factor=2)
     until(client, lambda world: world["speed"] == 2)
-    client.post(COMMANDS, json={"tag": "set-speed", "factor": 1})
+    send(client, tag="set-speed", factor=1)
     until(client, lambda world: world["speed"] == 1)
-    refused = client.post(COMMANDS, json={"tag": "set-speed", "factor": 3})
+    refused = send(client, tag="set-speed", factor=3)
     assert refused.status_code == 422
     assert "factor" in refused.text
 
 
 def test_candidates_are_toggled(client: TestClient) -> None:
     before = client.get(WORLD).json()["selected"]
-    client.post(COMMANDS, json={"tag": "toggle-candidate", "id": before[0]})
+    send(client, tag="toggle-candidate", id=before[0])
     until(client, lambda world: before[0] not in world["selected"])
-    client.post(COMMANDS, json={"tag": "set-candidates", "ids": before})
+    send(client, tag="set-candidates", ids=before)
     until(client, lambda world: world["selected"] == before)
 
 
 def test_person_is_moved(client: TestClient) -> None:
     pelvis = [0.3, 1.5, -1.5708]
-    client.post(COMMANDS, json={"tag": "move-person", "pelvis": pelvis})
+    send(client, tag="move-person", pelvis=pelvis)
     moved = until(
         client, lambda world: abs(world["state"]["people"][0]["q"][0] - pelvis[0]) < 0.02
     )
@@ -82,9 +67,9 @@ def test_person_is_moved(client: TestClient) -> None:
 
 
 def test_acting_checkpoint_is_changed(client: TestClient) -> None:
-    client.post(COMMANDS, json={"tag": "set-policy", "checkpoint": None})
+    send(client, tag="set-policy", checkpoint=None)
     until(client, lambda world: world["checkpoint"] is None)
-    client.post(COMMANDS, json={"tag": "set-policy", "checkpoint": "pick"})
+    send(client, tag="set-policy", checkpoint="pick")
     until(client, lambda world: world["checkpoint"] is not None)
 
 
@@ -104,16 +89,14 @@ def test_checkpoint_that_acts_is_not_deleted(client: TestClient) -> None:
 
 def test_case_study_is_started(client: TestClient) -> None:
     case = client.get("/v1/cells/pick-and-place").json()["cases"][0]
-    client.post(COMMANDS, json={"tag": "start-case", "id": case["id"]})
+    send(client, tag="start-case", id=case["id"])
     started = until(client, lambda world: world["case"] == case["id"])
     assert sorted(started["selected"]) == sorted(case["goals"])
 
 
 def test_second_person_works_and_the_state_repeats_the_choice(client: TestClient) -> None:
-    client.post(COMMANDS, json={"tag": "add-person"})
-    client.post(
-        COMMANDS, json={"tag": "set-anthropometry", "person": 1, "stature": 95, "arms": 20}
-    )
+    send(client, tag="add-person")
+    send(client, tag="set-anthropometry", person=1, stature=95, arms=20)
 
     def there(now: dict[str, Any]) -> bool:
         tall = len(now["people"]) == 2 and now["people"][1]["anthropometry"]["stature"] == 95
@@ -132,8 +115,8 @@ def test_second_person_works_and_the_state_repeats_the_choice(client: TestClient
         values = {one["id"]: one["value"] for one in world["candidates"]}
         assert {one["id"]: one["value"] for one in asked["candidates"]} == values
     finally:
-        client.post(COMMANDS, json={"tag": "remove-person", "person": 1})
-        client.post(COMMANDS, json={"tag": "set-anthropometry", "stature": 50})
+        send(client, tag="remove-person", person=1)
+        send(client, tag="set-anthropometry", stature=50)
     until(client, lambda now: len(now["people"]) == 1)
 
 
@@ -146,7 +129,7 @@ def test_imported_motion_is_played(client: TestClient) -> None:
     )
     assert posted.status_code == 201
     try:
-        client.post(COMMANDS, json={"tag": "set-motion", "name": "played"})
+        send(client, tag="set-motion", name="played")
         moving = until(
             client, lambda now: (now["people"][0]["motion"] or {}).get("t_s", 0) > 0.3
         )
@@ -155,9 +138,9 @@ def test_imported_motion_is_played(client: TestClient) -> None:
         assert (motion["name"], motion["run"], motion["n_runs"]) == ("played", 0, 1)
         assert motion["duration_s"] == pytest.approx(3.98)
         assert moving["people"][0]["anthropometry"]["recorded"]
-        refused = client.post(COMMANDS, json={"tag": "set-motion", "name": "played", "run": 4})
+        refused = send(client, tag="set-motion", name="played", run=4)
         assert (refused.status_code, refused.json()["field"]) == (422, "run")
-        unknown = client.post(COMMANDS, json={"tag": "set-motion", "name": "unknown"}).json()
+        unknown = send(client, tag="set-motion", name="unknown").json()
         assert (unknown["field"], unknown["choices"]) == ("name", ["played"])
     finally:
         client.delete("/v1/recordings/played")
@@ -217,11 +200,9 @@ def test_world_restarts_in_a_cell_of_the_user(client: TestClient) -> None:
         assert (shown["status"], shown["selected"][0]) == ("no policy", "part0")
         assert client.get("/viewer/main/").status_code == 200
         assert client.delete("/v1/cells/workshop").status_code == 409
-        refused = client.post(COMMANDS, json={"tag": "set-policy", "checkpoint": "pick"})
+        refused = send(client, tag="set-policy", checkpoint="pick")
         assert refused.status_code == 422
-        assert (
-            client.post(COMMANDS, json={"tag": "start-case", "id": "case-1"}).status_code == 422
-        )
+        assert send(client, tag="start-case", id="case-1").status_code == 422
     finally:
         back = client.put(f"{WORLD}/cell", json={"cell": "pick-and-place"})
     assert back.json()["checkpoint"] is not None
