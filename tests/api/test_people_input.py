@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 import pytest
 from fastapi.testclient import TestClient
-from httpx import Response
 
 from app.sim.perception.keypoints import BODY_25, K
+from tests.api.answers import content_of, post_json
 from tests.api.routes.test_task_selection import URL, refused
 from tests.sim.postures import FRAMES
 from tests.sim.tracked_person import CELL, seen, work
@@ -25,10 +25,7 @@ def without(*names: str) -> list[Any]:
 
 
 def asked(client: TestClient, state: dict[str, Any], *people: Any) -> dict[str, Any]:
-    answer = client.post(URL, json={**state, "people": list(people)})
-    assert answer.status_code == 200, answer.text
-    found: dict[str, Any] = answer.json()
-    return found
+    return content_of(client.post(URL, json={**state, "people": list(people)}))
 
 
 def values(answer: dict[str, Any]) -> list[float]:
@@ -107,11 +104,10 @@ def test_given_velocities_give_speeds(client: TestClient, state: dict[str, Any])
     assert values(answer) != values(still)
 
 
-def post_text(client: TestClient, state: dict[str, Any], points: str) -> Response:
+def asked_in_text(client: TestClient, state: dict[str, Any], points: str) -> dict[str, Any]:
     """Post key-points as other tools write them, with tokens that strict JSON lacks."""
     body = json.dumps({**state, "people": [{"keypoints": "POINTS"}]})
-    text = body.replace('"POINTS"', points)
-    return client.post(URL, content=text, headers={"Content-Type": "application/json"})
+    return content_of(post_json(client, URL, body.replace('"POINTS"', points)))
 
 
 @pytest.mark.parametrize(
@@ -130,10 +126,9 @@ def test_a_missing_keypoint_is_missing_however_it_is_written(
 ) -> None:
     points = [json.dumps(point) for point in POINTS]
     points[K["elbow_r"]] = points[K["wrist_r"]] = missing
-    answer = post_text(client, state, f"[{', '.join(points)}]")
+    answer = asked_in_text(client, state, f"[{', '.join(points)}]")
     same = asked(client, state, {"keypoints": without("elbow_r", "wrist_r")})
-    assert answer.status_code == 200, answer.text
-    assert answer.json()["people"] == same["people"]
+    assert answer["people"] == same["people"]
     assert same["people"][0]["missing"] == ["elbow_r", "wrist_r"]
     assert same["people"][0]["flags"] == same["people"][0]["unusable"] == []
 
@@ -149,9 +144,7 @@ def test_a_keypoint_that_cannot_be_used_costs_that_one_and_is_named(
 ) -> None:
     points = [json.dumps(point) for point in POINTS]
     points[K["wrist_r"]] = unusable
-    answer = post_text(client, state, f"[{', '.join(points)}]")
-    assert answer.status_code == 200, answer.text
-    use = answer.json()["people"][0]
+    use = asked_in_text(client, state, f"[{', '.join(points)}]")["people"][0]
     assert use["unusable"] == use["missing"] == ["wrist_r"] and use["implausible"] is None
 
 
@@ -200,9 +193,7 @@ def test_velocities_are_missing_or_unusable_as_keypoints_are(
     client: TestClient, state: dict[str, Any], velocity: str, speeds: str, named: bool
 ) -> None:
     person = f'{json.dumps(POINTS)}, "velocities": [{", ".join([velocity] * 25)}]'
-    answer = post_text(client, state, person)
-    assert answer.status_code == 200, answer.text
-    use = answer.json()["people"][0]
+    use = asked_in_text(client, state, person)["people"][0]
     assert use["speeds"] == speeds and ("velocity of neck" in use["unusable"]) is named
 
 

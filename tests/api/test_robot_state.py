@@ -8,6 +8,7 @@ from fastapi.testclient import TestClient
 from app.api.schemas.robot_state import ROS_NAMES
 from app.sim.cells.cell import load_cell
 from app.sim.human import model as human
+from tests.api.answers import content_of, problem_of
 from tests.api.conftest import ADDRESS
 
 SOCKET = ADDRESS.replace("http", "ws") + "/v1/motion/stream"
@@ -37,18 +38,13 @@ def url(request: pytest.FixtureRequest) -> str:
 
 
 def asked(client: TestClient, url: str, **changes: Any) -> dict[str, Any]:
-    answer = client.post(url, json={**TASKS[url], **changes})
-    assert answer.status_code == 200, answer.text
-    found: dict[str, Any] = answer.json()
+    found = content_of(client.post(url, json={**TASKS[url], **changes}))
     found.pop("elapsed_ms")
     return found
 
 
 def refused(client: TestClient, url: str, **changes: Any) -> dict[str, Any]:
-    answer = client.post(url, json={**TASKS[url], **changes})
-    assert answer.status_code == 422, answer.text
-    problem: dict[str, Any] = answer.json()
-    return problem
+    return problem_of(client.post(url, json={**TASKS[url], **changes}))
 
 
 def robot(url: str, **changes: Any) -> dict[str, Any]:

@@ -8,6 +8,7 @@ from fastapi.testclient import TestClient
 
 from app.api.texts import MAX_DEPTH, fault_in_address, fault_in_json
 from app.store.cursors import decode_cursor, encode_cursor
+from tests.api.answers import problem_of
 
 FAULTS: list[tuple[bytes, str, str]] = [
     (b"\xff", "body", "UTF-8"),
@@ -98,9 +99,7 @@ def test_integers_beyond_64_bits_are_refused_with_the_bound(
         assert "9223372036854775807" in answer.json()["rule"]
     for path in ("/v1/jobs", "/v1/checkpoints"):
         for cursor in (encode_cursor(number), encode_cursor(-number), encode_cursor(-1)):
-            answer = client.get(path, params={"cursor": cursor})
-            assert answer.status_code == 422
-            assert answer.json()["field"] == "cursor"
+            assert problem_of(client.get(path, params={"cursor": cursor}))["field"] == "cursor"
     assert client.get(f"{url}/metrics", params={"after_step": 2**63 - 1}).json()["items"] == []
 
 

@@ -6,6 +6,7 @@ import pytest
 from fastapi.testclient import TestClient
 
 from app.sim.cells.cell import cell_names
+from tests.api.answers import post_json, problem_of
 from tests.support import workshop
 
 
@@ -72,9 +73,7 @@ def test_all_faults_of_a_cell_come_back_at_once(client: TestClient) -> None:
     cell["stations"][0]["position"] = [-450, 620, 120]
     cell["robot"]["dt"] = 50.0
     cell["wheels"] = 4
-    answer = client.post("/v1/cells", json=cell)
-    assert answer.status_code == 422
-    problem = answer.json()
+    problem = problem_of(client.post("/v1/cells", json=cell))
     assert problem["type"] == "urn:tandem:problem:invalid-input"
     errors = {error["field"]: error for error in problem["errors"]}
     assert set(errors) == {
@@ -97,10 +96,7 @@ def test_all_faults_of_a_cell_come_back_at_once(client: TestClient) -> None:
     ],
 )
 def test_body_that_is_no_cell_is_named(client: TestClient, content: bytes, rule: str) -> None:
-    headers = {"Content-Type": "application/json"}
-    answer = client.post("/v1/cells", content=content, headers=headers)
-    assert answer.status_code == 422
-    assert rule in answer.json()["detail"]
+    assert rule in problem_of(post_json(client, "/v1/cells", content))["detail"]
 
 
 def test_description_of_the_api_tells_the_fields_of_a_cell(client: TestClient) -> None:

@@ -6,6 +6,7 @@ from fastapi.testclient import TestClient
 
 from app.store.jobs import create_job
 from app.store.records import NewJob
+from tests.api.answers import post_json, problem_of
 from tests.api.conftest import services_of
 from tests.sim.recorded_person import csv_text, working
 
@@ -65,18 +66,15 @@ def test_same_key_never_makes_a_second_job(client: TestClient) -> None:
 def test_bad_training_is_refused_by_field(
     client: TestClient, change: dict[str, Any], field: str
 ) -> None:
-    answer = client.post("/v1/jobs", json={**TRAIN, **change})
-    assert answer.status_code == 422
-    problem = answer.json()
+    problem = problem_of(client.post("/v1/jobs", json={**TRAIN, **change}))
     assert problem["field"] == field
     assert problem["rule"]
 
 
 def test_override_that_is_not_finite_is_refused(client: TestClient) -> None:
     body = '{"kind": "train", "preset": "pick-td3", "overrides": {"learning": {"gamma": NaN}}}'
-    answer = client.post("/v1/jobs", content=body, headers={"Content-Type": "application/json"})
-    assert answer.status_code == 422
-    assert answer.json()["field"] == "overrides.learning.gamma"
+    problem = problem_of(post_json(client, "/v1/jobs", body))
+    assert problem["field"] == "overrides.learning.gamma"
 
 
 @pytest.mark.parametrize(
@@ -190,9 +188,7 @@ def test_list_shows_the_parts_of_one_job_only(client: TestClient) -> None:
     ("query", "field"), [("limit=0", "limit"), ("cursor=x", "cursor"), ("state=odd", "state")]
 )
 def test_bad_query_is_refused_by_field(client: TestClient, query: str, field: str) -> None:
-    answer = client.get(f"/v1/jobs?{query}")
-    assert answer.status_code == 422
-    assert answer.json()["field"] == field
+    assert problem_of(client.get(f"/v1/jobs?{query}"))["field"] == field
 
 
 def test_unknown_job_is_not_found_on_every_route(client: TestClient) -> None:

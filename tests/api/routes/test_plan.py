@@ -6,22 +6,17 @@ import pytest
 from fastapi.testclient import TestClient
 
 from app.api.schemas.examples import PLAN
+from tests.api.answers import content_of, problem_of
 
 URL = "/v1/plan"
 
 
 def asked(client: TestClient, **changes: Any) -> dict[str, Any]:
-    answer = client.post(URL, json=PLAN | changes)
-    assert answer.status_code == 200, answer.text
-    found: dict[str, Any] = answer.json()
-    return found
+    return content_of(client.post(URL, json=PLAN | changes))
 
 
 def refused(client: TestClient, status: int = 422, **changes: Any) -> dict[str, Any]:
-    answer = client.post(URL, json=PLAN | changes)
-    assert answer.status_code == status, answer.text
-    problem: dict[str, Any] = answer.json()
-    return problem
+    return problem_of(client.post(URL, json=PLAN | changes), status)
 
 
 def test_answer_names_symbol_object_place_and_first_segment(client: TestClient) -> None:

@@ -1,5 +1,7 @@
 from fastapi.testclient import TestClient
 
+from tests.api.answers import problem_of
+
 
 def test_report_is_a_page_with_figures_that_loads_nothing(client: TestClient) -> None:
     job = client.post("/v1/jobs", json={"kind": "report", "name": "<b>x</b>"}).json()
@@ -17,8 +19,7 @@ def test_report_is_a_page_with_figures_that_loads_nothing(client: TestClient) ->
 def test_report_without_a_page_and_other_jobs_are_refused(client: TestClient) -> None:
     body = {"kind": "report", "measure": True, "priority": -100}
     report = client.post("/v1/jobs", json=body).json()
-    refused = client.get(f"/v1/jobs/{report['id']}/report")
-    assert (refused.status_code, refused.json()["field"]) == (409, "state")
+    assert problem_of(client.get(f"/v1/jobs/{report['id']}/report"), 409)["field"] == "state"
     client.post(f"/v1/jobs/{report['id']}/cancel")
     client.get(f"/v1/jobs/{report['id']}/events")  # ends with its evaluations
     evaluation = {"kind": "evaluate", "protocol": "pick-single", "priority": -100}

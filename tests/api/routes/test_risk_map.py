@@ -8,6 +8,7 @@ from fastapi.testclient import TestClient
 
 from app.api.schemas.examples import RISK_MAP, TASK_SELECTION
 from app.sim.human import model as human
+from tests.api.answers import content_of
 
 URL = "/v1/risk-map"
 
@@ -19,10 +20,7 @@ def person(x: float, y: float, yaw: float = -1.4) -> dict[str, Any]:
 
 
 def mapped(client: TestClient, **changes: Any) -> dict[str, Any]:
-    answer = client.post(URL, json=RISK_MAP | changes)
-    assert answer.status_code == 200, answer.text
-    found: dict[str, Any] = answer.json()
-    return found
+    return content_of(client.post(URL, json=RISK_MAP | changes))
 
 
 @pytest.mark.parametrize("objective", ["value", "success", "time"])

@@ -12,10 +12,10 @@ from app.policies.configs.sorting import SortingPreset
 from app.policies.training.sorting import start
 from app.sim.cells.cell import load_cell
 from jobs.checkpoints import to_store
+from tests.api.answers import content_of, post_json, problem_of
 from tests.api.conftest import services_of
 
 URL = "/v1/sorting"
-JSON = {"Content-Type": "application/json"}
 ALIAS = "untrained-sorting"
 
 TASK: dict[str, Any] = {
@@ -45,19 +45,11 @@ def checkpoint(client: TestClient) -> str:
 
 
 def asked(client: TestClient, body: dict[str, Any]) -> dict[str, Any]:
-    answer = client.post(URL, json=body)
-    assert answer.status_code == 200, answer.text
-    found: dict[str, Any] = answer.json()
-    return found
+    return content_of(client.post(URL, json=body))
 
 
 def refused(client: TestClient, body: Any, status: int = 422) -> dict[str, Any]:
-    content = body if isinstance(body, str) else json.dumps(body)
-    answer = client.post(URL, content=content, headers=JSON)
-    assert answer.status_code == status, answer.text
-    assert answer.headers["content-type"] == "application/problem+json"
-    problem: dict[str, Any] = answer.json()
-    return problem
+    return problem_of(post_json(client, URL, body), status)
 
 
 def carried_out(task: dict[str, Any], move: dict[str, Any]) -> dict[str, Any]:

@@ -4,6 +4,7 @@ from typing import Any
 import pytest
 from fastapi.testclient import TestClient
 
+from tests.api.answers import post_json, problem_of
 from tests.support.waiting import wait_until
 
 URL = "/v1/task-selection"
@@ -11,11 +12,7 @@ JSON = {"Content-Type": "application/json"}
 
 
 def refused(client: TestClient, body: Any, status: int = 422) -> dict[str, Any]:
-    content = body if isinstance(body, str) else json.dumps(body)
-    answer = client.post(URL, content=content, headers=JSON)
-    assert answer.status_code == status, answer.text
-    assert answer.headers["content-type"] == "application/problem+json"
-    problem: dict[str, Any] = answer.json()
+    problem = problem_of(post_json(client, URL, body), status)
     assert {"field", "value", "rule", "choices"} <= problem.keys()
     return problem
 

@@ -1,11 +1,11 @@
 """Requests of ``POST /v1/motion`` and its socket, and what is refused."""
 
-import json
 from typing import Any
 
 from fastapi.testclient import TestClient
 
 from app.sim.cells.cell import load_cell
+from tests.api.answers import content_of, post_json, problem_of
 from tests.api.conftest import ADDRESS
 
 URL, STREAM = "/v1/motion", "/v1/motion/stream"
@@ -29,19 +29,11 @@ TASK: dict[str, Any] = {
 
 
 def asked(client: TestClient, **changes: Any) -> dict[str, Any]:
-    answer = client.post(URL, json={**TASK, **changes})
-    assert answer.status_code == 200, answer.text
-    found: dict[str, Any] = answer.json()
-    return found
+    return content_of(client.post(URL, json={**TASK, **changes}))
 
 
 def refused(client: TestClient, status: int = 422, **changes: Any) -> dict[str, Any]:
-    content = json.dumps({**TASK, **changes})
-    answer = client.post(URL, content=content, headers={"Content-Type": "application/json"})
-    assert answer.status_code == status, answer.text
-    assert answer.headers["content-type"] == "application/problem+json"
-    problem: dict[str, Any] = answer.json()
-    return problem
+    return problem_of(post_json(client, URL, {**TASK, **changes}), status)
 
 
 BAD: list[tuple[dict[str, Any], int, str]] = [

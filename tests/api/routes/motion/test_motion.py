@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from fastapi.testclient import TestClient
 
+from tests.api.answers import post_json
 from tests.api.routes.motion.motion_requests import (
     BAD,
     BOX,
@@ -241,9 +242,7 @@ def test_whatever_numbers_come_the_answer_is_an_answer_or_a_named_problem(
         for _ in range(rng.integers(1, 3)):
             where, n = places[rng.integers(len(places))]
             where[rng.integers(n)] = strange[rng.integers(len(strange))]
-        answer = client.post(
-            URL, content=json.dumps(body), headers={"Content-Type": "application/json"}
-        )
+        answer = post_json(client, URL, body)
         statuses.append(answer.status_code)
         assert answer.status_code in (200, 422), answer.text
         if answer.status_code == 422:

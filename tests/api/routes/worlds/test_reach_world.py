@@ -10,6 +10,7 @@ from app.api.registry import REACH_ALIAS
 from app.policies.checkpoints import pretrained
 from app.store.checkpoints import put_checkpoint
 from jobs.checkpoints import to_store
+from tests.api.answers import problem_of
 from tests.api.conftest import services_of
 from tests.api.routes.worlds.live_world import COMMANDS, WORLD, send, until
 from tests.policies.untrained import untrained_reach
@@ -99,8 +100,7 @@ def test_policy_is_named_and_queried_in_its_inference_modes(client: TestClient) 
 def test_bad_command_is_refused_by_field(
     client: TestClient, command: dict[str, Any], field: str
 ) -> None:
-    refused = client.post(COMMANDS, json=command)
-    assert (refused.status_code, refused.json()["field"]) == (422, field)
+    assert problem_of(client.post(COMMANDS, json=command))["field"] == field
 
 
 def test_goal_outside_says_which_axis_and_by_how_much(client: TestClient) -> None:
@@ -118,8 +118,7 @@ def test_policy_that_chooses_tasks_cannot_reach(client: TestClient) -> None:
 
 def test_reach_commands_need_a_reach_cell(client: TestClient) -> None:
     client.put(f"{WORLD}/cell", json={"cell": "pick-and-place"}).raise_for_status()
-    refused = send(client, tag="set-walking-speed", speed=0.5)
-    assert (refused.status_code, refused.json()["field"]) == (422, "tag")
+    assert problem_of(send(client, tag="set-walking-speed", speed=0.5))["field"] == "tag"
     shown = client.put(f"{WORLD}/cell", json={"cell": "shared-workspace"})
     assert shown.status_code == 200
     assert shown.json()["checkpoint"] == pretrained.load(REACH_ALIAS).sha256

@@ -3,6 +3,7 @@ from typing import Any
 import pytest
 from fastapi.testclient import TestClient
 
+from tests.api.answers import post_json, problem_of
 from tests.api.routes.worlds.live_world import COMMANDS, WORLD, send, until
 from tests.sim.recorded_person import csv_text, working
 from tests.support import workshop
@@ -171,16 +172,12 @@ def test_imported_motion_is_played(client: TestClient) -> None:
 def test_bad_command_is_refused_by_field(
     client: TestClient, command: dict[str, Any], field: str
 ) -> None:
-    answer = client.post(COMMANDS, json=command)
-    assert answer.status_code == 422
-    assert answer.json()["field"] == field
+    assert problem_of(client.post(COMMANDS, json=command))["field"] == field
 
 
 def test_infinite_position_is_refused(client: TestClient) -> None:
     body = '{"tag": "move-person", "right": [Infinity, 0.0, 0.3]}'
-    answer = client.post(COMMANDS, content=body, headers={"Content-Type": "application/json"})
-    assert answer.status_code == 422
-    assert answer.json()["field"] == "right[0]"
+    assert problem_of(post_json(client, COMMANDS, body))["field"] == "right[0]"
 
 
 def test_unknown_world_is_not_found(client: TestClient) -> None:
