@@ -12,6 +12,7 @@ from app.live import commands
 from app.live.command_checks import Command
 from app.live.factory import new_world
 from app.sim.cells.cell import load_cell
+from tests.web.conftest import node
 from tests.web.viewer_client import ViewerClient
 from web.viewer.scene.cell_scene import CellScene
 from web.viewer.server import ViewerServer
@@ -51,13 +52,6 @@ LIVES: dict[str, Sequence[Command]] = {
 }
 
 
-@pytest.fixture
-def server() -> Iterator[ViewerServer]:
-    server = ViewerServer()
-    yield server
-    server.stop()
-
-
 def cases() -> Iterator[object]:
     """Yield cells and lives; the reach cell's people are cylinders, which keep their size."""
     for cell in ("pick-and-place", "shared-workspace", "sorting-e0"):
@@ -93,8 +87,7 @@ def test_skinned_meshes_stay(server: ViewerServer, cell: str, life: Sequence[Com
     people = {person.id for person in world.snapshot().people}
     for name in skinned:
         id = int(name.split("/")[2])
-        frame = server.scene.get_handle_by_name(f"/people/{id}")
-        assert frame is not None and frame.visible == (id in people)
+        assert node(server, f"/people/{id}").visible == (id in people)
 
 
 def test_person_of_a_reused_number_has_its_own_size_place_and_feet(
@@ -112,9 +105,7 @@ def test_person_of_a_reused_number_has_its_own_size_place_and_feet(
             scene.draw(world.snapshot(), cell.robot.dt)
 
     def height() -> float:
-        jacket = server.scene.get_handle_by_name("/people/1/jacket")
-        assert jacket is not None
-        return float(np.ptp(jacket.vertices[:, 2]))
+        return float(np.ptp(node(server, "/people/1/jacket").vertices[:, 2]))
 
     act(commands.AddPerson())
     median = height()
@@ -125,7 +116,5 @@ def test_person_of_a_reused_number_has_its_own_size_place_and_feet(
     assert height() > 1.04 * median
     act(commands.RemovePerson(person=1), commands.AddPerson())
     assert height() == pytest.approx(median)
-    shoe = server.scene.get_handle_by_name("/people/1/shoe_l")
-    person = world.snapshot().people[1]
-    assert shoe is not None
+    shoe, person = node(server, "/people/1/shoe_l"), world.snapshot().people[1]
     assert float(np.hypot(*(shoe.position[:2] - person.posture[:2]))) < 0.5

@@ -2,7 +2,6 @@
 
 import random
 import threading
-import time
 from collections.abc import Sequence
 from pathlib import Path
 from types import TracebackType
@@ -13,6 +12,8 @@ import viser
 import zstandard
 from websockets.sync.client import unix_connect
 from websockets.typing import Subprotocol
+
+from tests.support.waiting import wait_until
 
 
 def messages_of(frame: bytes) -> list[dict[str, Any]]:
@@ -76,12 +77,7 @@ class ViewerClient:
 
     def wait_for(self, type: str, name: str) -> None:
         """Wait until a message of a type that concerns a node has come."""
-        end = time.monotonic() + 10.0
-        while not any(
-            one["type"] == type and one.get("name") == name for one in list(self.received)
-        ):
-            assert time.monotonic() < end, f"no {type} of {name}"
-            time.sleep(0.02)
+        wait_until(lambda: any(one.get("name") == name for one in self.heard(type)))
 
     def look(self, fov: float) -> None:
         """Say where the camera is, with a field of view [rad]."""
@@ -100,14 +96,13 @@ class ViewerClient:
 
     def wait_until_heard(self, server: viser.ViserServer) -> None:
         """Wait until the server has handled all that was sent before."""
-        end = time.monotonic() + 10.0
         fov = 0.5 + 0.1 * random.random()
         self.look(fov)
-        while not any(
-            abs(one.camera.fov - fov) < 1e-9 for one in server.get_clients().values()
-        ):
-            assert time.monotonic() < end, "the viewer does not hear"
-            time.sleep(0.02)
+        wait_until(
+            lambda: any(
+                abs(one.camera.fov - fov) < 1e-9 for one in server.get_clients().values()
+            )
+        )
 
     def click(self, name: str) -> None:
         self.send(

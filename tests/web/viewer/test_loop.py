@@ -1,6 +1,6 @@
 import stat
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -15,10 +15,9 @@ from app.sim.human import model as human
 from app.sim.pick.task_policy import Decision
 from tests.support.listening_ports import listening_ports
 from tests.support.straight_policy import StraightPolicy
+from tests.support.waiting import wait_until
 from tests.web.viewer_client import ViewerClient
 from web.viewer.loop import LiveCell
-
-WAIT_S = 10.0
 
 
 @pytest.fixture(scope="module")
@@ -30,22 +29,15 @@ def live() -> Iterator[LiveCell]:
     live.stop()
 
 
-def wait_for(condition: Callable[[], bool]) -> None:
-    end = time.monotonic() + WAIT_S
-    while not condition():
-        assert time.monotonic() < end, "it never happened"
-        time.sleep(0.01)
-
-
 def test_world_ticks_without_any_client(live: LiveCell) -> None:
     first = live.handle.snapshot()
-    wait_for(lambda: live.handle.snapshot().tick >= first.tick + 20)
+    wait_until(lambda: live.handle.snapshot().tick >= first.tick + 20)
     assert live.handle.snapshot().t_s > first.t_s
 
 
 def test_simulated_time_never_runs_ahead_of_the_clock(live: LiveCell) -> None:
     start, first = time.monotonic(), live.handle.snapshot().tick
-    wait_for(lambda: live.handle.snapshot().tick >= first + 15)
+    wait_until(lambda: live.handle.snapshot().tick >= first + 15)
     elapsed = time.monotonic() - start
     ticks = live.handle.snapshot().tick - first
     assert ticks * 0.05 <= elapsed + 0.3
@@ -67,7 +59,7 @@ def test_commands_are_carried_out_in_order(live: LiveCell) -> None:
     live.handle.submit(commands.SetCandidates(ids=("cube1",)))
     live.handle.submit(commands.ToggleCandidate(id="cube2"))
     live.handle.submit(commands.ToggleCandidate(id="cube1"))
-    wait_for(lambda: live.handle.snapshot().selected == ("cube2",))
+    wait_until(lambda: live.handle.snapshot().selected == ("cube2",))
 
 
 def test_snapshot_says_which_commands_it_shows(live: LiveCell) -> None:
@@ -75,12 +67,12 @@ def test_snapshot_says_which_commands_it_shows(live: LiveCell) -> None:
     numbers = [live.handle.submit(commands.ToggleCandidate(id="cube3")) for _ in range(3)]
     assert numbers == list(range(numbers[0], numbers[0] + 3))
     before = live.handle.snapshot().selected
-    wait_for(lambda: live.handle.snapshot().commands >= numbers[-1])
+    wait_until(lambda: live.handle.snapshot().commands >= numbers[-1])
     assert ("cube3" in live.handle.snapshot().selected) != ("cube3" in before)
     with pytest.raises(InvalidInput):
         live.handle.submit(commands.RemovePerson(person=3))
     assert live.handle.submit(commands.ResumeClock()) == numbers[-1] + 1
-    wait_for(lambda: live.handle.snapshot().commands == numbers[-1] + 1)
+    wait_until(lambda: live.handle.snapshot().commands == numbers[-1] + 1)
     assert live.handle.snapshot().refused == ()
 
 
@@ -96,7 +88,7 @@ def refused_of(*places: str) -> list[tuple[int, str]]:
         block = commands_of_sorting.AddObject(colour="red", size="large", at=place)
         live.handle.submit(block)
     live.start()
-    wait_for(lambda: live.handle.snapshot().commands == cleared + len(places))
+    wait_until(lambda: live.handle.snapshot().commands == cleared + len(places))
     live.stop()
     found = live.handle.snapshot().refused
     return [(one.number - cleared, one.reason) for one in found]
@@ -123,27 +115,27 @@ def test_bad_commands_are_refused_at_the_door(live: LiveCell) -> None:
 def test_person_can_be_changed_as_soon_as_it_was_added(live: LiveCell) -> None:
     live.handle.submit(commands.AddPerson())
     live.handle.submit(commands.SetAnthropometry(person=1, stature=90.0))
-    wait_for(lambda: live.handle.snapshot().people[-1].anthropometry.stature == 90.0)
+    wait_until(lambda: live.handle.snapshot().people[-1].anthropometry.stature == 90.0)
     live.handle.submit(commands.RemovePerson(person=1))
     with pytest.raises(InvalidInput, match="no person"):
         live.handle.submit(commands.SetMode(person=1, mode="still"))
-    wait_for(lambda: len(live.handle.snapshot().people) == 1)
+    wait_until(lambda: len(live.handle.snapshot().people) == 1)
 
 
 def test_click_on_a_cube_toggles_it_as_candidate(live: LiveCell) -> None:
     live.handle.submit(commands.SetCandidates(ids=("cube0",)))
-    wait_for(lambda: live.handle.snapshot().selected == ("cube0",))
+    wait_until(lambda: live.handle.snapshot().selected == ("cube0",))
     with ViewerClient(live.viewer_address) as visitor:
         visitor.click("/stations/cube3")
-        wait_for(lambda: live.handle.snapshot().selected == ("cube0", "cube3"))
+        wait_until(lambda: live.handle.snapshot().selected == ("cube0", "cube3"))
         visitor.click("/stations/cube0")
-        wait_for(lambda: live.handle.snapshot().selected == ("cube3",))
+        wait_until(lambda: live.handle.snapshot().selected == ("cube3",))
 
 
 def test_drag_of_a_hand_moves_the_person(live: LiveCell) -> None:
     live.handle.submit(commands.SetMode(mode="manual"))
     live.handle.submit(commands.MovePerson(pelvis=(0.0, 1.3, -1.5708)))
-    wait_for(lambda: abs(live.handle.snapshot().people[0].q[1] - 1.3) < 0.02)
+    wait_until(lambda: abs(live.handle.snapshot().people[0].q[1] - 1.3) < 0.02)
 
     def away() -> float:
         person = live.handle.snapshot().people[0]
@@ -152,7 +144,7 @@ def test_drag_of_a_hand_moves_the_person(live: LiveCell) -> None:
 
     with ViewerClient(live.viewer_address) as visitor:
         visitor.drag("/gizmos/0/right", [(-0.1, 0.95, 0.3), (-0.15, 0.9, 0.25)])
-        wait_for(lambda: away() < 0.03)
+        wait_until(lambda: away() < 0.03)
 
 
 def test_drag_beyond_the_hall_takes_the_person_as_far_as_it_may_walk(live: LiveCell) -> None:
@@ -161,7 +153,7 @@ def test_drag_beyond_the_hall_takes_the_person_as_far_as_it_may_walk(live: LiveC
     farthest = live.cell.human.y_max
     with ViewerClient(live.viewer_address) as visitor:
         visitor.drag("/gizmos/0/pelvis", [(0.0, 1e4, 0.9)])
-        wait_for(lambda: live.handle.snapshot().people[0].q[1] > farthest)
+        wait_until(lambda: live.handle.snapshot().people[0].q[1] > farthest)
 
 
 def test_drag_of_a_person_who_leaves_meanwhile_is_no_error(
@@ -169,11 +161,11 @@ def test_drag_of_a_person_who_leaves_meanwhile_is_no_error(
 ) -> None:
     live.handle.submit(commands.AddPerson())
     live.handle.submit(commands.SetMode(person=1, mode="manual"))
-    wait_for(lambda: len(live.handle.snapshot().people) == 2)
+    wait_until(lambda: len(live.handle.snapshot().people) == 2)
     server = live._server
     assert server is not None
     with ViewerClient(live.viewer_address) as visitor:
-        visitor.wait_for("TransformControlsMessage", "/gizmos/1/pelvis")
+        visitor.wait_until("TransformControlsMessage", "/gizmos/1/pelvis")
         visitor.send(
             type="TransformControlsDragStartMessage", name="/gizmos/1/pelvis", owner=""
         )
@@ -181,7 +173,7 @@ def test_drag_of_a_person_who_leaves_meanwhile_is_no_error(
         live.handle.submit(commands.RemovePerson(person=1))
         visitor.drag("/gizmos/1/pelvis", [(0.0, 1.5, 0.9)])
         visitor.wait_until_heard(server)
-    wait_for(lambda: len(live.handle.snapshot().people) == 1)
+    wait_until(lambda: len(live.handle.snapshot().people) == 1)
     assert capsys.readouterr().err == ""  # viser prints what callbacks raise
 
 
@@ -201,7 +193,7 @@ def test_command_that_fails_is_named_and_the_next_ones_are_carried_out() -> None
     live.handle.submit(commands.RemovePerson(person=1))
     last = live.handle.submit(commands.SetMode(mode="still"))
     live.start()
-    wait_for(lambda: live.handle.snapshot().commands == last)
+    wait_until(lambda: live.handle.snapshot().commands == last)
     now = live.handle.snapshot()
     live.stop()
     [refused] = now.refused
@@ -214,19 +206,19 @@ def test_nothing_is_drawn_without_a_viewer_but_the_first_one_sees_the_present() 
     live.start()
     server = live._server
     assert server is not None
-    wait_for(lambda: not server.is_current.is_set())
+    wait_until(lambda: not server.is_current.is_set())
     drawn = server._websock_server.get_message_buffer().message_counter
     live.handle.submit(commands.AddPerson())
-    wait_for(lambda: len(live.handle.snapshot().people) == 2)
+    wait_until(lambda: len(live.handle.snapshot().people) == 2)
     tick = live.handle.snapshot().tick
-    wait_for(lambda: live.handle.snapshot().tick >= tick + 10)
+    wait_until(lambda: live.handle.snapshot().tick >= tick + 10)
     assert server._websock_server.get_message_buffer().message_counter == drawn
     with ViewerClient(live.viewer_address) as visitor:
-        wait_for(lambda: bool(visitor.heard("ReplayDoneMessage")))
+        wait_until(lambda: bool(visitor.heard("ReplayDoneMessage")))
         types = [one["type"] for one in visitor.received]
         at_first = visitor.received[: types.index("ReplayDoneMessage")]
         assert "/gizmos/1" in {one.get("name") for one in at_first}
-    wait_for(lambda: not server.has_viewers)
+    wait_until(lambda: not server.has_viewers)
     live.stop()
 
 
@@ -244,7 +236,7 @@ def test_stop_ends_thread_and_viewer() -> None:
 
 def test_faster_clock_takes_so_many_steps_between_two_pictures(live: LiveCell) -> None:
     live.handle.submit(commands.SetSpeed(factor=4))
-    wait_for(lambda: live.handle.snapshot().speed == 4)
+    wait_until(lambda: live.handle.snapshot().speed == 4)
     first = live.handle.snapshot().tick
     seen = set[int]()
 
@@ -252,7 +244,7 @@ def test_faster_clock_takes_so_many_steps_between_two_pictures(live: LiveCell) -
         seen.add(live.handle.snapshot().tick)
         return len(seen) >= 5
 
-    wait_for(look)
+    wait_until(look)
     live.handle.submit(commands.SetSpeed(factor=1))
-    wait_for(lambda: live.handle.snapshot().speed == 1)
+    wait_until(lambda: live.handle.snapshot().speed == 1)
     assert {(tick - first) % 4 for tick in seen} == {0}

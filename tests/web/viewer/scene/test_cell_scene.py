@@ -1,21 +1,18 @@
-from collections.abc import Iterator
-
 import numpy as np
 import pytest
 import viser
 
 from app.live import commands
-from app.live.command_checks import Command
 from app.live.pick.world import LivePickWorld
 from app.sim.cells.cell import Cell, load_cell
 from app.sim.human import model as human
 from app.sim.robot.ur10 import LINK_NAMES, Robot
 from tests.support.straight_policy import StraightPolicy
+from tests.web.conftest import node
 from web.viewer.capsules_view import HIT
 from web.viewer.scene.arc import dashes
 from web.viewer.scene.cell_scene import PATH_LIFT, CellScene
 from web.viewer.scene.stations_view import GOALS, IDLE
-from web.viewer.server import ViewerServer
 
 
 @pytest.fixture(scope="module")
@@ -23,32 +20,9 @@ def cell() -> Cell:
     return load_cell()
 
 
-@pytest.fixture(scope="module")
-def server() -> Iterator[ViewerServer]:
-    server = ViewerServer()
-    yield server
-    server.stop()
-
-
-@pytest.fixture(scope="module")
-def queued() -> list[Command]:
-    return []
-
-
-@pytest.fixture(scope="module")
-def scene(server: viser.ViserServer, cell: Cell, queued: list[Command]) -> CellScene:
-    return CellScene(server, cell, queued.append)
-
-
 @pytest.fixture
 def world(cell: Cell) -> LivePickWorld:
     return LivePickWorld(cell, StraightPolicy(cell), seed=2)
-
-
-def node(server: viser.ViserServer, name: str) -> viser.SceneNodeHandle:
-    handle = server.scene.get_handle_by_name(name)
-    assert handle is not None, name
-    return handle
 
 
 def test_links_are_placed_where_pinocchio_says(

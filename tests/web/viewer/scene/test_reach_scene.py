@@ -1,7 +1,5 @@
 import time
-from collections.abc import Iterator
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -13,44 +11,26 @@ from app.live.commands import SetSafety
 from app.live.reach.commands import MoveGoal, goal_box
 from app.live.reach.world import LiveReachWorld
 from app.live.snapshot import WorldSnapshot
-from app.sim.cells.cell import load_cell
+from app.sim.cells.cell import Cell, load_cell
+from tests.web.conftest import node
 from tests.web.viewer_client import ViewerClient
 from web.viewer.people.mannequin import VESTS
 from web.viewer.scene.cell_scene import CellScene
 from web.viewer.scene.reach_scene import N_GAUGE, OFF, OVERRIDES, blend, override_color
 from web.viewer.scene.stations_view import HIT
-from web.viewer.server import ViewerServer
 
 CELL = load_cell("shared-workspace")
 WAIT_S = 10.0
 
 
 @pytest.fixture(scope="module")
-def server() -> Iterator[ViewerServer]:
-    server = ViewerServer()
-    yield server
-    server.stop()
-
-
-@pytest.fixture(scope="module")
-def queued() -> list[Command]:
-    return []
-
-
-@pytest.fixture(scope="module")
-def scene(server: viser.ViserServer, queued: list[Command]) -> CellScene:
-    return CellScene(server, CELL, queued.append)
+def cell() -> Cell:
+    return CELL
 
 
 @pytest.fixture
 def world() -> LiveReachWorld:
     return LiveReachWorld(CELL, None, seed=3)
-
-
-def node(server: viser.ViserServer, name: str) -> Any:
-    handle = server.scene.get_handle_by_name(name)
-    assert handle is not None, name
-    return handle
 
 
 def slowed(snapshot: WorldSnapshot, override: float) -> WorldSnapshot:

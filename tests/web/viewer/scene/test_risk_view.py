@@ -1,23 +1,14 @@
 """Risk map in the scene: its colours, and where robot and person touch."""
 
-from collections.abc import Iterator
-
 import numpy as np
-import pytest
 
 from app.live.pick.risk_worker import GRID
 from app.sim.pick.task_policy import RiskMap
+from tests.web.conftest import node
 from web.viewer.scene.risk_view import COLOURS, NODE, NOTHING, RiskView, colours_of
 from web.viewer.server import ViewerServer
 
 N = len(GRID.x) * len(GRID.y)
-
-
-@pytest.fixture
-def server() -> Iterator[ViewerServer]:
-    server = ViewerServer()
-    yield server
-    server.stop()
 
 
 def risk(contact: np.ndarray | None, clearance: np.ndarray) -> RiskMap:
@@ -38,7 +29,7 @@ def test_colours_go_from_one_end_of_the_scale_to_the_other() -> None:
 
 def test_rows_of_the_picture_run_along_y(server: ViewerServer) -> None:
     view = RiskView(server)
-    image = server.scene.get_handle_by_name(f"{NODE}/map")
+    image = node(server, f"{NODE}/map")
     contact, clearance = np.zeros(GRID.shape), np.ones(GRID.shape)
     contact[0, -1], clearance[-1, 0] = 0.4, -0.01
     view.draw(risk(contact.ravel(), clearance.ravel()))
@@ -53,4 +44,4 @@ def test_rows_of_the_picture_run_along_y(server: ViewerServer) -> None:
 def test_without_probabilities_nothing_is_drawn(server: ViewerServer) -> None:
     view = RiskView(server)
     view.draw(risk(None, np.ones(N)))
-    assert not server.scene.get_handle_by_name(f"{NODE}/map").image.any()
+    assert not node(server, f"{NODE}/map").image.any()

@@ -1,5 +1,3 @@
-import time
-from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
@@ -14,13 +12,12 @@ from app.live.snapshot import WorldSnapshot
 from app.live.sorting.commands import ToggleGoal
 from app.live.sorting.snapshot import HELD, SortingSnapshot
 from app.sim.cells.cell import Cell, load_cell
+from tests.support.waiting import wait_until
+from tests.web.conftest import node
 from tests.web.sorting_views import a_view, centre, piece
 from tests.web.viewer_client import ViewerClient
 from web.viewer.scene.cell_scene import CellScene
 from web.viewer.scene.sorting_bodies import BLOCKS, FAILURES, failure_color
-from web.viewer.server import ViewerServer
-
-WAIT_S = 10.0
 
 
 @pytest.fixture(scope="module")
@@ -29,31 +26,8 @@ def cell() -> Cell:
 
 
 @pytest.fixture(scope="module")
-def server() -> Iterator[ViewerServer]:
-    server = ViewerServer()
-    yield server
-    server.stop()
-
-
-@pytest.fixture(scope="module")
-def queued() -> list[Command]:
-    return []
-
-
-@pytest.fixture(scope="module")
-def scene(server: viser.ViserServer, cell: Cell, queued: list[Command]) -> CellScene:
-    return CellScene(server, cell, queued.append)
-
-
-@pytest.fixture(scope="module")
 def still() -> WorldSnapshot:
     return LivePickWorld(load_cell(), None, seed=2).snapshot()
-
-
-def node(server: viser.ViserServer, name: str) -> Any:
-    handle = server.scene.get_handle_by_name(name)
-    assert handle is not None, name
-    return handle
 
 
 def test_cells_are_coloured_by_how_often_grasps_fail(
@@ -165,7 +139,5 @@ def test_click_on_a_block_puts_it_into_the_goal_or_out(
     scene.draw(replace(still, sorting=a_view(cell)), 0.05)
     with ViewerClient(server.address) as visitor:
         visitor.click("/blocks/block3")
-        end = time.monotonic() + WAIT_S
-        while not queued and time.monotonic() < end:
-            time.sleep(0.01)
+        wait_until(lambda: queued)
     assert queued == [ToggleGoal(id="block3")]

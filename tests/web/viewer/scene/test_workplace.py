@@ -1,20 +1,10 @@
-from collections.abc import Iterator
-
 import numpy as np
-import pytest
 import viser
 
 from app.sim.cells.cell import load_cell
 from app.sim.cells.parts import Obstacle
+from tests.web.conftest import node
 from web.viewer.scene import workplace
-from web.viewer.server import ViewerServer
-
-
-@pytest.fixture
-def server() -> Iterator[ViewerServer]:
-    server = ViewerServer()
-    yield server
-    server.stop()
 
 
 def test_obstacles_stand_where_the_cell_has_them(server: viser.ViserServer) -> None:
@@ -23,8 +13,7 @@ def test_obstacles_stand_where_the_cell_has_them(server: viser.ViserServer) -> N
     )
     cell = load_cell("shared-workspace").model_copy(update={"obstacles": (box,)})
     workplace.build(server, cell)
-    handle = server.scene.get_handle_by_name("/obstacles/rack")
-    assert handle is not None
+    handle = node(server, "/obstacles/rack")
     np.testing.assert_allclose(handle.position, [0.6, 0.1, 0.2])
     np.testing.assert_allclose(handle.wxyz, [np.cos(0.5), 0.0, 0.0, np.sin(0.5)], atol=1e-12)
     np.testing.assert_allclose(handle.dimensions, [0.2, 0.4, 0.6])
