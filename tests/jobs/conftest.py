@@ -7,7 +7,7 @@ import pytest
 from app.store.engine import Store
 from jobs.executor import LocalProcess
 from jobs.supervisor import Supervisor
-from tests.jobs.machinery import PATIENCE
+from tests.jobs.machinery import supervised
 from tests.jobs.supervisor_process import COUNTING
 from tests.support.databases import database_url, migrated, postgresql, store
 from tests.support.trainings import Made, made_undisturbed
@@ -21,16 +21,10 @@ def executor(store: Store, tmp_path: Path) -> LocalProcess:
 
 
 @pytest.fixture
-def supervisor(
-    store: Store,
-    tmp_path: Path,
-    executor: LocalProcess,
-) -> Iterator[Supervisor]:
+def supervisor(store: Store, tmp_path: Path, executor: LocalProcess) -> Iterator[Supervisor]:
     """A supervisor that runs counting jobs."""
-    started = Supervisor(store, tmp_path, executor=executor, timeouts=PATIENCE)
-    started.start()
-    yield started
-    started.stop()
+    with supervised(store, tmp_path, executor=executor) as started:
+        yield started
 
 
 @pytest.fixture(scope="session")

@@ -13,7 +13,7 @@ from app.store.database.lease import LEASE_S
 from app.store.engine import Store
 from app.store.records import JobRecord, NewJob
 from jobs.executor import PROJECT_ROOT
-from jobs.supervisor import Timeouts
+from jobs.supervisor import Supervisor, Timeouts
 from tests.jobs.counting_worker import CHECKPOINT_EVERY, FACTOR, GRID, MODULUS
 from tests.support import waiting
 
@@ -98,6 +98,19 @@ def _is_worker(folder: Path) -> bool:
         return b"--job" in (folder / "cmdline").read_bytes()
     except OSError:
         return False
+
+
+@contextmanager
+def supervised(
+    store: Store, folder: Path, *, timeouts: Timeouts = PATIENCE, **options: Any
+) -> Iterator[Supervisor]:
+    """Run a supervisor in this process until the end of the block."""
+    supervisor = Supervisor(store, folder, timeouts=timeouts, **options)
+    supervisor.start()
+    try:
+        yield supervisor
+    finally:
+        supervisor.stop()
 
 
 @contextmanager

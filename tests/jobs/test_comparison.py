@@ -10,6 +10,7 @@ from app.store import attempts, completion, jobs
 from app.store.engine import Store
 from jobs.comparison import band, compare, curves_as_csv
 from jobs.spec import TrainSpec, parse_spec
+from tests.support.databases import claimed
 
 
 def trained(store: Store, seed: int, values: list[float | None], **changes: Any) -> str:
@@ -17,8 +18,7 @@ def trained(store: Store, seed: int, values: list[float | None], **changes: Any)
     overrides = {"learning": changes} if changes else {}
     spec = TrainSpec(kind="train", preset="pick-td3", seed=seed, overrides=overrides)
     job = jobs.create_job(store, spec.new_job())
-    found = attempts.claim_next(store)
-    assert found is not None
+    found = claimed(store)
     for place, value in enumerate(values):
         attempts.record_progress(
             store, found[0], 10 * (place + 1), {"success": value, "reward": -1.0}

@@ -28,11 +28,12 @@ from tests.jobs.machinery import (
     PATIENCE,
     assert_counted_once,
     queue,
+    supervised,
     wait_for,
     wait_until,
     wait_until_final,
 )
-from tests.support.databases import SQLITE_ONLY
+from tests.support.databases import SQLITE_ONLY, claimed
 
 pytestmark = SQLITE_ONLY  # its limits and locks are those of a file
 
@@ -63,10 +64,8 @@ def impatient(store: Store, tmp_path: Path) -> Iterator[Supervisor]:
     short = Store(f"{store.url}?timeout=0.2")
     executor = LocalProcess(short.url, tmp_path, "tests.jobs.counting_worker")
     timeouts = replace(PATIENCE, silence_s=1.0, retry_s=0.1)
-    supervisor = Supervisor(short, tmp_path, executor=executor, timeouts=timeouts)
-    supervisor.start()
-    yield supervisor
-    supervisor.stop()
+    with supervised(short, tmp_path, executor=executor, timeouts=timeouts) as supervisor:
+        yield supervisor
     short.close()
 
 
@@ -114,13 +113,9 @@ def test_job_that_waits_for_room_can_be_stopped(
 def test_queue_waits_while_the_disk_has_too_little_room(
     store: Store, tmp_path: Path, executor: LocalProcess
 ) -> None:
-    supervisor = Supervisor(
-        store, tmp_path, executor=executor, timeouts=PATIENCE, min_free_bytes=1 << 62
-    )
-    supervisor.start()
-    job_id = queue(store, steps=20)
-    wait_until(lambda: supervisor.waiting == "disk full")
-    supervisor.stop()
+    with supervised(store, tmp_path, executor=executor, min_free_bytes=1 << 62) as supervisor:
+        job_id = queue(store, steps=20)
+        wait_until(lambda: supervisor.waiting == "disk full")
     assert jobs.get_job(store, job_id).attempt == 0
 
 
@@ -151,12 +146,10 @@ def test_worker_that_cannot_be_started_for_now_is_started_later(
 ) -> None:
     executor = Exhausted(store, tmp_path, error)
     timeouts = replace(PATIENCE, retry_s=0.2)
-    supervisor = Supervisor(store, tmp_path, executor=executor, timeouts=timeouts)
     job_id = queue(store, steps=20)
-    supervisor.start()
-    wait_until(lambda: supervisor.waiting == reason)
-    job = wait_until_final(store, job_id)
-    supervisor.stop()
+    with supervised(store, tmp_path, executor=executor, timeouts=timeouts) as supervisor:
+        wait_until(lambda: supervisor.waiting == reason)
+        job = wait_until_final(store, job_id)
     assert (job.state, job.attempt, job.failures) == ("succeeded", 5, 0)
 
 
@@ -207,8 +200,7 @@ def test_error_at_any_write_of_a_worker_loses_nothing(
     store: Store, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, place: str, error: str
 ) -> None:
     job_id = queue(store, seed=7, steps=60)
-    found = attempts.claim_next(store)
-    assert found is not None
+    found = claimed(store)
     worker = JobWorker(StoreAccess(store, tmp_path, found[0]))
     monkeypatch.setattr(jobs_worker, "RETRY_S", 0.01)
     n, commit = 0, store.engine.dialect.do_commit

@@ -9,6 +9,7 @@ from app.store import attempts, completion, jobs
 from app.store.engine import Store
 from app.store.records import NewCheckpoint, NewJob, ResumeState
 from jobs.resume_files import KEEP_UNKNOWN_S, folder_of, remove_unneeded
+from tests.support.databases import claimed
 
 
 def with_file(data_dir: Path, job_id: str) -> Path:
@@ -23,9 +24,7 @@ def test_files_go_with_their_job_and_after_its_success(store: Store, tmp_path: P
     paths = {}
     for name in ("succeeded", "running"):
         jobs.create_job(store, NewJob(kind="count", spec={}))
-        found = attempts.claim_next(store)
-        assert found is not None
-        claim = found[0]
+        claim, _ = claimed(store)
         resume = ResumeState(step=10, manifest={}, tensors=b"r")
         attempts.record_checkpoint(store, claim, 10, policy, resume)
         if name == "succeeded":

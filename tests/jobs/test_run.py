@@ -20,7 +20,7 @@ from jobs.recording_catalog import RecordingCatalog
 from jobs.spec import parse_spec
 from jobs.supervisor import Supervisor
 from tests.jobs.machinery import (
-    PATIENCE,
+    supervised,
     wait_for,
     wait_until,
     wait_until_final,
@@ -36,10 +36,8 @@ from tests.support.trainings import Made, made_by, train
 @pytest.fixture
 def supervisor(store: Store, tmp_path: Path) -> Iterator[Supervisor]:
     """A supervisor that runs real jobs."""
-    started = Supervisor(store, tmp_path, timeouts=PATIENCE)
-    started.start()
-    yield started
-    started.stop()
+    with supervised(store, tmp_path) as started:
+        yield started
 
 
 @SQLITE_ONLY

@@ -20,6 +20,7 @@ from tests.jobs.machinery import (
     assert_counted_once,
     is_running,
     queue,
+    supervised,
     supervisor_process,
     wait_for,
     wait_until,
@@ -117,14 +118,12 @@ def test_worker_without_a_sign_of_life_is_killed_and_the_job_goes_on(
     store: Store, tmp_path: Path, executor: LocalProcess
 ) -> None:
     timeouts = replace(PATIENCE, silence_s=20.0)
-    supervisor = Supervisor(store, tmp_path, executor=executor, timeouts=timeouts)
-    supervisor.start()
-    job_id = queue(store, steps=100, hold_at=[27])
-    wait_for(store, job_id, lambda job: job.step == 25)
-    (pid,) = worker_pids(os.getpid())
-    os.kill(pid, signal.SIGSTOP)
-    job = wait_until_final(store, job_id)
-    supervisor.stop()
+    with supervised(store, tmp_path, executor=executor, timeouts=timeouts):
+        job_id = queue(store, steps=100, hold_at=[27])
+        wait_for(store, job_id, lambda job: job.step == 25)
+        (pid,) = worker_pids(os.getpid())
+        os.kill(pid, signal.SIGSTOP)
+        job = wait_until_final(store, job_id)
     assert (job.state, job.attempt, job.failures) == ("succeeded", 2, 1)
 
 
@@ -132,18 +131,14 @@ def test_stopped_server_queues_its_job_again_and_the_next_one_finishes_it(
     store: Store, tmp_path: Path, executor: LocalProcess
 ) -> None:
     job_id = queue(store, steps=100, hold_at=[27])
-    first = Supervisor(store, tmp_path, executor=executor, timeouts=PATIENCE)
-    first.start()
-    wait_for(store, job_id, lambda job: job.step == 25)
-    first.stop()
+    with supervised(store, tmp_path, executor=executor):
+        wait_for(store, job_id, lambda job: job.step == 25)
     job = jobs.get_job(store, job_id)
     resume = attempts.load_resume(store, job_id)
     assert (job.state, job.failures) == ("queued", 0)
     assert resume is not None and resume.step == 27
-    second = Supervisor(store, tmp_path, executor=executor, timeouts=PATIENCE)
-    second.start()
-    assert wait_until_final(store, job_id).failures == 0
-    second.stop()
+    with supervised(store, tmp_path, executor=executor):
+        assert wait_until_final(store, job_id).failures == 0
     assert [row.step for row in metrics.list_metrics(store, job_id)] == list(range(5, 101, 5))
 
 
@@ -263,10 +258,8 @@ def test_worker_that_cannot_be_started_fails_the_job(
     store: Store, tmp_path: Path, executor: LocalProcess
 ) -> None:
     (tmp_path / "logs").write_text("no folder")
-    supervisor = Supervisor(store, tmp_path, executor=executor, timeouts=PATIENCE)
-    supervisor.start()
-    job = wait_until_final(store, queue(store, steps=20))
-    supervisor.stop()
+    with supervised(store, tmp_path, executor=executor):
+        job = wait_until_final(store, queue(store, steps=20))
     assert job.error is not None and "could not be started" in job.error
 
 

@@ -1,9 +1,9 @@
 import pytest
 
-from app.store import attempts, jobs
+from app.store import jobs
 from app.store.engine import Store
 from app.store.records import Claim, NewJob
-from tests.support.databases import database_url, migrated, postgresql, store
+from tests.support.databases import claimed, database_url, migrated, postgresql, store
 
 __all__ = ["database_url", "migrated", "postgresql", "store"]
 
@@ -12,6 +12,4 @@ __all__ = ["database_url", "migrated", "postgresql", "store"]
 def claim(store: Store) -> Claim:
     """A running job."""
     jobs.create_job(store, NewJob(kind="count", spec={"kind": "count"}))
-    found = attempts.claim_next(store)
-    assert found is not None
-    return found[0]
+    return claimed(store)[0]

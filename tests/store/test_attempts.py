@@ -9,6 +9,7 @@ from app.storage_errors import StaleAttempt
 from app.store import attempts, checkpoints, completion, events, fencing, jobs, metrics
 from app.store.engine import Store
 from app.store.records import Claim, NewCheckpoint, NewJob, ResumeState
+from tests.support.databases import claimed
 
 
 def policy(content: bytes = b"x") -> NewCheckpoint:
@@ -31,9 +32,7 @@ def curve(store: Store, claim: Claim) -> list[int]:
 
 def claim_again(store: Store) -> Claim:
     completion.requeue_orphans(store)
-    found = attempts.claim_next(store)
-    assert found is not None
-    return found[0]
+    return claimed(store)[0]
 
 
 def test_jobs_are_claimed_in_the_order_of_submission(store: Store) -> None:
@@ -276,8 +275,7 @@ def test_worker_killed_after_a_cancel_cancels_its_job_at_the_last_failure_too(
     store: Store, claim: Claim
 ) -> None:
     completion.crash(store, claim, "killed", max_failures=2)
-    found = attempts.claim_next(store)
-    assert found is not None
+    found = claimed(store)
     jobs.request_cancel(store, claim.job_id)
     job = completion.crash(store, found[0], "killed by SIGTERM", max_failures=2)
     assert (job.state, job.error) == ("cancelled", None)

@@ -1,9 +1,10 @@
 import pytest
 
 from app.errors import Conflict, NotFound
-from app.store import attempts, cells, completion, jobs
+from app.store import cells, completion, jobs
 from app.store.engine import Store
 from app.store.records import NewJob
+from tests.support.databases import claimed
 
 KITCHEN = {"name": "kitchen", "stations": [{"id": "cup", "position": [0.1, 0.2, 0.3]}]}
 
@@ -45,8 +46,7 @@ def test_cell_stays_while_a_job_waits_or_trains_in_it(store: Store) -> None:
     jobs.create_job(store, NewJob(kind="train", spec={}, overrides={"cell": "kitchen"}))
     with pytest.raises(Conflict, match="in use by job"):
         cells.remove_cell(store, "kitchen")
-    found = attempts.claim_next(store)
-    assert found is not None
+    found = claimed(store)
     with pytest.raises(Conflict, match="in use by job"):
         cells.remove_cell(store, "kitchen")
     completion.finish(store, found[0])

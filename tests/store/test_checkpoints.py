@@ -5,6 +5,7 @@ from app.errors import InvalidInput, NotFound
 from app.store import attempts, checkpoints, completion, jobs
 from app.store.engine import Store
 from app.store.records import Claim, NewCheckpoint, NewJob, ResumeState
+from tests.support.databases import claimed
 
 
 def policy(content: bytes) -> NewCheckpoint:
@@ -14,9 +15,7 @@ def policy(content: bytes) -> NewCheckpoint:
 
 def second_job(store: Store) -> Claim:
     jobs.create_job(store, NewJob(kind="count", spec={}))
-    found = attempts.claim_next(store)
-    assert found is not None
-    return found[0]
+    return claimed(store)[0]
 
 
 def test_checkpoint_of_a_job_is_found_by_its_hash(store: Store, claim: Claim) -> None:

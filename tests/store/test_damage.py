@@ -16,6 +16,7 @@ from app.store import attempts, cells, checkpoints, completion, jobs, metrics, r
 from app.store.database.migrate import alembic_config, migrate
 from app.store.engine import Store
 from app.store.records import Claim, NewCheckpoint, NewRecording, ResumeState
+from tests.store.test_attempts import claim_again
 from tests.support.damage import JSON, TENSORS, Change, cut, damage, flip
 from tests.support.databases import SQLITE_ONLY
 
@@ -128,13 +129,6 @@ def train_on(store: Store, claim: Claim, *steps: int) -> None:
         attempts.record_progress(store, claim, step, {"reward": float(step)})
         state = ResumeState(step=step, manifest={"n": 1}, tensors=CONTENT + bytes([step]))
         attempts.record_checkpoint(store, claim, step, policy(step), state)
-
-
-def claim_again(store: Store) -> Claim:
-    completion.requeue_orphans(store)
-    found = attempts.claim_next(store)
-    assert found is not None
-    return found[0]
 
 
 @pytest.mark.parametrize(("column", "change"), every({"tensors": TENSORS, "manifest": JSON}))

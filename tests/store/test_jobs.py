@@ -4,6 +4,7 @@ from app.errors import Conflict, InvalidInput, NotFound
 from app.store import attempts, completion, jobs
 from app.store.engine import Store
 from app.store.records import Claim, NewJob
+from tests.support.databases import claimed
 
 
 def queue(store: Store, n: int = 1) -> list[str]:
@@ -128,8 +129,7 @@ def test_succeeded_evaluations_are_selected_by_protocol_and_checkpoint(store: St
     made = []
     for protocol, checkpoint in (("a", "1"), ("b", "1"), ("b", "2")):
         jobs.create_job(store, NewJob(kind="evaluate", spec={"protocol": protocol}))
-        found = attempts.claim_next(store)
-        assert found is not None
+        found = claimed(store)
         result = {"protocol": protocol, "checkpoint": checkpoint}
         completion.finish(store, found[0], result=result)
         made.append(found[0].job_id)

@@ -15,6 +15,7 @@ from app.store import (
 from app.store.engine import Store
 from app.store.records import Claim, NewJob, ResumeState
 from tests.store.test_checkpoints import policy, second_job
+from tests.support.databases import claimed
 
 
 def save(store: Store, claim: Claim, step: int, content: bytes) -> str:
@@ -145,8 +146,7 @@ def test_parts_of_a_job_that_has_not_ended_are_kept(store: Store, claim: Claim) 
     sweep = jobs.create_job(store, NewJob(kind="sweep", spec={}))
     composed_jobs.start(store, sweep.id)
     part = jobs.create_job(store, NewJob(kind="count", spec={}, part_of=sweep.id, trial=1))
-    found = attempts.claim_next(store)
-    assert found is not None
+    found = claimed(store)
     completion.finish(store, found[0])
     with pytest.raises(WrongState, match="sweep 2 has not ended and needs it; cancel 2 first"):
         retention.delete_job(store, part.id, {})

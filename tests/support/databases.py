@@ -8,8 +8,10 @@ from pathlib import Path
 import pytest
 import sqlalchemy as sa
 
+from app.store import attempts
 from app.store.database.migrate import migrate
 from app.store.engine import Store
+from app.store.records import Claim, JobRecord
 from tests.support.postgresql_server import TEMPLATE, PostgresqlServer, postgresql_server
 
 SQLITE_ONLY = pytest.mark.parametrize("database_url", ["sqlite"], indirect=True)
@@ -49,6 +51,13 @@ def store(database_url: str) -> Iterator[Store]:
     opened = Store(database_url)
     yield opened
     opened.close()
+
+
+def claimed(store: Store) -> tuple[Claim, JobRecord]:
+    """Claim the next job, which must be there."""
+    found = attempts.claim_next(store)
+    assert found is not None
+    return found
 
 
 def wait_until_lease_expires(store: Store) -> None:

@@ -8,8 +8,7 @@ from app.policies.configs.presets import nested
 from app.store import checkpoints, jobs
 from app.store.engine import Store
 from jobs.spec import parse_spec
-from jobs.supervisor import Supervisor
-from tests.jobs.machinery import PATIENCE, wait_until_final
+from tests.jobs.machinery import supervised, wait_until_final
 
 TINY = {
     "learning.total_steps": 2048,
@@ -49,10 +48,8 @@ def made_by(store: Store, job_id: str) -> Made:
 
 def made_undisturbed(store: Store, folder: Path) -> Made:
     """Run the training in a process of this machine to its end."""
-    supervisor = Supervisor(store, folder, timeouts=PATIENCE)
-    supervisor.start()
-    job = wait_until_final(store, train(store))
-    supervisor.stop()
+    with supervised(store, folder):
+        job = wait_until_final(store, train(store))
     made = made_by(store, job.id)
     assert job.state == "succeeded" and len(made.checkpoints) == 4
     return made

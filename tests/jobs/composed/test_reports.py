@@ -11,6 +11,7 @@ from app.store.engine import Store
 from app.store.records import JobRecord
 from jobs.composed.reports import Reports
 from jobs.spec import parse_spec
+from tests.support.databases import claimed
 
 
 def post(store: Store, **changes: Any) -> JobRecord:
@@ -29,9 +30,7 @@ def parts_of(store: Store, report: JobRecord) -> list[JobRecord]:
 
 def run_one(store: Store) -> JobRecord:
     """Run the next queued evaluation; each states a success of 12.34 %."""
-    found = attempts.claim_next(store)
-    assert found is not None
-    claim, job = found
+    claim, job = claimed(store)
     rate = {"mean": 0.1234, "low": 0.1, "high": 0.2}
     rows = [{"name": name, "n": 7, "success": rate} for name in ("interpolated", "critic")]
     result = {"protocol": job.spec["protocol"], "seed": 5, "episodes": 7, "results": rows}

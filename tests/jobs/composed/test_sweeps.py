@@ -20,7 +20,7 @@ from app.store.engine import Store
 from app.store.records import JobRecord, NewJob
 from jobs.composed.sweeps import Sweeps, SweepTrial, trials_of
 from jobs.spec import parse_spec
-from tests.support.databases import SQLITE_ONLY
+from tests.support.databases import SQLITE_ONLY, claimed
 
 SWEEP: dict[str, Any] = {
     "kind": "sweep",
@@ -50,9 +50,7 @@ def look(store: Store, sweep: JobRecord) -> tuple[JobRecord, tuple[SweepTrial, .
 
 def run_one(store: Store, success: float) -> JobRecord:
     """Run the next queued job to its end."""
-    found = attempts.claim_next(store)
-    assert found is not None
-    claim, job = found
+    claim, job = claimed(store)
     if job.kind == "train":
         for step in (51_200, 102_400):
             attempts.record_progress(store, claim, step, {"success": success})
@@ -109,8 +107,7 @@ def test_training_below_the_median_is_pruned(store: Store) -> None:
     for success in (0.8, 0.9, 0.7, 0.8):
         run_trial(store, sweep, success)
     look(store, sweep)
-    found = attempts.claim_next(store)
-    assert found is not None
+    found = claimed(store)
     attempts.record_progress(store, found[0], 51_200, {"success": 0.1})
     look(store, sweep)
     pruned = jobs.get_job(store, found[0].job_id)
@@ -160,8 +157,7 @@ def test_sweep_without_any_value_fails_with_the_reason(store: Store) -> None:
     sweep = post(store, trials=2)
     for _ in range(2):
         look(store, sweep)
-        found = attempts.claim_next(store)
-        assert found is not None
+        found = claimed(store)
         completion.fail(store, found[0], "out of memory")
     job, _ = look(store, sweep)
     assert (job.state, job.error) == ("failed", "no trial has a value; trial 2: out of memory")

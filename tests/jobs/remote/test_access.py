@@ -30,7 +30,7 @@ from tests.jobs.machinery import wait_until
 from tests.jobs.remote.serving import TOKEN
 from tests.policies.evaluation.sorting_players import untrained
 from tests.sim.recorded_person import csv_text, working
-from tests.support.databases import SQLITE_ONLY
+from tests.support.databases import SQLITE_ONLY, claimed
 from tests.support.failing_proxy import FailingProxy, failing_proxy
 
 pytestmark = SQLITE_ONLY
@@ -44,7 +44,7 @@ ROWS_SHA256 = sha256(ROWS).hexdigest()
 @pytest.fixture
 def claim(store: Store) -> Claim:
     jobs.create_job(store, parse_spec(SPEC).new_job())
-    return claim_again(store)
+    return claimed(store)[0]
 
 
 @pytest.fixture
@@ -56,12 +56,6 @@ def service(address: str, claim: Claim) -> Iterator[ServiceConnection]:
 @pytest.fixture
 def access(service: ServiceConnection) -> ServiceAccess:
     return ServiceAccess(service)
-
-
-def claim_again(store: Store) -> Claim:
-    found = attempts.claim_next(store)
-    assert found is not None
-    return found[0]
 
 
 def state(step: int, *files: str) -> ResumeState:
@@ -212,7 +206,7 @@ def test_earlier_attempt_is_refused_and_changes_nothing(
     act: Callable[[ServiceConnection], object],
 ) -> None:
     completion.give_back(store, claim)
-    second = claim_again(store)
+    second = claimed(store)[0]
     before = jobs.get_job(store, claim.job_id)
     with pytest.raises(StaleAttempt, match="attempt 1 no longer holds job"):
         act(service)

@@ -9,7 +9,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -19,7 +19,7 @@ from app.store import attempts, jobs, metrics
 from app.store.engine import Store
 from jobs.executor import PROJECT_ROOT, LocalProcess, search_path
 from jobs.supervisor import Supervisor
-from tests.jobs.machinery import PATIENCE, wait_for, wait_until_final
+from tests.jobs.machinery import PATIENCE, supervised, wait_for, wait_until_final
 from tests.jobs.remote.serving import TOKEN
 from tests.support.databases import SQLITE_ONLY
 from tests.support.trainings import made_by, train
@@ -82,19 +82,13 @@ def line_of(process: "subprocess.Popen[str]") -> str:
     return process.stdout.readline().strip()
 
 
-@contextmanager
 def running_on(
     ray_address: str, store: Store, folder: Path, address: str
-) -> Iterator[Supervisor]:
+) -> AbstractContextManager[Supervisor]:
     """Run a supervisor whose jobs run on a cluster."""
     settings = {"TANDEM_RAY": ray_address, "TANDEM_WORKER_URL": address, "TANDEM_TOKEN": TOKEN}
     executor = LocalProcess(store.url, folder, "jobs.remote.ray_driver", settings)
-    supervisor = Supervisor(store, folder, executor=executor, timeouts=PATIENCE_OF_RAY)
-    supervisor.start()
-    try:
-        yield supervisor
-    finally:
-        supervisor.stop()
+    return supervised(store, folder, executor=executor, timeouts=PATIENCE_OF_RAY)
 
 
 def process_of(job_id: str, module: str = "jobs.remote.run") -> int | None:
@@ -112,10 +106,8 @@ def process_of(job_id: str, module: str = "jobs.remote.run") -> int | None:
 def test_training_whose_worker_and_node_fail_ends_with_the_checkpoints_of_a_local_one(
     store: Store, tmp_path: Path, address: str, cluster: RayCluster
 ) -> None:
-    local_supervisor = Supervisor(store, tmp_path, timeouts=PATIENCE)
-    local_supervisor.start()
-    local = wait_until_final(store, train(store, **FIELDS))
-    local_supervisor.stop()
+    with supervised(store, tmp_path):
+        local = wait_until_final(store, train(store, **FIELDS))
     with running_on(cluster.address, store, tmp_path, address):
         job_id = train(store, **FIELDS)
         wait_for(store, job_id, lambda job: job.step >= 384)

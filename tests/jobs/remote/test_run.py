@@ -10,7 +10,13 @@ from app.store.engine import Store
 from jobs.executor import LocalProcess
 from jobs.spec import parse_spec
 from jobs.supervisor import Supervisor
-from tests.jobs.machinery import PATIENCE, wait_for, wait_until_final, worker_pids
+from tests.jobs.machinery import (
+    PATIENCE,
+    supervised,
+    wait_for,
+    wait_until_final,
+    worker_pids,
+)
 from tests.jobs.remote.serving import TOKEN, serving
 from tests.support.databases import SQLITE_ONLY
 from tests.support.trainings import Made, made_by, train
@@ -27,17 +33,13 @@ def elsewhere(folder: Path, address: str) -> LocalProcess:
 def test_training_over_http_killed_once_ends_with_the_checkpoints_of_a_local_one(
     store: Store, tmp_path: Path, address: str, undisturbed: Made
 ) -> None:
-    over_http = Supervisor(
-        store, tmp_path, executor=elsewhere(tmp_path, address), timeouts=PATIENCE
-    )
-    over_http.start()
-    killed_id = train(store)
-    wait_for(store, killed_id, lambda job: job.step >= 640)
-    (pid,) = worker_pids(os.getpid())
-    os.kill(pid, signal.SIGKILL)
-    assert any((tmp_path / "resume" / killed_id).iterdir())
-    killed = wait_until_final(store, killed_id)
-    over_http.stop()
+    with supervised(store, tmp_path, executor=elsewhere(tmp_path, address)):
+        killed_id = train(store)
+        wait_for(store, killed_id, lambda job: job.step >= 640)
+        (pid,) = worker_pids(os.getpid())
+        os.kill(pid, signal.SIGKILL)
+        assert any((tmp_path / "resume" / killed_id).iterdir())
+        killed = wait_until_final(store, killed_id)
     assert (killed.state, killed.error, killed.attempt) == ("succeeded", None, 2)
     assert made_by(store, killed_id) == undisturbed
     steps = [point.step for point in metrics.list_metrics(store, killed_id)]
@@ -63,10 +65,6 @@ def test_evaluation_of_an_unknown_checkpoint_fails_over_http_as_locally(
 ) -> None:
     body = {"kind": "evaluate", "protocol": "pick-single", "checkpoint": "nobody"}
     job_id = jobs.create_job(store, parse_spec(body).new_job()).id
-    over_http = Supervisor(
-        store, tmp_path, executor=elsewhere(tmp_path, address), timeouts=PATIENCE
-    )
-    over_http.start()
-    job = wait_until_final(store, job_id)
-    over_http.stop()
+    with supervised(store, tmp_path, executor=elsewhere(tmp_path, address)):
+        job = wait_until_final(store, job_id)
     assert (job.state, job.error) == ("failed", "no checkpoint 'nobody'")
