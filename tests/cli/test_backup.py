@@ -9,14 +9,12 @@ from tests.cli.test_commands import run
 from tests.support import workshop
 
 
-@pytest.fixture
-def data(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A data folder with a cell of the user's own."""
-    monkeypatch.setenv("TANDEM_DATA", str(tmp_path / "data"))
+@pytest.fixture(autouse=True)
+def own_cell(tmp_path: Path) -> None:
+    """A cell of the user's own in the data folder."""
     file = tmp_path / "workshop.json"
     file.write_text(json.dumps(workshop.definition()))
     assert main(["cells", "add", str(file)]) == 0
-    return tmp_path / "data"
 
 
 def test_backup_and_restore_name_their_content(

@@ -134,7 +134,6 @@ def test_wrong_call_ends_with_status_2(
     tmp_path: Path,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    monkeypatch.setenv("TANDEM_DATA", str(tmp_path))
     monkeypatch.chdir(tmp_path)
     assert main(arguments) == 2
     assert capsys.readouterr().err
@@ -152,10 +151,7 @@ def test_bad_setting_stops_the_start_with_status_2(
     assert name in capsys.readouterr().err
 
 
-def test_evaluation_prints_one_json_object(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setenv("TANDEM_DATA", str(tmp_path))
+def test_evaluation_prints_one_json_object(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["evaluate", "pick-single", "--episodes", "8", "--seed", "3", "--json"]) == 0
     result = json.loads(capsys.readouterr().out)
     assert (result["protocol"], result["seed"], result["episodes"]) == ("pick-single", 3, 8)
@@ -166,9 +162,8 @@ def test_evaluation_prints_one_json_object(
 
 
 def test_sorting_of_a_policy_file_prints_one_json_object_and_a_table_without_pairs(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setenv("TANDEM_DATA", str(tmp_path))
     policy, path = untrained(), tmp_path / "policy.safetensors"
     path.write_bytes(policy.tensors)
     path.with_suffix(".json").write_text(json.dumps(policy.manifest))
@@ -185,12 +180,8 @@ def test_sorting_of_a_policy_file_prints_one_json_object_and_a_table_without_pai
 
 @pytest.mark.parametrize("manifest", [None, "", "{bad", "\udc80", "[" * 100_000])
 def test_policy_file_without_a_manifest_beside_it_is_refused_with_the_path(
-    manifest: str | None,
-    monkeypatch: pytest.MonkeyPatch,
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
+    manifest: str | None, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setenv("TANDEM_DATA", str(tmp_path))
     path = tmp_path / "policy.safetensors"
     path.write_bytes(untrained().tensors)
     if manifest is not None:
@@ -237,17 +228,15 @@ def test_the_table_shows_nested_values_as_text() -> None:
 
 
 def test_a_policy_that_picks_cannot_be_measured_at_sorting(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
-    monkeypatch.setenv("TANDEM_DATA", str(tmp_path))
     assert main(["evaluate", "sorting-grid", "--checkpoint", "pick", "--episodes", "1"]) == 2
     assert "must be a policy that sorts for sorting-grid" in capsys.readouterr().err
 
 
 @pytest.fixture
-def clip(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
-    """A good motion file, and a data folder without a database."""
-    monkeypatch.setenv("TANDEM_DATA", str(tmp_path / "data"))
+def clip(tmp_path: Path) -> Path:
+    """A good motion file."""
     path = tmp_path / "wave.csv"
     path.write_text(csv_text(working(100)), encoding="utf-8")
     return path
@@ -291,18 +280,14 @@ def test_every_fault_of_every_bad_motion_file_is_reported(
     assert [fault["place"].split(": ")[0] for fault in faults][-1] == str(wrong)
 
 
-def test_cells_are_listed(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setenv("TANDEM_DATA", str(tmp_path))
+def test_cells_are_listed(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["cells", "list", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["cells"][0]["name"] == "pick-and-place"
 
 
 @pytest.fixture
-def cell_file(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
-    """A good cell of the user's own, and a data folder without a database."""
-    monkeypatch.setenv("TANDEM_DATA", str(tmp_path / "data"))
+def cell_file(tmp_path: Path) -> Path:
+    """A good cell of the user's own."""
     path = tmp_path / "workshop.json"
     path.write_text(json.dumps(workshop.definition()), encoding="utf-8")
     return path

@@ -12,8 +12,7 @@ from tests.sim.recorded_skeleton import Person, skeleton
 
 
 @pytest.fixture
-def clip(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    monkeypatch.setenv("TANDEM_DATA", str(tmp_path))
+def clip(tmp_path: Path) -> Path:
     path = tmp_path / "someone.bvh"
     path.write_text(bvh_text(working(200)), encoding="utf-8")
     return path

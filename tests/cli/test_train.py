@@ -53,11 +53,10 @@ def steps_of(output: Path) -> Sequence[int]:
 
 
 def test_interrupted_command_continues_with_the_same_result(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, data: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setenv("TANDEM_DATA", str(tmp_path))
     parts, whole = tmp_path / "parts", tmp_path / "whole"
-    status, messages = interrupted(parts, tmp_path, 640)
+    status, messages = interrupted(parts, data, 640)
     assert status == INTERRUPTED, messages
     assert f"the same command continues from {parts}" in messages
     assert any((parts / "resume").glob("step-*.json"))
@@ -81,9 +80,8 @@ with in_use(Path(sys.argv[1])): print('held', flush=True); time.sleep(600)"
 
 
 def test_second_training_in_a_folder_is_refused_until_the_first_is_killed(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setenv("TANDEM_DATA", str(tmp_path))
     folder = tmp_path / "run"
     command = [sys.executable, "-c", HOLDER, str(folder)]
     with subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, text=True) as first:

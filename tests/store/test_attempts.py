@@ -1,5 +1,5 @@
-import threading
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
@@ -43,16 +43,9 @@ def test_jobs_are_claimed_in_the_order_of_submission(store: Store) -> None:
 
 def test_one_job_is_claimed_by_one_of_many_threads(store: Store) -> None:
     jobs.create_job(store, NewJob(kind="count", spec={}))
-    found: list[object] = []
-    threads = [
-        threading.Thread(target=lambda: found.append(attempts.claim_next(store)))
-        for _ in range(8)
-    ]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    assert len(found) == 8 and sum(claim is not None for claim in found) == 1
+    with ThreadPoolExecutor(8) as pool:
+        found = list(pool.map(lambda _: attempts.claim_next(store), range(8)))
+    assert sum(claim is not None for claim in found) == 1
 
 
 def test_progress_reaches_job_and_curve(store: Store, claim: Claim) -> None:

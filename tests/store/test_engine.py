@@ -1,5 +1,5 @@
 import signal
-import threading
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
 from pathlib import Path
 
@@ -110,15 +110,12 @@ def test_relative_path_is_made_absolute_for_workers(
 
 
 def test_many_threads_write_and_none_is_turned_away(store: Store) -> None:
-    def submit() -> None:
+    def submit(_thread: int) -> None:
         for i in range(10):
             jobs.create_job(store, NewJob(kind="count", spec={"i": i}))
 
-    threads = [threading.Thread(target=submit) for _ in range(8)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
+    with ThreadPoolExecutor(8) as pool:
+        list(pool.map(submit, range(8)))
     assert len(jobs.list_jobs(store, limit=200).items) == 80
 
 
@@ -142,18 +139,12 @@ def test_commit_number_differs_after_commits_and_not_after_reads(store: Store) -
 
 
 def test_one_key_posted_by_many_threads_makes_one_job(store: Store) -> None:
-    found: list[str] = []
-
-    def submit() -> None:
+    def submit(_thread: int) -> str:
         new = NewJob(kind="count", spec={"a": 1})
-        found.append(jobs.create_job(store, new, idempotency_key="k").id)
+        return jobs.create_job(store, new, idempotency_key="k").id
 
-    threads = [threading.Thread(target=submit) for _ in range(8)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    assert len(found) == 8 and len(set(found)) == 1
+    with ThreadPoolExecutor(8) as pool:
+        assert len(set(pool.map(submit, range(8)))) == 1
 
 
 @SQLITE_ONLY
