@@ -34,3 +34,8 @@ export function Logo() {
     <path d="M16 10.05a7.4 7.4 0 0 1 0 11.9" stroke="currentColor" />
   </svg>`;
 }
+
+/** The notice of a fault. */
+export function Alert({ children }) {
+  return html`<p class="notice bad" role="alert"><${Icon} name="alert" /><span>${children}</span></p>`;
+}

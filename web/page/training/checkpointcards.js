@@ -3,7 +3,7 @@ import { html, useEffect, useState } from "../vendor/htm-preact-standalone.modul
 import { Ask, Fault, useAction } from "../action.js";
 import { get, postFile, put, remove } from "../api.js";
 import * as format from "../format.js";
-import { Icon } from "../icons.js";
+import { Alert, Icon } from "../icons.js";
 
 const PAGE = 100;
 const PURPOSES = { "choosing tasks": "task selection", "reaching goals": "reach", sorting: "sorting" };
@@ -24,8 +24,7 @@ export function CheckpointCards({ link, jobs, acting }) {
   return html`<section class="card" aria-labelledby="checkpoints-title" data-role="checkpoints">
     <header class="card-head"><h2 id="checkpoints-title">Checkpoints</h2></header>
     <${Upload} onDone=${(one) => { refresh(); setOpen(one.sha256); }} />
-    ${error && html`<p class="notice bad" role="alert"><${Icon} name="alert" />
-      The checkpoints could not be loaded: ${error.message}</p>`}
+    ${error && html`<${Alert}>The checkpoints could not be loaded: ${error.message}</${Alert}>`}
     ${!list && !error && html`<div class="skeleton" aria-busy="true" aria-label="Loading checkpoints"></div>`}
     ${list?.length === 0 && html`<p class="empty">No checkpoints yet: the shipped ones are stored
       while the server starts.</p>`}

@@ -23,7 +23,6 @@ export function Acting({ world, checkpoints, jobs, send }) {
   const now = world.checkpoint;
   const purpose = world.reach ? REACHING : CHOOSING;
   const groups = grouped(checkpoints.list.filter((c) => c.purpose === purpose), jobs, now);
-  const known = groups.some((g) => g.items.some((c) => c.sha256 === now));
   return html`<label class="acting">
     <span>Active policy</span>
     <select value=${now ?? ""} data-role="acting" aria-label="Checkpoint of the active policy"
@@ -31,10 +30,7 @@ export function Acting({ world, checkpoints, jobs, send }) {
       onChange=${(e) => send({ tag: "set-policy", checkpoint: e.target.value || null })}>
       ${world.reach && html`<option value="">none: straight to the goal</option>`}
       ${!now && !world.reach && html`<option value="" disabled>no policy</option>`}
-      ${now && !known && html`<option value=${now}>${world.policy_title ?? format.short(now)}</option>`}
-      ${groups.map((group) => html`<optgroup key=${group.label} label=${group.label}>
-        ${group.items.map((c) => html`<option key=${c.sha256} value=${c.sha256}>
-          ${name(c, group.job)}</option>`)}</optgroup>`)}
+      ${options(groups, now, world.policy_title)}
     </select>
   </label>`;
 }
@@ -44,16 +40,22 @@ export function TaskPlanner({ sorting, cell, checkpoints, jobs, send }) {
   const now = sorting.sorting_policy;
   const mine = checkpoints.list.filter((c) => c.purpose === SORTING && c.manifest.cell === cell.name);
   const groups = grouped(mine, jobs, now);
-  const known = mine.some((c) => c.sha256 === now);
   return html`<label class="sorting-policy"><span>Task planner</span>
     <select value=${now ?? ""} data-role="sorting-policy" onFocus=${checkpoints.refresh}
       onChange=${(e) => send({ tag: "set-sorting-policy", checkpoint: e.target.value || null })}>
       <option value="">the exact planner</option>
-      ${now && !known && html`<option value=${now}>${sorting.sorting_policy_title ?? format.short(now)}</option>`}
-      ${groups.map((group) => html`<optgroup key=${group.label} label=${group.label}>
-        ${group.items.map((c) => html`<option key=${c.sha256} value=${c.sha256}>
-          ${name(c, group.job)}</option>`)}</optgroup>`)}
+      ${options(groups, now, sorting.sorting_policy_title)}
     </select></label>`;
+}
+
+/** The checkpoints of groups, after the one that acts now if it is in none of them. */
+function options(groups, now, title) {
+  const known = groups.some((g) => g.items.some((c) => c.sha256 === now));
+  return html`
+    ${now && !known && html`<option value=${now}>${title ?? format.short(now)}</option>`}
+    ${groups.map((group) => html`<optgroup key=${group.label} label=${group.label}>
+      ${group.items.map((c) => html`<option key=${c.sha256} value=${c.sha256}>
+        ${name(c, group.job)}</option>`)}</optgroup>`)}`;
 }
 
 /** Shipped checkpoints first, then each job's newest few, and whatever acts now. */

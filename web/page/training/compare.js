@@ -1,10 +1,10 @@
 // Comparison of jobs: one curve per group of seeds with its band, and the fields that differ.
 import { html, useEffect, useMemo, useRef, useState } from "../vendor/htm-preact-standalone.module.js";
-import { get } from "../api.js";
 import * as format from "../format.js";
-import { Icon } from "../icons.js";
+import { Alert, Icon } from "../icons.js";
 import { GOALS } from "../palette.js";
 import { axis, Plot, useTheme } from "../plots.js";
+import { useAnswer } from "./formfields.js";
 
 export const MAX_JOBS = 20;
 const RATES = new Set(["success", "collision", "timeout"]);
@@ -13,25 +13,17 @@ const HEIGHT = 300;
 /** A dialog over the page; `ids` are the compared jobs, in their order. */
 export function Comparison({ ids, onClose }) {
   const [quantity, setQuantity] = useState(null);
-  const [{ found, error }, setState] = useState({ found: null, error: null });
   const dialog = useRef(null);
   const query = ids.map((id) => `job=${encodeURIComponent(id)}`).join("&");
+  const chosen = quantity ? `&quantity=${encodeURIComponent(quantity)}` : "";
+  const { answer: found, error } = useAnswer(`v1/comparison?${query}${chosen}`);
   useEffect(() => dialog.current.showModal(), []);
-  useEffect(() => {
-    const chosen = quantity ? `&quantity=${encodeURIComponent(quantity)}` : "";
-    const stop = new AbortController();
-    get(`v1/comparison?${query}${chosen}`, { signal: stop.signal }).then(
-      (answer) => setState({ found: answer, error: null }),
-      (problem) => problem.name !== "AbortError" && setState((now) => ({ ...now, error: problem })));
-    return () => stop.abort();
-  }, [query, quantity]);
   return html`<dialog class="compare" ref=${dialog} onClose=${onClose} data-role="comparison"
     aria-labelledby="compare-title">
     <header class="card-head"><h2 id="compare-title">Comparison of ${ids.length} jobs</h2>
       <button type="button" class="quiet-button" aria-label="Close the comparison"
         onClick=${() => dialog.current.close()}><${Icon} name="close" /></button></header>
-    ${error && html`<p class="notice bad" role="alert"><${Icon} name="alert" />
-      <span>${error.message}</span></p>`}
+    ${error && html`<${Alert}>${error.message}</${Alert}>`}
     ${!found && !error && html`<div class="skeleton tall" aria-busy="true"
       aria-label="Loading the curves"></div>`}
     ${found && html`

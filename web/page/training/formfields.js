@@ -1,7 +1,7 @@
 // Forms: what is typed, one submission at a time, and the faults that the service finds in it.
 import { html, useEffect, useRef, useState } from "../vendor/htm-preact-standalone.module.js";
 import { get, Unreachable } from "../api.js";
-import { Icon } from "../icons.js";
+import { Alert, Icon } from "../icons.js";
 
 /**
  * A form whose fields are `names`; `typed` are their texts at the start. `submit(send)` sends it
@@ -53,11 +53,23 @@ export function useItems(link, path) {
   return state;
 }
 
+/** The answer of a route, asked for again whenever one of `causes` has changed. */
+export function useAnswer(path, ...causes) {
+  const [state, setState] = useState({ answer: null, error: null });
+  useEffect(() => {
+    const stop = new AbortController();
+    get(path, { signal: stop.signal }).then(
+      (answer) => setState({ answer, error: null }),
+      (error) => error.name !== "AbortError" && setState((now) => ({ ...now, error })));
+    return () => stop.abort();
+  }, [path, ...causes]);
+  return state;
+}
+
 /** What a form shows while its choices are loaded, or could not be. */
 export function Loading({ what, error }) {
   return error
-    ? html`<p class="notice bad" role="alert"><${Icon} name="alert" />
-        The ${what} could not be loaded: ${error.message}</p>`
+    ? html`<${Alert}>The ${what} could not be loaded: ${error.message}</${Alert}>`
     : html`<div class="skeleton tall" aria-busy="true" aria-label=${`Loading ${what}`}></div>`;
 }
 
@@ -74,8 +86,7 @@ export function StartForm({ form, title, send, start, note, onClose, children })
     <div class="train-head"><h3>${title}</h3>
       <button type="button" class="quiet-button" aria-label="Close the form" onClick=${onClose}>
         <${Icon} name="close" /></button></div>
-    ${fault && html`<p class="notice bad" role="alert"><${Icon} name="alert" />
-      <span>${fault}</span></p>`}
+    ${fault && html`<${Alert}>${fault}</${Alert}>`}
     ${children}
     <div class="train-foot">
       <button type="submit" class="primary" disabled=${form.busy}>

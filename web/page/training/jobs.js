@@ -2,11 +2,12 @@
 import { html, useCallback, useEffect, useRef, useState } from "../vendor/htm-preact-standalone.module.js";
 import { follow, get } from "../api.js";
 import * as format from "../format.js";
-import { Icon } from "../icons.js";
+import { Alert, Icon } from "../icons.js";
 import { CurvePlot } from "../plots.js";
 import { EndedByBudget } from "./budgets.js";
 import { MAX_JOBS } from "./compare.js";
-import { JobActions, Labels, isActive } from "./jobactions.js";
+import { isActive } from "./jobactions.js";
+import { JobFrame } from "./jobframe.js";
 import { Follow } from "./follow.js";
 import { ReportDetail } from "./report.js";
 import { SweepDetail } from "./sweep.js";
@@ -95,8 +96,7 @@ export function QueueWaits({ waiting }) {
 
 export function JobList({ jobs, error, onNew, ...rest }) {
   if (error && !jobs) {
-    return html`<p class="notice bad" role="alert"><${Icon} name="alert" />
-      The jobs could not be loaded: ${error.message}</p>`;
+    return html`<${Alert}>The jobs could not be loaded: ${error.message}</${Alert}>`;
   }
   if (!jobs) return html`<div class="skeleton" aria-busy="true" aria-label="Loading jobs"></div>`;
   if (jobs.length === 0) {
@@ -182,9 +182,10 @@ function JobDetail({ job, onChanged, onOpen, onClone, onAct, acting }) {
   const [at, setAt] = useState(null);
   const row = rows?.[at ?? rows.length - 1] ?? null;
   const readout = at !== null && at !== undefined && row;
-  return html`<div class="job-detail">
-    ${job.error && html`<p class="notice bad" role="alert"><${Icon} name="alert" />
-      <span>${job.error}</span></p>`}
+  const actions = html`
+    ${checkpoint && html`<${Act} job=${job} newest=${checkpoint} acting=${acting} onAct=${onAct} />`}
+    ${job.kind === "train" && html`<${Follow} job=${job} />`}`;
+  return html`<${JobFrame} ...${{ job, actions, onChanged, onOpen, onClone }}>
     ${!rows && html`<div class="skeleton tall" aria-busy="true" aria-label="Loading the curve"></div>`}
     ${rows && rows.length === 0 && html`<p class="empty">${job.state === "queued"
       ? "Waiting for its turn; one job runs at a time."
@@ -205,15 +206,7 @@ function JobDetail({ job, onChanged, onOpen, onClone, onAct, acting }) {
     ${lost && html`<p class="notice warn" role="status"><${Icon} name="alert" />
       Lost the stream of this job; trying again.</p>`}
     <${Speed} job=${job} row=${rows?.at(-1)} />
-    <${Notes} job=${job} />
-    <div class="job-actions">
-      ${checkpoint && html`<${Act} job=${job} newest=${checkpoint} acting=${acting}
-        onAct=${onAct} />`}
-      ${job.kind === "train" && html`<${Follow} job=${job} />`}
-      <${JobActions} ...${{ job, onChanged, onOpen, onClone }} />
-    </div>
-    <${Labels} job=${job} onChanged=${onChanged} />
-  </div>`;
+  </${JobFrame}>`;
 }
 
 /** Lets the job's newest checkpoint act: which one that is, the server says at the click. */
@@ -250,12 +243,10 @@ function episodes({ episodes: n }) {
 }
 
 /** An evaluation has no curve: its rows, once all are known. */
-function Evaluation({ job, onChanged, onOpen, onClone }) {
+function Evaluation({ job, ...rest }) {
   const rows = job.result?.results ?? [];
   const rates = (row) => OUTCOMES.filter(({ key }) => row[key]);
-  return html`<div class="job-detail">
-    ${job.error && html`<p class="notice bad" role="alert"><${Icon} name="alert" />
-      <span>${job.error}</span></p>`}
+  return html`<${JobFrame} job=${job} ...${rest}>
     ${rows.length === 0 && !job.error && html`<p class="empty">${job.state === "queued"
       ? "Waiting for its turn; one job runs at a time."
       : isActive(job) ? "The rows are shown once all are known."
@@ -268,14 +259,7 @@ function Evaluation({ job, onChanged, onOpen, onClone }) {
           <b>${format.steps(row.contacts)}</b></dd>`}
       </div>`)}</dl>
       <p class="plot-foot"><span>Rates with their 95 % intervals</span></p>`}
-    <${Notes} job=${job} />
-    <div class="job-actions"><${JobActions} ...${{ job, onChanged, onOpen, onClone }} /></div>
-    <${Labels} job=${job} onChanged=${onChanged} />
-  </div>`;
-}
-
-function Notes({ job }) {
-  return job.notes && html`<p class="notes" data-role="notes">${job.notes}</p>`;
+  </${JobFrame}>`;
 }
 
 function Legend({ lines, row, show }) {

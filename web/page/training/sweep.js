@@ -1,43 +1,26 @@
 // A sweep: its trials as a table and a plot, the best one marked.
-import { html, useEffect, useMemo, useState } from "../vendor/htm-preact-standalone.module.js";
-import { get } from "../api.js";
+import { html, useMemo } from "../vendor/htm-preact-standalone.module.js";
 import * as format from "../format.js";
-import { Icon } from "../icons.js";
 import { axis, Plot, useTheme } from "../plots.js";
-import { JobActions, Labels, isActive } from "./jobactions.js";
+import { useAnswer } from "./formfields.js";
+import { isActive } from "./jobactions.js";
+import { JobFrame } from "./jobframe.js";
 
 const LABELS = { success: "success", collision: "collision", timeout: "time-out" };
 
-export function SweepDetail({ job, onChanged, onOpen, onClone }) {
-  const { found, error } = useTrials(job);
+export function SweepDetail({ job, ...rest }) {
+  // Asked for again whenever the list of jobs was.
+  const { answer: found, error } = useAnswer(`v1/jobs/${job.id}/trials`, isActive(job) ? job : job.state);
   const trials = found?.items ?? [];
-  return html`<div class="job-detail">
-    ${(job.error || error) && html`<p class="notice bad" role="alert"><${Icon} name="alert" />
-      <span>${job.error ?? error.message}</span></p>`}
+  return html`<${JobFrame} job=${job} error=${error} ...${rest}>
     ${!found && !error && html`<div class="skeleton tall" aria-busy="true" aria-label="Loading the trials"></div>`}
     ${found && trials.length === 0 && html`<p class="empty">${isActive(job)
       ? "The first trial is drawn in a moment." : "It ended before its first trial."}</p>`}
     ${trials.some((one) => one.value) && html`<${TrialPlot} found=${found} />
       <p class="plot-foot"><span>${LABELS[found.quantity]} [%] by trial, with 95 % intervals</span>
         <span>line: best so far</span></p>`}
-    ${trials.length > 0 && html`<${TrialTable} found=${found} onOpen=${onOpen} />`}
-    ${job.notes && html`<p class="notes" data-role="notes">${job.notes}</p>`}
-    <div class="job-actions"><${JobActions} ...${{ job, onChanged, onOpen, onClone }} /></div>
-    <${Labels} job=${job} onChanged=${onChanged} />
-  </div>`;
-}
-
-/** The trials of a sweep, asked for again whenever the list of jobs was. */
-function useTrials(job) {
-  const [state, setState] = useState({ found: null, error: null });
-  useEffect(() => {
-    const stop = new AbortController();
-    get(`v1/jobs/${job.id}/trials`, { signal: stop.signal }).then(
-      (found) => setState({ found, error: null }),
-      (error) => error.name !== "AbortError" && setState((now) => ({ ...now, error })));
-    return () => stop.abort();
-  }, [job.id, isActive(job) ? job : job.state]);
-  return state;
+    ${trials.length > 0 && html`<${TrialTable} found=${found} onOpen=${rest.onOpen} />`}
+  </${JobFrame}>`;
 }
 
 function TrialTable({ found, onOpen }) {

@@ -1,7 +1,7 @@
 // The form that starts a training job; every field comes from GET /v1/presets.
 import { html, useEffect, useState } from "../vendor/htm-preact-standalone.module.js";
 import { post } from "../api.js";
-import { Icon } from "../icons.js";
+import { Alert, Icon } from "../icons.js";
 import { BUDGETS, budgetBody, budgetTexts } from "./budgets.js";
 import { capital, changed, Loading, OWN, parsed, show, StartForm, useForm } from "./formfields.js";
 
@@ -34,8 +34,8 @@ export function TrainForm({ presets: { items: presets, error }, cell, from, onSt
   };
 
   if (from && presets && preset?.name !== from.preset) {
-    return html`<p class="notice bad" role="alert"><${Icon} name="alert" />
-      Job ${from.number} was trained with the preset ${from.preset}, which does not exist any more.</p>`;
+    return html`<${Alert}>Job ${from.number} was trained with the preset ${from.preset}, which does not
+      exist any more.</${Alert}>`;
   }
   if (!preset) return html`<${Loading} what="presets" error=${error} />`;
   const rest = fields.filter((f) => !FIRST_FIELDS.includes(f.name));

@@ -1,0 +1,16 @@
+// What every open job shows, around what its kind shows.
+import { html } from "../vendor/htm-preact-standalone.module.js";
+import { Alert } from "../icons.js";
+import { JobActions, Labels } from "./jobactions.js";
+
+/** Its fault, the children, its notes, `actions` beside those of any job, and its labels. */
+export function JobFrame({ job, error, actions, children, onChanged, onOpen, onClone }) {
+  const fault = job.error ?? error?.message;
+  return html`<div class="job-detail">
+    ${fault && html`<${Alert}>${fault}</${Alert}>`}
+    ${children}
+    ${job.notes && html`<p class="notes" data-role="notes">${job.notes}</p>`}
+    <div class="job-actions">${actions}<${JobActions} ...${{ job, onChanged, onOpen, onClone }} /></div>
+    <${Labels} job=${job} onChanged=${onChanged} />
+  </div>`;
+}
