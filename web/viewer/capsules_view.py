@@ -77,8 +77,7 @@ class CapsulesView:
     def show(self, visible: bool, touched: Collection[str]) -> None:
         """Show all or none; those named ``touched`` are seen in any case, in red."""
         for handle in self._handles.values():
-            if handle.visible != visible:
-                handle.visible = visible
+            handle.visible = visible
         for name in self._hits.keys() - set(touched):
             self._hits.pop(name).remove()
         for name in self._handles.keys() & set(touched) - self._hits.keys():
@@ -96,10 +95,8 @@ class CapsulesView:
             stretch = (now + 2.0 * radius) / (length + 2.0 * radius)
             scale = (1.0, 1.0, stretch if abs(now - length) > STIFF_M else 1.0)
             for handle in (self._handles[name], self._hits.get(name)):
-                if handle is None:
-                    continue
-                handle.wxyz, handle.position = turn, pair.mean(axis=0)
-                if handle.scale != scale:
+                if handle is not None:
+                    handle.wxyz, handle.position = turn, pair.mean(axis=0)
                     handle.scale = scale
 
 

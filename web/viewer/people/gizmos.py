@@ -105,8 +105,7 @@ class Gizmos:
         """Show the gizmos in manual mode, each where its body is."""
         manual = person.mode == "manual"
         for gizmo in (self._pelvis, *self._hands.values()):
-            if gizmo.visible != manual:
-                gizmo.visible = manual
+            gizmo.visible = manual
         if not manual:
             self._released.clear()
             return

@@ -105,6 +105,5 @@ class _Cylinder:
             for rim in self._rims:
                 rim.scale = (one.radius, one.radius, one.radius)
         color = HIT if hit else self._color
-        if tuple(self._side.color) != color:
-            self._side.color, self._shade.color = color, color
-            self._side.opacity = HIT_OPACITY if hit else OPACITY
+        self._side.color = self._shade.color = color
+        self._side.opacity = HIT_OPACITY if hit else OPACITY

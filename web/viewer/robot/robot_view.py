@@ -36,7 +36,6 @@ class RobotView:
             self._lamp = self._add_magnet(scene, cell)
         else:
             self._fingers = self._add_gripper(scene, cell)
-        self._closed = False
         self._capsules = CapsulesView(server, "robot")
         self._shapes = load_robot_capsules(tool.tool_length, tool.tool_radius)
         for name, radius, p0, p1 in zip(
@@ -100,9 +99,6 @@ class RobotView:
 
     def grip(self, closed: bool) -> None:
         """Open or close the fingers, or switch the magnet."""
-        if closed == self._closed:
-            return
-        self._closed = closed
         if self._lamp is not None:
             self._lamp.visible = closed
             return

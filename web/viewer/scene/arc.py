@@ -27,13 +27,11 @@ class Arc:
 
     def hide(self) -> None:
         """Take it out of sight."""
-        if self._lines.visible:
-            self._lines.visible = False
+        self._lines.visible = False
 
     def show(self, start: Vec, end: Vec) -> None:
         """Draw it from ``start`` to ``end`` [m], shape (3,)."""
-        if not self._lines.visible:
-            self._lines.visible = True
+        self._lines.visible = True
         key = (*np.round(start, 3).tolist(), *np.round(end, 3).tolist())
         if key != self._key:
             self._key = key

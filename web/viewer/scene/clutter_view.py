@@ -70,10 +70,8 @@ class ClutterView:
             return
         self._shown = failure
         for surface, label, chance in zip(self._tiles, self._labels, failure, strict=True):
-            if tuple(surface.color) != (color := failure_color(chance)):
-                surface.color = color
-            if label.text != (text := f"{100.0 * chance:.0f} %"):
-                label.text = text
+            surface.color = failure_color(chance)
+            label.text = f"{100.0 * chance:.0f} %"
 
 
 def _spacing(values: Vec) -> float:

@@ -67,12 +67,9 @@ class GoalGizmo:
     def draw(self, view: ReachSnapshot, *, reached: bool) -> None:
         """Show the goal, and bring a handle that nobody holds to it."""
         color = REACHED if reached else GOAL
-        if np.abs(self._frame.position - view.goal).max() > 1e-4:
-            self._frame.position = view.goal
-        if self._around.scale != view.tolerance:
-            self._around.scale = view.tolerance
-        if tuple(self._point.color) != color:
-            self._point.color = self._around.color = color
+        self._frame.position = view.goal
+        self._around.scale = view.tolerance
+        self._point.color = self._around.color = color
         if time.monotonic() >= self._free_at:
             if np.abs(self._handle.position - view.goal).max() > 1e-3:
                 self._handle.position = view.goal

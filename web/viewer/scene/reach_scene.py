@@ -121,20 +121,16 @@ class _Zone:
     def draw(self, safety: SafetySnapshot) -> None:
         """Show the zone of this state."""
         visible = safety.person is not None
-        for part in (self._area, self._edge):
-            if part.visible != visible:
-                part.visible = visible
+        self._area.visible = self._edge.visible = visible
         color, outline = override_color(safety), safety.zone
         key = (color, *np.round(outline[::9], 2).ravel().tolist())
         if not visible or key == self._key:
             return
         self._key = key
         vertices, faces = _fan(outline, self._z)
-        if len(faces) != len(self._area.faces):
-            self._area.faces = faces.astype(np.uint32)
+        self._area.faces = faces.astype(np.uint32)
         self._area.vertices = vertices.astype(np.float32)
-        if tuple(self._area.color) != color:
-            self._area.color = color
+        self._area.color = color
         rim = np.column_stack([outline, np.full(len(outline), self._z + 0.003)])
         self._edge.points = np.stack([rim, np.roll(rim, -1, axis=0)], axis=1).astype(np.float32)
         self._edge.colors = np.full((len(rim), 2, 3), color, dtype=np.uint8)
@@ -157,20 +153,13 @@ class _Gauge:
             anchor="center-center",
             font_screen_scale=1.1,
         )
-        self._key: tuple[object, ...] = ()
 
     def draw(self, safety: SafetySnapshot) -> None:
         """Show the override of this state."""
-        color = override_color(safety)
-        full = round(N_GAUGE * safety.override)
-        text = f"{100 * safety.override:.0f} %" if safety.on else "no safety layer"
-        if (full, color, text) == self._key:
-            return
-        self._key = (full, color, text)
         colors = np.full((N_GAUGE, 2, 3), BACK, dtype=np.uint8)
-        colors[:full] = color
+        colors[: round(N_GAUGE * safety.override)] = override_color(safety)
         self._ring.colors = colors
-        self._text.text = text
+        self._text.text = f"{100 * safety.override:.0f} %" if safety.on else "no safety layer"
 
 
 class _Trail:
@@ -197,8 +186,7 @@ class _Trail:
     def draw(self) -> None:
         """Show what was noted."""
         seen = len(self._points) > 1
-        if self._lines.visible != seen:
-            self._lines.visible = seen
+        self._lines.visible = seen
         if not seen or self._sent == self._n:
             return
         self._sent = self._n

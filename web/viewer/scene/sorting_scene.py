@@ -67,8 +67,7 @@ class SortingScene:
 
     def _ring(self, name: str, at: Vec | None) -> None:
         ring = self._rings[name]
-        if ring.visible != (at is not None):
-            ring.visible = at is not None
+        ring.visible = at is not None
         if at is not None and np.abs(ring.position - at).max() > 1e-4:
             ring.position = at
 

@@ -125,21 +125,16 @@ class StationsView:
             candidate = offered.get(station.id)
             color = IDLE if candidate is None else GOALS[index % len(GOALS)]
             body, label = self._bodies[station.id], self._labels[station.id]
-            if tuple(body.color) != color:
-                body.color = color
-            if label.text != (text := _text(station, candidate, values)):
-                label.text = text
-            if label.visible != (shown := candidate is not None):
-                label.visible = shown
+            body.color = color
+            label.text = _text(station, candidate, values)
+            label.visible = candidate is not None
         self._mark(snapshot.chosen if snapshot.chosen in self._bodies else None)
 
     def _mark(self, chosen: str | None) -> None:
-        if self._marker.visible != (chosen is not None):
-            self._marker.visible = chosen is not None
+        self._marker.visible = chosen is not None
         if chosen is not None:
             x, y, _ = self._cell.station(chosen).position
-            if tuple(self._marker.position[:2]) != (x, y):
-                self._marker.position = (x, y, 0.0)
+            self._marker.position = (x, y, 0.0)
 
 
 def _text(station: Station, candidate: CandidateSnapshot | None, values: list[float]) -> str:
