@@ -6,32 +6,19 @@ from typing import Any
 import pytest
 from fastapi.testclient import TestClient
 
-from app.policies.configs import presets
 from app.policies.training.train import train
 from app.store.checkpoints import put_checkpoint
 from jobs.checkpoints import to_store
 from tests.api.conftest import services_of
+from tests.policies.conftest import TINY, preset_of
 from tests.support import workshop
-
-TINY = {
-    "learning.total_steps": 1024,
-    "learning.n_envs": 16,
-    "learning.buffer_size": 2000,
-    "learning.batch_size": 32,
-    "learning.learning_starts": 256,
-    "networks.width": 32,
-    "learning.progress_steps": 256,
-    "learning.checkpoint_steps": 512,
-    "cell": "workshop",
-}
-"""Nothing is learned by so little; everything is run through."""
 
 
 @pytest.fixture(scope="module")
 def checkpoint(client: TestClient) -> str:
     """A policy that was trained in the own cell, in the store of the service."""
     made = train(
-        presets.resolve("pick-td3", presets.nested(TINY)),
+        preset_of("pick-td3", TINY, {"learning.total_steps": 1024, "cell": "workshop"}),
         seed=2,
         on_progress=lambda _: None,
         on_checkpoint=lambda *_: None,
