@@ -9,7 +9,6 @@ from functools import lru_cache
 import fast_simplification
 import numpy as np
 import trimesh
-from numpy.typing import NDArray
 
 from app.sim.robot.ur10 import LINK_NAMES, package_dir
 from web.viewer.scene.solid_meshes import block, material, painted, rod
@@ -21,8 +20,6 @@ _FILES = dict(
         strict=True,
     )
 )
-
-Ints = NDArray[np.int64]
 
 ALUMINIUM = material((205, 209, 214), metallic=0.15, roughness=0.42)
 CAP = material((88, 152, 196), metallic=0.05, roughness=0.35)
@@ -61,7 +58,7 @@ def _welded(mesh: trimesh.Trimesh) -> trimesh.Trimesh:
     """Return the mesh with shared vertices, few triangles, shaded smoothly except at creases.
 
     The files give every face its own vertices. Here faces that meet at less than ``CREASE``
-    form a group, and each group shares one vertex per place.
+    share one vertex per place; its normal is the mean of theirs, weighted by area.
     """
     points, index = np.unique(mesh.vertices.round(4), axis=0, return_inverse=True)
     faces = index.reshape(-1)[mesh.faces]
@@ -69,34 +66,11 @@ def _welded(mesh: trimesh.Trimesh) -> trimesh.Trimesh:
     if len(faces) > DENSE:
         points, faces = fast_simplification.simplify(points, faces, 1.0 - KEPT, agg=3)
     solid = trimesh.Trimesh(vertices=points, faces=faces, process=False)
-    faces = np.asarray(solid.faces)
-    soft = solid.face_adjacency[solid.face_adjacency_angles < CREASE]
-    group = _groups(len(faces), soft)
-    corners = np.stack([faces.ravel(), np.repeat(group, 3)], axis=1)
-    own, corner = np.unique(corners, axis=0, return_inverse=True)
-    shared = corner.reshape(faces.shape)
-    normals = np.zeros((len(own), 3))
-    areas = solid.face_normals * solid.area_faces[:, None]
-    for column in range(3):
-        np.add.at(normals, shared[:, column], areas)
-    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
-    return trimesh.Trimesh(
-        vertices=points[own[:, 0]], faces=shared, vertex_normals=normals, process=False
-    )
-
-
-def _groups(n: int, pairs: Ints) -> Ints:
-    """Return the group of each of ``n`` things, joined by ``pairs``, shape (m, 2)."""
-    label = np.arange(n)
-    while True:
-        least = label[pairs].min(axis=1)
-        new = label.copy()
-        np.minimum.at(new, pairs[:, 0], least)
-        np.minimum.at(new, pairs[:, 1], least)
-        new = new[new]
-        if np.array_equal(new, label):
-            return label
-        label = new
+    shaded = trimesh.graph.smooth_shade(solid, angle=CREASE, facet_minarea=None)
+    weighted = shaded.face_normals * shaded.area_faces[:, None]
+    shaded.vertex_normals = trimesh.unitize(shaded.faces_sparse @ weighted)
+    shaded.metadata.clear()  # the groups, which a glTF would carry
+    return shaded
 
 
 @lru_cache(maxsize=4)
