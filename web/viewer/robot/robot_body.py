@@ -11,7 +11,7 @@ import numpy as np
 import trimesh
 
 from app.sim.robot.ur10 import LINK_NAMES, package_dir
-from web.viewer.scene.solid_meshes import block, material, painted, rod
+from web.viewer.scene.solid_meshes import block, creased, material, painted, rod
 
 _FILES = dict(
     zip(
@@ -66,11 +66,12 @@ def _welded(mesh: trimesh.Trimesh) -> trimesh.Trimesh:
     if len(faces) > DENSE:
         points, faces = fast_simplification.simplify(points, faces, 1.0 - KEPT, agg=3)
     solid = trimesh.Trimesh(vertices=points, faces=faces, process=False)
-    shaded = trimesh.graph.smooth_shade(solid, angle=CREASE, facet_minarea=None)
+    shaded = creased(solid, CREASE)
     weighted = shaded.face_normals * shaded.area_faces[:, None]
-    shaded.vertex_normals = trimesh.unitize(shaded.faces_sparse @ weighted)
-    shaded.metadata.clear()  # the groups, which a glTF would carry
-    return shaded
+    normals = trimesh.unitize(shaded.faces_sparse @ weighted)
+    return trimesh.Trimesh(
+        vertices=shaded.vertices, faces=shaded.faces, vertex_normals=normals, process=False
+    )
 
 
 @lru_cache(maxsize=4)

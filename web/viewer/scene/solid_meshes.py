@@ -28,14 +28,11 @@ def material(
     )
 
 
-def _flat(mesh: trimesh.Trimesh) -> trimesh.Trimesh:
-    """Return the mesh with its own vertices per face, so that edges stay crisp."""
-    return trimesh.Trimesh(
-        vertices=mesh.triangles.reshape(-1, 3),
-        faces=np.arange(3 * len(mesh.faces)).reshape(-1, 3),
-        vertex_normals=np.repeat(mesh.face_normals, 3, axis=0),
-        process=False,
-    )
+def creased(mesh: trimesh.Trimesh, angle: float) -> trimesh.Trimesh:
+    """Return the mesh shaded smoothly except at edges of at least ``angle`` [rad]."""
+    shaded: trimesh.Trimesh = trimesh.graph.smooth_shade(mesh, angle=angle, facet_minarea=None)
+    shaded.metadata.clear()  # the groups of faces, which a glTF would carry
+    return shaded
 
 
 def block(size: Sequence[float], center: Sequence[float], bevel: float) -> trimesh.Trimesh:
@@ -87,31 +84,15 @@ def slab(
     tips = [[0.0, 0.0, -half[2]], [0.0, 0.0, half[2]]]
     mesh = trimesh.Trimesh(np.vstack([*rings, tips]), np.vstack(faces), process=False)
     mesh.apply_translation(center)
-    return _flat(mesh)
+    mesh.unmerge_vertices()  # so that edges stay crisp
+    return mesh
 
 
 def rod(base: Sequence[float], height: float, radius: float) -> trimesh.Trimesh:
     """Return an upright cylinder on ``base`` [m], shape (3,), with a smooth side."""
-    count = 40
-    angles = 2.0 * np.pi * np.arange(count) / count
-    side = np.column_stack([np.cos(angles), np.sin(angles), np.zeros(count)])
-    up = np.array([0.0, 0.0, 1.0])
-    low = np.asarray(base) + radius * side
-    high = low + height * up
-    i, j = np.arange(count), (np.arange(count) + 1) % count
-    caps = [
-        np.column_stack([np.full(count, 2 * count), 2 * count + i, 2 * count + j])[1:-1],
-        np.column_stack([np.full(count, 3 * count), 3 * count + j, 3 * count + i])[1:-1],
-    ]
-    walls = [np.column_stack([i, j, count + j]), np.column_stack([i, count + j, count + i])]
-    return trimesh.Trimesh(
-        vertices=np.vstack([low, high, high, low]),
-        faces=np.vstack([*walls, *caps]),
-        vertex_normals=np.vstack(
-            [side, side, np.tile(up, (count, 1)), np.tile(-up, (count, 1))]
-        ),
-        process=False,
-    )
+    cylinder = trimesh.creation.cylinder(radius, height, sections=40)
+    cylinder.apply_translation(np.asarray(base) + (0.0, 0.0, 0.5 * height))
+    return creased(cylinder, 1.0)
 
 
 def painted(pieces: Sequence[tuple[trimesh.Trimesh, PBRMaterial]]) -> bytes:
@@ -131,8 +112,9 @@ def torus(radius: float, thickness: float) -> tuple[Vec, Vec]:
     return np.asarray(ring.vertices), np.asarray(ring.faces)
 
 
-def disc(radius: float, sections: int = 64) -> tuple[Vec, Vec]:
+def disc(radius: float) -> tuple[Vec, Vec]:
     """Return vertices [m] and faces of a disc in the xy plane, facing up."""
+    sections = 64
     angles = np.linspace(0.0, 2.0 * np.pi, sections, endpoint=False)
     rim = radius * np.column_stack([np.cos(angles), np.sin(angles), np.zeros(sections)])
     index = np.arange(sections)
