@@ -5,6 +5,7 @@ from collections.abc import Collection
 import numpy as np
 import trimesh
 import viser
+from trimesh.geometry import align_vectors
 
 from web.viewer.poses import Vec, orientation
 
@@ -55,10 +56,9 @@ class CapsulesView:
     ) -> viser.MeshHandle:
         radius, length = self._sizes[name]
         mesh = trimesh.creation.capsule(height=length, radius=radius, count=(24, 14))
-        vertices = np.asarray(mesh.vertices)
         return self._scene.add_mesh_simple(
             node,
-            vertices - 0.5 * (vertices.min(axis=0) + vertices.max(axis=0)),
+            np.asarray(mesh.vertices),
             np.asarray(mesh.faces),
             color=color,
             opacity=opacity,
@@ -88,7 +88,11 @@ class CapsulesView:
 
     def _send(self, ends: Vec) -> None:
         self._placed = True
-        turns = orientation(_turns_onto(ends[:, 1] - ends[:, 0]))
+        frames = [
+            align_vectors((0.0, 0.0, 1.0), end - start)  # type: ignore[no-untyped-call]
+            for start, end in ends
+        ]
+        turns = orientation(np.stack(frames)[:, :3, :3])
         for name, turn, pair in zip(self._handles, turns, ends, strict=True):
             radius, length = self._sizes[name]
             now = float(np.linalg.norm(pair[1] - pair[0]))
@@ -98,15 +102,3 @@ class CapsulesView:
                 if handle is not None:
                     handle.wxyz, handle.position = turn, pair.mean(axis=0)
                     handle.scale = scale
-
-
-def _turns_onto(directions: Vec) -> Vec:
-    """Return rotations whose z axis points along the directions, shape (n, 3, 3)."""
-    out = np.empty((len(directions), 3, 3))
-    for rotation, direction in zip(out, directions, strict=True):
-        length = float(np.linalg.norm(direction))
-        z = direction / length if length > 1e-9 else np.array([0.0, 0.0, 1.0])
-        x = np.cross([0.0, 1.0, 0.0] if abs(z[1]) < 0.9 else [1.0, 0.0, 0.0], z)
-        x /= np.linalg.norm(x)
-        rotation[:] = np.column_stack([x, np.cross(z, x), z])
-    return out
