@@ -65,22 +65,18 @@ class _Cylinder:
             receive_shadow=False,
             position=(0.0, 0.0, floor + 0.5 * height),
         )
-        vertices, faces = disc(1.0)
         self._shade = scene.add_mesh_simple(
             f"{root}/floor",
-            vertices,
-            faces,
+            *disc(1.0),
             color=color,
             opacity=FLOOR_OPACITY,
             cast_shadow=False,
             position=(0.0, 0.0, floor + 0.008),
         )
-        vertices, faces = torus(1.0, 0.02)
         self._rims = [
             scene.add_mesh_simple(
                 f"{root}/rim{k}",
-                vertices,
-                faces,
+                *torus(1.0, 0.02),
                 color=color,
                 cast_shadow=False,
                 position=(0.0, 0.0, z),

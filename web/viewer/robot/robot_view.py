@@ -63,11 +63,9 @@ class RobotView:
     def _add_magnet(self, scene: viser.SceneApi, cell: Cell) -> viser.MeshHandle:
         length, radius = cell.robot.tool_length, cell.robot.tool_radius
         scene.add_glb("/robot/tool/body", magnet_body(length, radius))
-        vertices, faces = torus(0.8 * radius, 0.004)
         return scene.add_mesh_simple(
             "/robot/tool/lamp",
-            vertices,
-            faces,
+            *torus(0.8 * radius, 0.004),
             color=LAMP,
             cast_shadow=False,
             position=(0.0, 0.0, length - 0.022),

@@ -101,11 +101,9 @@ class _Zone:
     def __init__(self, server: viser.ViserServer, cell: Cell) -> None:
         self._z = cell.floor_z + 0.005
         square = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
-        vertices, faces = _fan(square, self._z)
         self._area = server.scene.add_mesh_simple(
             "/zone/area",
-            vertices,
-            faces,
+            *_fan(square, self._z),
             color=OFF,
             opacity=0.22,
             side="double",

@@ -95,7 +95,7 @@ def _place(view: SortingSnapshot, cell: Cell, floor: float) -> Vec:
 
 
 def _add_ring(server: viser.ViserServer, name: str) -> viser.MeshHandle:
-    vertices, faces = torus(RING_M, 0.004 if name == "pick" else 0.0028)
+    ring = torus(RING_M, 0.004 if name == "pick" else 0.0028)
     return server.scene.add_mesh_simple(
-        f"/marks/{name}", vertices, faces, color=MARK, cast_shadow=False, visible=False
+        f"/marks/{name}", *ring, color=MARK, cast_shadow=False, visible=False
     )

@@ -92,20 +92,16 @@ class StationsView:
 
     def _add_marker(self) -> viser.FrameHandle:
         marker = self._scene.add_frame("/chosen", show_axes=False, visible=False)
-        vertices, faces = torus(0.085, 0.0055)
         self._scene.add_mesh_simple(
             "/chosen/ring",
-            vertices,
-            faces,
+            *torus(0.085, 0.0055),
             color=MARK,
             position=(0, 0, 0.006),
             cast_shadow=False,
         )
-        vertices, faces = disc(0.083)
         self._scene.add_mesh_simple(
             "/chosen/glow",
-            vertices,
-            faces,
+            *disc(0.083),
             color=MARK,
             opacity=0.22,
             position=(0.0, 0.0, 0.003),
