@@ -11,9 +11,9 @@ import viser
 
 from app.live.reach.commands import is_reaching
 from app.sim.cells.cell import Cell
+from app.sim.sorting.layout import is_sorting
 from web.viewer.capsules_view import SHAPES
 from web.viewer.scene.risk_view import NODE as RISK
-from web.viewer.scene.sorting_scene import sorts
 
 PREFIX = "view: "
 """What the labels of these check boxes begin with, so that the page knows them."""
@@ -52,7 +52,7 @@ REACH = (
 
 def settings_of(cell: Cell) -> tuple[Setting, ...]:
     """Return what can be shown or hidden in a cell's scene."""
-    if sorts(cell):
+    if is_sorting(cell):
         return (COLLISION_SHAPES, *SORTING)
     return (COLLISION_SHAPES, *(REACH if is_reaching(cell) else CHOICE))
 

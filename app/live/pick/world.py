@@ -44,7 +44,7 @@ class LivePickWorld(BaseWorld[LiveWorkers]):
         self._run = CaseRun()
         self._goal: str | None = None
         self._picked: set[str] = set()
-        self._selected = tuple(s.id for s in cell.stations if s.kind == "cube")
+        self._selected = tuple(cube.id for cube in cell.stations_of("cube"))
         self._own_choice = self._selected
         self._reset()
         self._plan()

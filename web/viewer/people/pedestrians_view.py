@@ -1,4 +1,4 @@
-"""Walking cylinders in the scene: what counts of people, around their mannequins."""
+"""Pedestrians in the scene, as cylinders: what counts of people, around their mannequins."""
 
 import numpy as np
 import viser
@@ -15,7 +15,7 @@ SAME_M = 2e-3
 """Changes of place and radius that are not shown [m]."""
 
 
-class WalkersView:
+class PedestriansView:
     """Draws the cylinders; used by the live cell's thread only.
 
     Args:

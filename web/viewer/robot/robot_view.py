@@ -32,7 +32,7 @@ class RobotView:
         self._tool = scene.add_frame("/robot/tool", show_axes=False)
         self._fingers: tuple[viser.GlbHandle, ...] = ()
         self._lamp: viser.MeshHandle | None = None
-        if any(station.kind == "clutter" for station in cell.stations):
+        if cell.stations_of("clutter"):
             self._lamp = self._add_magnet(scene, cell)
         else:
             self._fingers = self._add_gripper(scene, cell)

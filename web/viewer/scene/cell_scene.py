@@ -13,13 +13,14 @@ from app.live.reach.commands import is_reaching
 from app.live.snapshot import WorldSnapshot
 from app.sim.cells.cell import Cell
 from app.sim.pick.task_policy import RiskMap
+from app.sim.sorting.layout import is_sorting
 from web.viewer.people.people_view import PeopleView
 from web.viewer.robot.robot_view import RobotView
 from web.viewer.scene import workplace
 from web.viewer.scene.arc import Arc
 from web.viewer.scene.reach_scene import ReachScene
 from web.viewer.scene.risk_view import RiskView
-from web.viewer.scene.sorting_scene import SortingScene, sorts
+from web.viewer.scene.sorting_scene import SortingScene
 from web.viewer.scene.stations_view import StationsView
 
 PATH_LIFT = 0.12
@@ -38,7 +39,7 @@ class CellScene:
             self._robot = RobotView(server, cell)
             self._stations = StationsView(server, cell, submit)
             self._people = PeopleView(server, cell, submit)
-            self._sorting = SortingScene(server, cell, submit) if sorts(cell) else None
+            self._sorting = SortingScene(server, cell, submit) if is_sorting(cell) else None
             self._reach = ReachScene(server, cell, submit) if is_reaching(cell) else None
             picks = self._sorting is None and self._reach is None
             self._risk = RiskView(server) if picks else None

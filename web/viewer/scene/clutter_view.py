@@ -20,7 +20,7 @@ def tray_height(cell: Cell) -> float:
 
     The tool reaches a block's top at its station; a block is one level high.
     """
-    towers = [one for one in cell.stations if one.kind == "cluster"]
+    towers = cell.stations_of("cluster")
     levels = [one.position[2] - (one.level_height or 0.0) for one in towers]
     return max(DRAWN_M, min(levels, default=0.0))
 
@@ -35,7 +35,7 @@ class ClutterView:
 
     def __init__(self, server: viser.ViserServer, cell: Cell) -> None:
         scene, height = server.scene, tray_height(cell)
-        stations = [one for one in cell.stations if one.kind == "clutter"]
+        stations = cell.stations_of("clutter")
         points = np.array([one.position[:2] for one in stations])
         width, depth = _spacing(points[:, 0]), _spacing(points[:, 1])
         body = tray(points, height, 0.5 * max(width, depth) + 0.002)

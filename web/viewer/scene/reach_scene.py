@@ -17,7 +17,7 @@ from app.sim.cells.cell import Cell
 from app.sim.reach.batch import goal_region_of
 from app.sim.safety.separation_zone import N_DIRECTIONS
 from web.viewer.people.mannequin import Rgb
-from web.viewer.people.pedestrians_view import WalkersView
+from web.viewer.people.pedestrians_view import PedestriansView
 from web.viewer.poses import Vec
 from web.viewer.scene.arc import Arc
 from web.viewer.scene.goal_gizmo import GoalGizmo
@@ -65,7 +65,7 @@ class ReachScene:
     def __init__(
         self, server: viser.ViserServer, cell: Cell, submit: Callable[[MoveGoal], object]
     ) -> None:
-        self._walkers = WalkersView(server, cell)
+        self._pedestrians = PedestriansView(server, cell)
         self._goal = GoalGizmo(server, cell, submit)
         _add_targets(server, cell)
         self._zone = _Zone(server, cell)
@@ -83,7 +83,7 @@ class ReachScene:
         view = snapshot.reach
         if view is None:
             return
-        self._walkers.draw(snapshot)
+        self._pedestrians.draw(snapshot)
         self._goal.draw(view, reached=snapshot.status == "reached")
         if snapshot.status == "moving":
             self._path.show(snapshot.tcp, view.goal)

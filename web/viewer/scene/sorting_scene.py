@@ -25,11 +25,6 @@ ARC_LIFT = 0.22
 RING_M = 0.078
 
 
-def sorts(cell: Cell) -> bool:
-    """Return whether a cell has somewhere to sort from and somewhere to sort to."""
-    return {"clutter", "cluster"} <= {station.kind for station in cell.stations}
-
-
 class SortingScene:
     """Draws what is sorted; used by the live cell's thread only.
 

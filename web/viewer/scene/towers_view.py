@@ -23,8 +23,8 @@ class TowersView:
     def __init__(self, server: viser.ViserServer, cell: Cell) -> None:
         self._scene = server.scene
         height = tray_height(cell)
-        for station in cell.stations:
-            if station.kind == "cluster" and station.colour is not None:
+        for station in cell.stations_of("cluster"):
+            if station.colour is not None:
                 x, y, _ = station.position
                 plate = tower_plate(BLOCKS[station.colour], height)
                 self._scene.add_glb(

@@ -116,7 +116,7 @@ def _light(server: viser.ViserServer) -> None:
 def _camera(server: viser.ViserServer, cell: Cell) -> None:
     """Look at the people's hands; at blocks from nearer, at walkers from farther off."""
     camera = server.initial_camera
-    if any(station.kind == "clutter" for station in cell.stations):
+    if cell.stations_of("clutter"):
         camera.position, camera.look_at = (2.14, -0.88, 1.58), (-0.02, 0.58, 0.1)
     elif is_reaching(cell):
         camera.position, camera.look_at = (2.9, -2.0, 2.2), (-0.25, 0.75, 0.0)
