@@ -27,7 +27,7 @@ from types import MappingProxyType
 import numpy as np
 
 from app.sim.cells.cell import Cell
-from app.sim.people.reach_script import HANDS
+from app.sim.human.model import HANDS
 from app.sim.pick.case_geometry import (
     BLOCKED_BELOW,
     CaseGeometry,
