@@ -3,8 +3,10 @@
 Double Q-learning, dueling networks, prioritised replay with n-step returns, action masks in
 exploration, targets and prediction, and expert labels: in a part of each minibatch the exact
 planner marks all optimal moves, and a large-margin loss raises one of them above the others.
-The prioritised draw returns transitions in the order of their places in the buffer, therefore
-the labelled rows are spread evenly over the minibatch, and with it over the buffer.
+The part is the first of the minibatch. The prioritised draw returns transitions in the order of
+their places in the buffer, so that it is always the same region of places: until the buffer is
+full the oldest transitions, afterwards those of the places that are written first. Labels
+spread over the buffer gave no better policies (docs/notebook/sorting.md).
 
 The double target is ``r + gamma^n Q_target(s', argmax_a Q_online(s', a))``.
 
@@ -176,10 +178,10 @@ class SortingDQN(DQN, Stateful):
         error = functional.smooth_l1_loss(taken, target, reduction="none")
         loss = (drawn.weights * error).mean()
         if self._expert is not None:
-            rows = labelled_rows(batch_size, self.preset.expert.share)
-            best = self._expert(drawn.observations[rows].numpy())
+            n = round(self.preset.expert.share * batch_size)
+            best = self._expert(drawn.observations[:n].numpy())
             short = large_margin_loss(
-                values[rows], torch.as_tensor(best), self.preset.expert.margin
+                values[:n], torch.as_tensor(best), self.preset.expert.margin
             )
             loss = loss + self.preset.expert.weight * short
         self.policy.optimizer.zero_grad()
@@ -188,12 +190,6 @@ class SortingDQN(DQN, Stateful):
         self.policy.optimizer.step()
         with torch.no_grad():
             self.memory.update(drawn.indices, (taken - target).abs().numpy())
-
-
-def labelled_rows(batch_size: int, share: float) -> Tensor:
-    """Return a share of the rows of a minibatch, spread evenly over it."""
-    n = round(share * batch_size)
-    return torch.arange(n) * batch_size // n
 
 
 def large_margin_loss(values: Tensor, best: Tensor, margin: float) -> Tensor:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import torch
 
-from app.policies.algorithms.dqn import SortingDQN, labelled_rows, large_margin_loss
+from app.policies.algorithms.dqn import SortingDQN, large_margin_loss
 from app.policies.algorithms.vecenv import BatchVecEnv
 from app.policies.configs import presets
 from app.policies.configs.fields import entries
@@ -80,15 +80,6 @@ def test_advice_marks_all_moves_that_begin_a_shortest_plan():
     marks = expert_of(batch.shape)(batch.reset())
     for e in range(40):
         assert tuple(np.flatnonzero(marks[e])) == solve(batch.state_of(e), batch.shape).first
-
-
-def test_labelled_rows_come_from_the_whole_replay():
-    model = model_of(alpha=0.0)
-    model.learn(2_000)
-    rows = labelled_rows(64, 0.25)
-    assert len(rows) == len(set(rows.tolist())) == 16
-    places = model.memory.draw(64, 0.4).indices[rows.numpy()]
-    assert np.bincount(places * 4 // 2_000, minlength=4).min() >= 3
 
 
 @pytest.mark.parametrize(
