@@ -62,7 +62,7 @@ def list_all_evaluations(
         str | None, Query(description="only of this checkpoint, by SHA-256 or alias")
     ] = None,
     cursor: Annotated[str | None, Query(description="next_cursor of the page before")] = None,
-    limit: Annotated[int, Query(description="length of the page, 1 to 200")] = 50,
+    limit: Annotated[int, Query(ge=1, le=200, description="length of the page")] = 50,
 ) -> EvaluationList:
     """Return one page of the results of succeeded evaluations, newest first."""
     if protocol is not None and protocol not in PROTOCOLS:

@@ -1,8 +1,7 @@
 """The pick scenario of thesis chapter 5: one robot, one person, cubes and docks.
 
 :class:`PickBatch` steps many environments in compiled kernels (``pick/kernels/episode.py``).
-The
-functions evaluate one state with the same kernels, for the live world and task selection.
+The functions evaluate one state with the same kernels, for the live world and task selection.
 """
 
 from dataclasses import dataclass, field

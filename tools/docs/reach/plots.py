@@ -173,15 +173,16 @@ def modes_of(result: Json) -> dict[str, Json]:
 
 
 def own_mode(result: Json) -> str:
-    """Return the inference mode that a policy was trained for, with rollout if available."""
-    modes = list(modes_of(result))
+    """Return the inference mode that a policy was trained for, without rollout."""
+    modes = [mode for mode in modes_of(result) if not mode.endswith("-rollout")]
     return ([mode for mode in modes if mode.startswith("interpolated")] or modes)[-1]
 
 
 def between_targets(results: Sequence[Json]) -> Figure:
     """Draw success on goals between targets, by inference mode and by distance to the grid.
 
-    Of several policies, the right panel shows each in the mode it was trained for.
+    Of several policies, the right panel shows each in the mode it was trained for, without
+    rollout.
     """
     several = len(results) > 1
     n_modes = sum(len(modes_of(result)) for result in results)

@@ -6,9 +6,8 @@ and waist round. Legs follow the feet that :mod:`web.viewer.people.gait` puts on
 
 Frames: in the bind pose the pelvis is the origin, x forward, y left, z up, as in
 ``app.sim.human.model``. The mannequin is modelled as the median person; for another one its
-skin is
-scaled bone by bone (:func:`scales`), along the bone as its length and across it as the girth.
-Legs are as long as the girth says, which goes with the stature.
+skin is scaled bone by bone (:func:`scales`), along the bone as its length and across it as the
+girth. Legs are as long as the girth says, which goes with the stature.
 """
 
 import math
