@@ -165,7 +165,7 @@ def test_drag_of_a_person_who_leaves_meanwhile_is_no_error(
     server = live._server
     assert server is not None
     with ViewerClient(live.viewer_address) as visitor:
-        visitor.wait_until("TransformControlsMessage", "/gizmos/1/pelvis")
+        visitor.wait_for("TransformControlsMessage", "/gizmos/1/pelvis")
         visitor.send(
             type="TransformControlsDragStartMessage", name="/gizmos/1/pelvis", owner=""
         )
