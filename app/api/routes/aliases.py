@@ -10,17 +10,16 @@ from app.api.services import ServicesDep
 from app.errors import Conflict, NotFound
 from app.policies.checkpoints import pretrained
 
+router = APIRouter(prefix="/v1/aliases", tags=["checkpoints"])
+RESERVED: dict[int | str, dict[str, Any]] = {
+    409: {"description": "It is the name of a shipped checkpoint"},
+    507: {},
+}
 IN_USE: dict[int | str, dict[str, Any]] = {
     409: {
         "description": "It is the name of a shipped checkpoint, or a job that has not ended "
         "evaluates its checkpoint by this name"
     },
-    507: {},
-}
-
-router = APIRouter(prefix="/v1/aliases", tags=["checkpoints"])
-RESERVED: dict[int | str, dict[str, Any]] = {
-    409: {"description": "It is the name of a shipped checkpoint"},
     507: {},
 }
 
