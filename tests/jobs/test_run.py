@@ -30,7 +30,7 @@ from tests.policies.evaluation.sorting_players import untrained
 from tests.sim.recorded_person import csv_text, working
 from tests.support import workshop
 from tests.support.databases import SQLITE_ONLY
-from tests.support.trainings import Made, made_by, train
+from tests.support.trainings import Made, killed_midway, made_by, train
 
 
 @pytest.fixture
@@ -71,15 +71,10 @@ def test_training_stores_its_curve_and_policies(store: Store) -> None:
 def test_killed_training_ends_with_the_checkpoints_of_one_that_was_not(
     store: Store, tmp_path: Path, undisturbed: Made
 ) -> None:
-    killed_id = train(store)
-    wait_for(store, killed_id, lambda job: job.step >= 640)
-    (pid,) = worker_pids(os.getpid())
-    os.kill(pid, signal.SIGKILL)
-    assert any((tmp_path / "resume" / killed_id).iterdir())
-    killed = wait_until_final(store, killed_id)
+    killed = killed_midway(store, tmp_path)
     assert (killed.state, killed.attempt) == ("succeeded", 2)
-    assert made_by(store, killed_id) == undisturbed
-    folder = tmp_path / "resume" / killed_id  # removed after the end is recorded
+    assert made_by(store, killed.id) == undisturbed
+    folder = tmp_path / "resume" / killed.id  # removed after the end is recorded
     wait_until(lambda: not folder.exists())
 
 

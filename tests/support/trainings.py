@@ -1,5 +1,7 @@
 """A training of seconds as a job, and its result where nothing disturbs it."""
 
+import os
+import signal
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -7,8 +9,9 @@ from typing import Any
 from app.policies.configs.presets import nested
 from app.store import checkpoints, jobs
 from app.store.engine import Store
+from app.store.records import JobRecord
 from jobs.spec import parse_spec
-from tests.jobs.machinery import supervised, wait_until_final
+from tests.jobs.machinery import supervised, wait_for, wait_until_final, worker_pids
 
 TINY = {
     "learning.total_steps": 2048,
@@ -38,6 +41,16 @@ def train(store: Store, step_budget: int | None = None, **overrides: float | str
     body = {"kind": "train", "preset": "pick-td3", "seed": 4, "overrides": fields}
     body["step_budget"] = step_budget
     return jobs.create_job(store, parse_spec(body).new_job()).id
+
+
+def killed_midway(store: Store, folder: Path) -> JobRecord:
+    """Post a training, kill its process when it has states; return the job at its end."""
+    job_id = train(store)
+    wait_for(store, job_id, lambda job: job.step >= 640)
+    (pid,) = worker_pids(os.getpid())
+    os.kill(pid, signal.SIGKILL)
+    assert any((folder / "resume" / job_id).iterdir())
+    return wait_until_final(store, job_id)
 
 
 def made_by(store: Store, job_id: str) -> Made:

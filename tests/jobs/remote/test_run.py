@@ -1,7 +1,5 @@
 """A worker that has neither the database nor the data folder, in a real process."""
 
-import os
-import signal
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,11 +13,10 @@ from tests.jobs.machinery import (
     supervised,
     wait_for,
     wait_until_final,
-    worker_pids,
 )
 from tests.jobs.remote.serving import TOKEN, serving
 from tests.support.databases import SQLITE_ONLY
-from tests.support.trainings import Made, made_by, train
+from tests.support.trainings import Made, killed_midway, made_by, train
 
 pytestmark = SQLITE_ONLY
 
@@ -34,15 +31,10 @@ def test_training_over_http_killed_once_ends_with_the_checkpoints_of_a_local_one
     store: Store, tmp_path: Path, address: str, undisturbed: Made
 ) -> None:
     with supervised(store, tmp_path, executor=elsewhere(tmp_path, address)):
-        killed_id = train(store)
-        wait_for(store, killed_id, lambda job: job.step >= 640)
-        (pid,) = worker_pids(os.getpid())
-        os.kill(pid, signal.SIGKILL)
-        assert any((tmp_path / "resume" / killed_id).iterdir())
-        killed = wait_until_final(store, killed_id)
+        killed = killed_midway(store, tmp_path)
     assert (killed.state, killed.error, killed.attempt) == ("succeeded", None, 2)
-    assert made_by(store, killed_id) == undisturbed
-    steps = [point.step for point in metrics.list_metrics(store, killed_id)]
+    assert made_by(store, killed.id) == undisturbed
+    steps = [point.step for point in metrics.list_metrics(store, killed.id)]
     assert steps == list(range(128, 2049, 128))
     assert not (tmp_path / "elsewhere" / "resume").exists()
 
