@@ -10,6 +10,7 @@ from typing import Any, Protocol
 import numpy as np
 import torch
 from stable_baselines3.common.callbacks import BaseCallback
+from stable_baselines3.common.logger import Logger
 from stable_baselines3.common.type_aliases import TrainFreq
 
 from app.policies.algorithms.dqn import SortingDQN
@@ -92,6 +93,8 @@ class TrainingRun:
     ) -> None:
         self.preset, self.seed, self.cell = preset, seed, cell
         self.model, self._env, self._parts = model, env, parts
+        # The default one, though it writes nothing here, leaves a folder per training in /tmp.
+        model.set_logger(Logger(None, []))
         self._cpu_before, self._cpu_start = 0.0, time.process_time()
         self._untimed = 0.0
         self._commits: list[Any] = []

@@ -3,6 +3,7 @@
 import json
 import logging
 import random
+import tempfile
 from pathlib import Path
 from typing import Any
 
@@ -221,6 +222,16 @@ def test_everything_that_a_training_changes_is_restored(
         differs = {path for path in content if restored[part].get(path) != content[path]}
         assert differs <= COUNTED_BY_CALLBACK.get(part, set())
     assert global_generators() == generators
+
+
+def test_a_training_leaves_no_temporary_files(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    temporary = tmp_path / "temporary"
+    temporary.mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(temporary))
+    Training(small("DQN"), tmp_path / "states").run()
+    assert not list(temporary.iterdir())
 
 
 COUNTED_BY_CALLBACK = {
