@@ -13,7 +13,7 @@ is a map of 50 x 50 places of a person with three candidates.
 ``sorting_decision.decide`` gives them to the service: with the plan behind the expected
 attempts, all moves ranked and the planner fallback monitored. Half of the tasks are disturbed.
 
-``motion-...`` is the next piece of motion toward a goal; see ``motion_decisions.py``.
+``motion-...`` is the next segment toward a goal; see ``motion_decisions.py``.
 
 Clock time, of one thread: the median over all calls, with the least and the 99th percentile
 beside it.

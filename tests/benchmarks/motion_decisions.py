@@ -1,11 +1,11 @@
 """Motion decisions for ``bench decision-time``, beside eight calls of ``TD3.predict``.
 
 ``motion`` is one decision between training targets, eight states in one batch, as
-``MotionDecider.decide`` gives it: checks, observations, network, weights, the piece and its
+``MotionDecider.decide`` gives it: checks, observations, network, weights, the segment and its
 limits. ``motion-monitored`` adds speed and separation monitoring, ``motion-direct`` asks for
 one state, ``motion-rollout`` plays the decision ahead. ``motion-sb3-predict`` is
 Stable-Baselines3's own ``predict`` of a network of that size, called once for each of eight
-observations that are ready: without observing, weighing and the piece.
+observations that are ready: without observing, weighing and the segment.
 
 All take turns, state by state, so that a machine that slows down slows all of them.
 """

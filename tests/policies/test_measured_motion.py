@@ -1,4 +1,4 @@
-"""States near and over the limits: always an answer, a flag, and a piece that leads inside."""
+"""States near and over the limits: an answer, a flag, and a segment that leads inside."""
 
 from dataclasses import replace
 
@@ -52,15 +52,15 @@ def near_the_limits(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray, n
 
 def assert_leads_inside(decision: MotionDecision, asked: MotionQuestion) -> None:
     """Every joint outside is turned inward with its whole acceleration, until it is fast."""
-    q, qd, piece = asked.q, asked.qd, decision.piece
-    np.testing.assert_allclose(piece.q, q + DT * (qd + DT * (piece.c + DT * piece.d)))
+    q, qd, segment = asked.q, asked.qd, decision.segment
+    np.testing.assert_allclose(segment.q, q + DT * (qd + DT * (segment.c + DT * segment.d)))
     step = HARD * DT
-    assert (np.abs(piece.qd - qd) <= step + 1e-9).all()
+    assert (np.abs(segment.qd - qd) <= step + 1e-9).all()
     inside = (q >= LOW) & (q <= HIGH)
-    assert (np.abs(piece.qd) <= np.maximum(FAST, np.abs(qd) - step) + 1e-9)[inside].all()
+    assert (np.abs(segment.qd) <= np.maximum(FAST, np.abs(qd) - step) + 1e-9)[inside].all()
     for above, sign in ((q > HIGH, 1.0), (q < LOW, -1.0)):
         toward = np.maximum(-FAST, sign * qd - step)
-        np.testing.assert_allclose((sign * piece.qd)[above], toward[above], atol=1e-6)
+        np.testing.assert_allclose((sign * segment.qd)[above], toward[above], atol=1e-6)
 
 
 @pytest.mark.parametrize("kind", ["speed", "coefficient", "one-step"])
@@ -88,15 +88,15 @@ def test_a_jerk_limited_policy_leads_inside_from_the_clamped_acceleration() -> N
     for _ in range(200):
         q, qd, qdd = near_the_limits(rng)
         decision = one.decide(question(q=q, qd=qd, qdd=qdd))
-        piece, begun = decision.piece, np.clip(qdd, -HARD, HARD)
-        np.testing.assert_allclose(2.0 * piece.c, begun)
-        assert (np.abs(6.0 * piece.d) <= jerk + 1e-6).all()
-        assert (np.abs(piece.qdd) <= HARD + 1e-6).all()
+        segment, begun = decision.segment, np.clip(qdd, -HARD, HARD)
+        np.testing.assert_allclose(2.0 * segment.c, begun)
+        assert (np.abs(6.0 * segment.d) <= jerk + 1e-6).all()
+        assert (np.abs(segment.qdd) <= HARD + 1e-6).all()
         for above, sign in ((q > HIGH, 1.0), (q < LOW, -1.0)):
             least = np.maximum(-HARD, sign * begun - jerk * DT)
             slow = sign * qd > -0.5 * FAST
             outward = above & slow & (sign * begun > -0.5 * HARD)
-            np.testing.assert_allclose((sign * piece.qdd)[outward], least[outward], atol=1e-6)
+            np.testing.assert_allclose((sign * segment.qdd)[outward], least[outward], atol=1e-6)
 
 
 @pytest.mark.parametrize("kind", list(ACTIONS))
@@ -163,7 +163,7 @@ def test_a_joint_at_its_limit_at_full_speed_outward_brakes_and_is_flagged(
     qd[joints] = side * FAST[joints]
     decision = one.decide(question(q=q, qd=qd, qdd=np.zeros(6), people=()))
     assert decision.unfeasible and decision.state_outside == ()
-    slower = side * (qd - decision.piece.qd)[joints]
+    slower = side * (qd - decision.segment.qd)[joints]
     most = HARD * DT if kind != "jerk" else 0.5 * np.array(CELL.robot.jerk_max) * DT**2
     np.testing.assert_allclose(slower, most[joints], rtol=1e-6)
     assert decision.safe is not None and (side * decision.safe.qd < FAST)[joints].all()
@@ -226,7 +226,7 @@ def test_distances_and_stops_are_those_of_the_measured_state() -> None:
     layer = measured.safe
     assert layer is not None and measured.terms is not None
     assert measured.terms.separation == pytest.approx(measured.met[0].separation, abs=1e-9)
-    np.testing.assert_allclose(measured.piece.q - q, layer.q - q, atol=0.01)
+    np.testing.assert_allclose(measured.segment.q - q, layer.q - q, atol=0.01)
 
 
 @pytest.mark.parametrize("away", [6.0, 40.0, 99.0])

@@ -146,17 +146,17 @@ class SegmentPublic(Answer):
     qdd: Vector6 = Field(description="joint accelerations there [rad/s^2]")
 
     @staticmethod
-    def commanded(piece: TrajectorySegment, q: Vec, qd: Vec, dt: float) -> Data:
+    def commanded(segment: TrajectorySegment, q: Vec, qd: Vec, dt: float) -> Data:
         """Return the data of the policy's segment from joint positions and speeds."""
-        parts = [q, qd, piece.c]
-        if piece.d.any():
-            parts.append(piece.d)
+        parts = [q, qd, segment.c]
+        if segment.d.any():
+            parts.append(segment.d)
         return {
             "coefficients": np.array(parts).T.tolist(),
             "until": dt,
-            "q": piece.q.tolist(),
-            "qd": piece.qd.tolist(),
-            "qdd": piece.qdd.tolist(),
+            "q": segment.q.tolist(),
+            "qd": segment.qd.tolist(),
+            "qdd": segment.qdd.tolist(),
         }
 
     @staticmethod
@@ -269,7 +269,7 @@ class MotionAnswer(Answer):
     ) -> Data:
         """Return the data of the answer of a decision."""
         segment, safe = (
-            SegmentPublic.commanded(decision.piece, question.q, question.qd, dt),
+            SegmentPublic.commanded(decision.segment, question.q, question.qd, dt),
             decision.safe,
         )
         commanded = segment

@@ -142,7 +142,7 @@ class MotionDecider:
             act=act,
             rollout=rollout,
             candidate=candidate,
-            piece=segment,
+            segment=segment,
             unfeasible=unfeasible,
             inference_mode=mode,
             targets=targets,

@@ -7,5 +7,5 @@ path_tracking          Path following: tracks a timed path from the robot's actu
                        period by period
 replanning             Replanning executors: planners in three roles, in place of a policy
 time_parameterization  From a path of straight joint motions to one timed within the limits, in
-                       exact pieces
+                       exact segments
 """

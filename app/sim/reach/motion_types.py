@@ -80,8 +80,8 @@ class MotionDecision(NamedTuple):
     """Whether rollouts were simulated."""
     candidate: str | None
     """Candidate executed instead of the policy's action; None for the policy's action."""
-    piece: TrajectorySegment
-    """The commanded piece, before any scaling."""
+    segment: TrajectorySegment
+    """The commanded segment, before any scaling."""
     unfeasible: bool
     """Whether a joint had no admissible coefficient and brakes, or returns to its limits."""
     inference_mode: MotionMode

@@ -33,7 +33,7 @@ def test_peer_moves_as_the_kernels_move() -> None:
     for _ in range(20):
         act = rng.uniform(-1.0, 1.0, 5).astype(np.float32)
         obs, _, ended = env.step(act)
-        piece = step_robot(arm, q, qd, np.zeros(6), act)
-        q, qd = piece.q, piece.qd
+        segment = step_robot(arm, q, qd, np.zeros(6), act)
+        q, qd = segment.q, segment.qd
         assert not ended
         np.testing.assert_allclose(obs[:12], np.concatenate([q, qd]), atol=1e-9)

@@ -1,4 +1,4 @@
-"""The next piece of motion: as in training, interpolated, monitored; and what is refused."""
+"""The next trajectory segment: as in training, interpolated, monitored; and what is refused."""
 
 from dataclasses import replace
 from typing import Any
@@ -102,8 +102,8 @@ def test_one_state_gives_the_action_and_segment_of_training(
     assert len(found) > 2
     for e, decision in found.items():
         np.testing.assert_allclose(decision.act, expected[e], atol=2e-6)
-        np.testing.assert_allclose(decision.piece.q, batch.state.q[e], atol=1e-7)
-        np.testing.assert_allclose(decision.piece.qd, batch.state.qd[e], atol=1e-6)
+        np.testing.assert_allclose(decision.segment.q, batch.state.q[e], atol=1e-7)
+        np.testing.assert_allclose(decision.segment.qd, batch.state.qd[e], atol=1e-6)
         np.testing.assert_allclose(decision.clearance, clear[e], atol=1e-9)
         assert decision.distance == pytest.approx(distance[e], abs=1e-12)
 
@@ -238,7 +238,7 @@ def test_only_a_measured_velocity_takes_the_place_of_the_assumed_one(
 def test_far_from_people_monitoring_leaves_the_piece_as_it_is() -> None:
     decision = decider().decide(question(safety=SafetySettings()))
     assert decision.safe is not None and decision.safe.override == 1.0
-    np.testing.assert_array_equal(decision.safe.q, decision.piece.q)
+    np.testing.assert_array_equal(decision.safe.q, decision.segment.q)
     assert decision.terms is not None and decision.terms_of == 0
     assert decision.terms.separation > decision.terms.required
     no_people = decider().decide(question(people=(), safety=SafetySettings()))
@@ -251,8 +251,8 @@ def test_a_policy_that_limits_jerk_needs_accelerations() -> None:
         one.decide(question())
     qdd = np.full(6, 0.4)
     decision = one.decide(question(qdd=qdd))
-    np.testing.assert_array_equal(decision.piece.c, 0.5 * qdd)
-    assert decision.piece.d.any()
+    np.testing.assert_array_equal(decision.segment.c, 0.5 * qdd)
+    assert decision.segment.d.any()
 
 
 BAD: list[tuple[dict[str, Any], str]] = [

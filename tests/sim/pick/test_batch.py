@@ -118,19 +118,19 @@ def test_single_state_functions_do_what_the_batch_does(cell: Cell) -> None:
         q, qd, person = state.q.copy(), state.qd.copy(), state.people.q.copy()
         result = batch.step(act, auto_reset=False)
         for e in np.flatnonzero(state.outcome == 0):
-            piece = pick.step_robot(batch.arm, q[e], qd[e], np.zeros(6), act[e])
-            np.testing.assert_array_equal(piece.q, state.q[e])
-            np.testing.assert_array_equal(piece.qd, state.qd[e])
+            segment = pick.step_robot(batch.arm, q[e], qd[e], np.zeros(6), act[e])
+            np.testing.assert_array_equal(segment.q, state.q[e])
+            np.testing.assert_array_equal(segment.qd, state.qd[e])
             hit = contact(
                 batch.arm,
                 people,
-                JointPath(q[e], qd[e], piece.c, piece.d),
+                JointPath(q[e], qd[e], segment.c, segment.d),
                 (person[e], state.people.q[e]),
                 sizes=state.people.size[e],
             )
             assert hit.kind == "none" and hit.clearance_m == state.clear[e, 0]
             seen, _ = observer.observe(
-                (piece.q, piece.qd),
+                (segment.q, segment.qd),
                 (state.people.q[e], state.people.qd[e], state.people.size[e]),
                 state.goal[e : e + 1],
                 state.time_left[e],

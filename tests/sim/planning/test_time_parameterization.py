@@ -1,4 +1,4 @@
-"""Timed paths keep the limits to rounding, in exact pieces, and stay near their path."""
+"""Timed paths keep the limits to rounding, in exact segments, and stay near their path."""
 
 import itertools
 from dataclasses import replace
@@ -111,7 +111,7 @@ def test_timing_costs_little_beside_the_speed_limits() -> None:
     assert least <= spent < 1.2 * least
 
 
-def test_every_piece_lies_in_the_interval_of_the_bounded_actions() -> None:
+def test_every_segment_lies_in_the_interval_of_the_bounded_actions() -> None:
     rng = np.random.default_rng(6)
     low, high = planning_limits(Checker(ARM, no_people()), ARM.home)
     for _ in range(60):
@@ -126,7 +126,7 @@ def test_every_piece_lies_in_the_interval_of_the_bounded_actions() -> None:
                 assert c_min - 1e-9 <= c[j] <= c_max + 1e-9
 
 
-def test_at_interpolates_the_pieces_and_holds_the_ends() -> None:
+def test_at_interpolates_the_segments_and_holds_the_ends() -> None:
     timed = time_path(np.array([np.zeros(6), np.full(6, 0.4)]), LIMITS)
     q, qd = timed.at(2.5 * ARM.dt)
     c = (timed.qd[3] - timed.qd[2]) / (2.0 * ARM.dt)

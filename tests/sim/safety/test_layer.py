@@ -48,7 +48,7 @@ def ahead(distance):
 
 
 def least_full_distance(settings, qd, c, age=0.0):
-    """The least separation of the ball at which the piece is executed as commanded [m]."""
+    """The least separation of the ball at which the segment is executed as commanded [m]."""
     layer, low, high = SafetyLayer(ARM, settings), 0.0, 3.0
     for _ in range(30):
         middle = 0.5 * (low + high)

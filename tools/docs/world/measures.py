@@ -129,8 +129,8 @@ def episode(arm: Arm, degree: int, seed: int) -> Episode:
     for period in range(PERIODS):
         if period % HOLD == 0:
             act = rng.choice([-1.0, 1.0, rng.uniform(-1.0, 1.0)], 6)
-        piece = step_robot(arm, q, qd, qdd, act, action)
-        c, d = piece.c, piece.d
+        segment = step_robot(arm, q, qd, qdd, act, action)
+        c, d = segment.c, segment.d
         rows.append(
             (
                 period * arm.dt + x[:, 0],
@@ -140,7 +140,7 @@ def episode(arm: Arm, degree: int, seed: int) -> Episode:
                 np.tile(6.0 * d, (PER_PERIOD, 1)),
             )
         )
-        q, qd, qdd = piece.q, piece.qd, piece.qdd
+        q, qd, qdd = segment.q, segment.qd, segment.qdd
     joined = [np.concatenate(parts) for parts in zip(*rows, strict=True)]
     return Episode(time=joined[0], q=joined[1], qd=joined[2], qdd=joined[3], jerk=joined[4])
 

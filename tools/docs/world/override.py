@@ -71,8 +71,8 @@ def visit() -> tuple[Json, Visit]:
         if np.abs(configurations[at] - q).max() < 0.05:
             at = 1 - at
         act = np.clip(GAIN * (configurations[at] - q) / arm.limits.qd_max, -1.0, 1.0)[:5]
-        piece = step_robot(arm, q, qd, qdd, act)
-        done = layer.decide(q, qd, piece.c, piece.d, shapes_of(cell, person[None]))
+        segment = step_robot(arm, q, qd, qdd, act)
+        done = layer.decide(q, qd, segment.c, segment.d, shapes_of(cell, person[None]))
         q, qd, qdd = done.q, done.qd, done.qdd
         later = human.rest_posture(0.0, pelvis_y((period + 1) * arm.dt), -0.5 * np.pi)
         gap = clearance(arm, people, q, later[None], NO_CYLINDERS).people_m

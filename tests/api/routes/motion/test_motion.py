@@ -30,10 +30,10 @@ pytestmark = pytest.mark.usefixtures("policies")
 PAGE = (Path(__file__).parents[4] / "docs" / "http.md").read_text("utf-8")
 
 
-def at(piece: dict[str, Any], t: float) -> np.ndarray:
-    """Joint positions of a piece at a time in its period."""
-    t = min(t, piece["until"])
-    return np.array([np.polynomial.polynomial.polyval(t, c) for c in piece["coefficients"]])
+def at(segment: dict[str, Any], t: float) -> np.ndarray:
+    """Joint positions of a segment at a time in its period."""
+    t = min(t, segment["until"])
+    return np.array([np.polynomial.polynomial.polyval(t, c) for c in segment["coefficients"]])
 
 
 def test_answer_is_a_piece_per_joint_and_what_explains_it(
@@ -92,12 +92,12 @@ def test_executed_piece_is_a_polynomial_in_time_that_ends_where_it_says(
 ) -> None:
     qd = [0.8, -0.4, 0.6, 0.1, 0.0, -0.9]
     answer = asked(client, robot={"q": HOME, "qd": qd}, people=[{**WALKER, "y": 1.3}])
-    safety, piece = answer["safety"], answer["segment"]
+    safety, segment = answer["safety"], answer["segment"]
     assert 0.0 <= safety["override"] < 1.0 and safety["set_by"] == 0
-    np.testing.assert_allclose(at(piece, 0.02), piece["q"], atol=1e-12)
-    slope = (at(piece, 0.02) - at(piece, 0.02 - 1e-7)) / 1e-7
-    np.testing.assert_allclose(slope, piece["qd"], atol=1e-5)
-    assert np.abs(piece["qd"]).max() < 0.9
+    np.testing.assert_allclose(at(segment, 0.02), segment["q"], atol=1e-12)
+    slope = (at(segment, 0.02) - at(segment, 0.02 - 1e-7)) / 1e-7
+    np.testing.assert_allclose(slope, segment["qd"], atol=1e-5)
+    assert np.abs(segment["qd"]).max() < 0.9
 
 
 def test_terms_add_up_to_the_distance_that_is_required(client: TestClient) -> None:

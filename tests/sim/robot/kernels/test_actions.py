@@ -35,7 +35,7 @@ class Limits(NamedTuple):
 
 
 class Walk(NamedTuple):
-    """States at the starts of all periods, their pieces, and how many were unfeasible."""
+    """States at the starts of all periods, their segments, and how many were unfeasible."""
 
     q: np.ndarray
     qd: np.ndarray
@@ -128,7 +128,7 @@ def excess(value: np.ndarray, low, high) -> float:
 
 
 def worst_excess(one: Walk, limit: Limits) -> float:
-    """Greatest excess over any limit at any time, by the exact extremes of every piece."""
+    """Greatest excess over any limit at any time, by the exact extremes of every segment."""
     q, qd, c, d, dt = one.q[:-1], one.qd[:-1], one.c, one.d, limit.dt
     found = [
         excess(one.q, limit.q_min, limit.q_max),
@@ -215,7 +215,7 @@ def test_no_limit_is_exceeded_from_states_that_are_just_viable(name: str, degree
     assert n_empty == 0
 
 
-def test_the_measure_of_excess_sees_a_piece_that_leaves_its_limits_in_the_middle() -> None:
+def test_the_measure_of_excess_sees_a_segment_that_leaves_its_limits_in_the_middle() -> None:
     limit = limits(1.0, 1.0, 5.0, 50.0, 0.2)
     q = np.full((2, N), 0.69)
     qd = np.tile([[0.5], [-0.3]], N)
@@ -225,7 +225,7 @@ def test_the_measure_of_excess_sees_a_piece_that_leaves_its_limits_in_the_middle
 
 
 @pytest.mark.parametrize("degree", [2, 3])
-def test_pieces_join_and_end_where_they_are_said_to(degree: int) -> None:
+def test_segments_join_and_end_where_they_are_said_to(degree: int) -> None:
     limit = SETS["reaching"]
     one = walk(ActionRule(degree, VIABLE, SPEED), limit, "random", 400, seed=5)
     x, q, qd = limit.dt, one.q[:-1], one.qd[:-1]
