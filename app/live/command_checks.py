@@ -31,8 +31,8 @@ from app.live.reach.commands import (
 )
 from app.live.snapshot import WorldSnapshot
 from app.live.sorting.commands import (
-    AddObject,
-    MoveObject,
+    AddBlock,
+    MoveBlock,
     SetGoal,
     SortingCommand,
     StartTest,
@@ -100,7 +100,7 @@ def check(command: Command, cell: Cell, people: Sequence[int]) -> None:
         case StartTest():
             tests = [one.name for one in tests_of(cell)]
             _require("id", command.id, tests, "is no sorting test that fits this cell")
-        case AddObject() | MoveObject() | SetGoal():
+        case AddBlock() | MoveBlock() | SetGoal():
             _check_table_words(command, cell)
         case _:
             pass
@@ -160,19 +160,19 @@ def _check_goal(position: tuple[float, float, float], cell: Cell) -> None:
             raise InvalidInput(f"position.{axis}", value, rule)
 
 
-def _check_table_words(command: AddObject | MoveObject | SetGoal, cell: Cell) -> None:
+def _check_table_words(command: AddBlock | MoveBlock | SetGoal, cell: Cell) -> None:
     clusters = cell.stations_of("cluster")
     towers = [one.id for one in clusters]
     places = [*(one.id for one in cell.stations_of("clutter")), *towers]
     sizes, no_place = SIZE_NAMES[3], "is no clutter cell or tower of this cell"
     match command:
-        case AddObject():
+        case AddBlock():
             colours = [one.colour or one.id for one in clusters]
             _require("colour", command.colour, colours, "is no colour of this cell")
             _require("size", command.size, sizes, "is no size")
             if command.at is not None:
                 _require("at", command.at, places, no_place)
-        case MoveObject():
+        case MoveBlock():
             _require("to", command.to, places, no_place)
         case SetGoal():
             for tower, wanted in command.towers.items():

@@ -33,13 +33,13 @@ def show(server: str, cell: str) -> None:
 def sorting(server: str) -> Iterator[str]:
     """The server with the sorting cell: four blocks, no goal, a person who stands still."""
     show(server, "sorting-e0")
-    there = [{"tag": "remove-object", "id": one["id"]} for one in task(server)["pieces"]]
+    there = [{"tag": "remove-block", "id": one["id"]} for one in task(server)["blocks"]]
     tell(
         server, {"tag": "set-mode", "mode": "still"}, {"tag": "set-goal", "towers": {}}, *there
     )
     for cell, kind in BLOCKS.items():
         colour, size = kind.split("-")
-        tell(server, {"tag": "add-object", "colour": colour, "size": size, "at": cell})
+        tell(server, {"tag": "add-block", "colour": colour, "size": size, "at": cell})
     yield server
     show(server, load_cell().name)
 
@@ -52,7 +52,7 @@ def task(server: str) -> dict:
 def towers(server: str) -> dict[str, list[str]]:
     """Return the sizes that stand on each tower, from the bottom."""
     found: dict[str, list[str]] = {"red": [], "blue": []}
-    for one in sorted(task(server)["pieces"], key=lambda piece: piece["level"]):
+    for one in sorted(task(server)["blocks"], key=lambda block: block["level"]):
         if one["place"] in found:
             found[one["place"]].append(f"{one['colour']}-{one['size']}")
     return found
@@ -125,7 +125,7 @@ def test_page_counts_the_commands_that_a_world_refuses(
     )
     expect(page.locator(".banner.bad")).to_contain_text("cell7")
     expect(page.locator(".banner.bad")).to_contain_text("(2 commands)")
-    assert [one["place"] for one in task(sorting)["pieces"]].count("cell7") == 1
+    assert [one["place"] for one in task(sorting)["blocks"]].count("cell7") == 1
 
 
 def test_sorting_page_fits_a_phone(open_page: Callable[..., Page], sorting: str) -> None:

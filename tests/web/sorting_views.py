@@ -6,9 +6,9 @@ from dataclasses import replace
 import numpy as np
 
 from app.live.sorting.snapshot import (
+    BlockSnapshot,
     GoalBlockSnapshot,
     MoveSnapshot,
-    PieceSnapshot,
     SortingCounters,
     SortingSnapshot,
 )
@@ -30,9 +30,9 @@ def centre(cell: Cell, place: str, level: int) -> np.ndarray:
     return np.array([x, y, z - half + level * 2.0 * half])
 
 
-def piece(cell: Cell, id: str, kind: str, place: str, level: int = 0) -> PieceSnapshot:
+def block(cell: Cell, id: str, kind: str, place: str, level: int = 0) -> BlockSnapshot:
     colour, size = kind.split("-")
-    return PieceSnapshot(
+    return BlockSnapshot(
         id=id,
         colour=colour,
         size=size,
@@ -58,15 +58,15 @@ def goal_block(cell: Cell, tower: str, level: int, size: str) -> GoalBlockSnapsh
 
 
 def a_view(
-    cell: Cell, pieces: Sequence[PieceSnapshot] = (), goal: Sequence[GoalBlockSnapshot] = ()
+    cell: Cell, blocks: Sequence[BlockSnapshot] = (), goal: Sequence[GoalBlockSnapshot] = ()
 ) -> SortingSnapshot:
     """Return a task of five blocks, the first of which is being fetched."""
-    pieces = pieces or (
-        piece(cell, "block1", "red-large", "cell2"),
-        piece(cell, "block2", "red-small", "cell5"),
-        piece(cell, "block3", "blue-medium", "cell3"),
-        piece(cell, "block4", "blue-large", "blue"),
-        piece(cell, "block5", "red-medium", "blue", 1),
+    blocks = blocks or (
+        block(cell, "block1", "red-large", "cell2"),
+        block(cell, "block2", "red-small", "cell5"),
+        block(cell, "block3", "blue-medium", "cell3"),
+        block(cell, "block4", "blue-large", "blue"),
+        block(cell, "block5", "red-medium", "blue", 1),
     )
     goal = goal or (
         goal_block(cell, "red", 0, "large"),
@@ -75,11 +75,11 @@ def a_view(
         goal_block(cell, "blue", 1, "medium"),
     )
     move = MoveSnapshot(
-        pick=pieces[0].place, place="red", piece=pieces[0].id, value=0.8, best=True
+        pick=blocks[0].place, place="red", block=blocks[0].id, value=0.8, best=True
     )
     stations = [one for one in cell.stations if one.kind == "clutter"]
     return SortingSnapshot(
-        pieces=tuple(pieces),
+        blocks=tuple(blocks),
         goal=tuple(goal),
         failure=tuple(float(one.failure_probability or 0.0) for one in stations),
         colours=tuple(str(o.colour) for o in cell.stations if o.kind == "cluster"),

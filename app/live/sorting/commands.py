@@ -21,10 +21,10 @@ from app.live.sorting.snapshot import Order
 from app.live.sorting.table import Block, SortingTable
 
 
-class AddObject(LiveCommand):
+class AddBlock(LiveCommand):
     """Add a block."""
 
-    tag: Literal["add-object"] = "add-object"
+    tag: Literal["add-block"] = "add-block"
     colour: Name
     """one of the colours of the cell's towers"""
     size: Name
@@ -33,18 +33,18 @@ class AddObject(LiveCommand):
     """free clutter cell, or tower (on its top); null: the first free clutter cell"""
 
 
-class RemoveObject(LiveCommand):
+class RemoveBlock(LiveCommand):
     """Remove a block; a goal block without a remaining match is removed as well."""
 
-    tag: Literal["remove-object"] = "remove-object"
+    tag: Literal["remove-block"] = "remove-block"
     id: Name
     """id of the block"""
 
 
-class MoveObject(LiveCommand):
+class MoveBlock(LiveCommand):
     """Move a block, as a person would."""
 
-    tag: Literal["move-object"] = "move-object"
+    tag: Literal["move-block"] = "move-block"
     id: Name
     """id of the block"""
     to: Name
@@ -96,7 +96,7 @@ class SetOrder(LiveCommand):
 
 
 PlanningCommand = SetSortingPolicy | SetOrder
-TableCommand = AddObject | RemoveObject | MoveObject | SetGoal | ToggleGoal
+TableCommand = AddBlock | RemoveBlock | MoveBlock | SetGoal | ToggleGoal
 SortingCommand = (
     PeopleCommand
     | ClockCommand
@@ -115,15 +115,15 @@ def change_table(command: TableCommand, table: SortingTable) -> Block | None:
         InvalidInput: The command does not fit the table; nothing has changed.
     """
     match command:
-        case AddObject():
+        case AddBlock():
             table.add(command.colour, command.size, command.at)
-        case MoveObject():
+        case MoveBlock():
             table.move(command.id, command.to)
         case SetGoal():
             table.set_goal(command.towers)
         case ToggleGoal():
             table.toggle_goal(command.id)
-        case RemoveObject():
+        case RemoveBlock():
             before = table.goal.copy()
             gone = table.remove(command.id)
             return gone if (table.goal != before).any() else None

@@ -25,7 +25,7 @@ MAX_RANKED = 5
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class PieceSnapshot(ReadModel):
+class BlockSnapshot(ReadModel):
     """One block."""
 
     id: str
@@ -76,7 +76,7 @@ class MoveSnapshot(ReadModel):
     """station of the block"""
     place: str
     """station it is placed on"""
-    piece: str | None
+    block: str | None
     """id of the block; null if it is gone"""
     value: float | None
     """Q(s, a) of the sorting policy; null if only the planner decides"""
@@ -102,7 +102,7 @@ class SortingCounters(ReadModel):
 class SortingSnapshot(ReadModel):
     """The sorting task at one tick."""
 
-    pieces: tuple[PieceSnapshot, ...]
+    blocks: tuple[BlockSnapshot, ...]
     """blocks in the order of their ids, the held one included"""
     goal: tuple[GoalBlockSnapshot, ...]
     """goal, tower by tower from the lowest level"""

@@ -163,7 +163,7 @@ class SortingTable:
         )
         if len(self.blocks) >= self.shape.n_cells:
             rule = f"would be more than {self.shape.n_cells} blocks, one per clutter cell"
-            raise InvalidInput("objects", len(self.blocks) + 1, rule)
+            raise InvalidInput("blocks", len(self.blocks) + 1, rule)
         position = self._free_cell() if at is None else self._free("at", at)
         block = self._new(code)
         self._put(block, position)

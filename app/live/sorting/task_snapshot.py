@@ -9,10 +9,10 @@ from app.live.sorting.controller import MoveChoice, SortController
 from app.live.sorting.snapshot import (
     HELD,
     MAX_RANKED,
+    BlockSnapshot,
     GoalBlockSnapshot,
     MoveSnapshot,
     Phase,
-    PieceSnapshot,
     SortingCounters,
     SortingSnapshot,
 )
@@ -50,7 +50,7 @@ def task_snapshot(inputs: SnapshotInputs) -> SortingSnapshot:
     policy, choice = inputs.controller.policy, inputs.choice
     ranked = () if decision is None else decision.ranked[:MAX_RANKED]
     return SortingSnapshot(
-        pieces=tuple(_piece(inputs, one) for one in table.blocks),
+        blocks=tuple(_block(inputs, one) for one in table.blocks),
         goal=_goal(inputs),
         failure=tuple(table.fail.tolist()),
         colours=table.names.colours,
@@ -80,18 +80,18 @@ def is_solved(table: SortingTable) -> bool:
 def table_of(cell: Cell, snapshot: SortingSnapshot) -> SortingTable:
     """Return the table of a snapshot, to validate a change."""
     table = SortingTable(cell)
-    for piece in sorted(snapshot.pieces, key=lambda one: one.level):
-        size = table.names.sizes.index(piece.size)
-        code = table.shape.code(table.names.colours.index(piece.colour), size)
-        table.show(Block(piece.id, code), None if piece.held else piece.place)
-    for block in snapshot.goal:
+    for block in sorted(snapshot.blocks, key=lambda one: one.level):
         size = table.names.sizes.index(block.size)
         code = table.shape.code(table.names.colours.index(block.colour), size)
-        table.goal[table.names.towers.index(block.tower), block.level] = code
+        table.show(Block(block.id, code), None if block.held else block.place)
+    for goal in snapshot.goal:
+        size = table.names.sizes.index(goal.size)
+        code = table.shape.code(table.names.colours.index(goal.colour), size)
+        table.goal[table.names.towers.index(goal.tower), goal.level] = code
     return table
 
 
-def _piece(inputs: SnapshotInputs, block: Block) -> PieceSnapshot:
+def _block(inputs: SnapshotInputs, block: Block) -> BlockSnapshot:
     table = inputs.table
     size = table.shape.size_of(block.code)
     half = half_size(table.cell, size, table.shape.n_sizes)
@@ -101,7 +101,7 @@ def _piece(inputs: SnapshotInputs, block: Block) -> PieceSnapshot:
         position, level = table.place_of(block)
         place = table.names.stations[position]
         top = table.point(position, level)
-    return PieceSnapshot(
+    return BlockSnapshot(
         id=block.id,
         colour=table.names.colours[table.shape.colour_of(block.code)],
         size=table.names.sizes[size],
@@ -163,7 +163,7 @@ def _move(
     return MoveSnapshot(
         pick=table.names.stations[move.pick],
         place=table.names.stations[move.place],
-        piece=None if block is None else block.id,
+        block=None if block is None else block.id,
         value=value,
         best=best,
     )

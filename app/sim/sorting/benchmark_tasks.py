@@ -248,18 +248,18 @@ def _ask_for_another_colour(
 TESTS: tuple[SortingTest, ...] = (
     SortingTest(
         name="test-1",
-        title="Sort five objects",
-        text="Five objects lie about; all of them shall be sorted.",
-        expected="Every object is sorted, without a contact.",
+        title="Sort five blocks",
+        text="Five blocks lie about; all of them shall be sorted.",
+        expected="Every block is sorted, without a contact.",
         n_objects=5,
         n_goal=5,
         start=_some(5, 5),
     ),
     SortingTest(
         name="test-2",
-        title="Sort ten objects",
-        text="As the first test, with twice the objects.",
-        expected="Every object is sorted, without a contact.",
+        title="Sort ten blocks",
+        text="As the first test, with twice the blocks.",
+        expected="Every block is sorted, without a contact.",
         n_objects=10,
         n_goal=10,
         start=_some(10, 10),
@@ -267,8 +267,8 @@ TESTS: tuple[SortingTest, ...] = (
     SortingTest(
         name="test-3",
         title="Choose the lower-risk duplicate",
-        text="Each of five objects has a duplicate in a cell where picks fail more often.",
-        expected="Every object is sorted, each from the safer cell, without a contact.",
+        text="Each of five blocks has a duplicate in a cell where picks fail more often.",
+        expected="Every block is sorted, each from the safer cell, without a contact.",
         safer_duplicates=True,
         n_objects=10,
         n_goal=5,
@@ -276,16 +276,16 @@ TESTS: tuple[SortingTest, ...] = (
     ),
     SortingTest(
         name="test-4",
-        title="A larger object comes late",
-        text="At the goal a person adds a larger object that belongs below sorted ones.",
-        expected="The goal is reached, with the larger object as well, without a contact.",
+        title="A larger block comes late",
+        text="At the goal a person adds a larger block that belongs below sorted ones.",
+        expected="The goal is reached, with the larger block as well, without a contact.",
         n_objects=5,
         n_goal=5,
         start=_with_room_below,
         interferences=(
             Interference(
                 after_moves=None,
-                text="A person adds a larger object, and the goal asks for it.",
+                text="A person adds a larger block, and the goal asks for it.",
                 change=_add_below,
             ),
         ),
@@ -295,7 +295,7 @@ TESTS: tuple[SortingTest, ...] = (
     SortingTest(
         name="test-5",
         title="An alternative, then another goal",
-        text="A person adds a duplicate of an object, and changes the goal at its end.",
+        text="A person adds a duplicate of a block, and changes the goal at its end.",
         expected="The goal is reached, and the changed goal as well, without a contact.",
         n_objects=8,
         n_goal=5,
@@ -303,12 +303,12 @@ TESTS: tuple[SortingTest, ...] = (
         interferences=(
             Interference(
                 after_moves=1,
-                text="A person adds a duplicate of an object that is still to be sorted.",
+                text="A person adds a duplicate of a block that is still to be sorted.",
                 change=_add_alternative,
             ),
             Interference(
                 after_moves=None,
-                text="A person changes the goal: objects that are sorted must move again.",
+                text="A person changes the goal: blocks that are sorted must move again.",
                 change=_change_goal,
             ),
         ),
@@ -317,7 +317,7 @@ TESTS: tuple[SortingTest, ...] = (
     SortingTest(
         name="test-6",
         title="One colour, then another",
-        text="Three objects of one colour; then the goal asks for three of another as well.",
+        text="Three blocks of one colour; then the goal asks for three of another as well.",
         expected="The goal is reached, and the longer one as well, without a contact.",
         n_objects=8,
         n_goal=3,
@@ -325,7 +325,7 @@ TESTS: tuple[SortingTest, ...] = (
         interferences=(
             Interference(
                 after_moves=None,
-                text="The goal is extended by three objects of another colour.",
+                text="The goal is extended by three blocks of another colour.",
                 change=_ask_for_another_colour,
             ),
         ),

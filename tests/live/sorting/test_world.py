@@ -8,9 +8,9 @@ from app.live import commands
 from app.live.command_checks import Command
 from app.live.snapshot import WorldSnapshot
 from app.live.sorting.commands import (
-    AddObject,
-    MoveObject,
-    RemoveObject,
+    AddBlock,
+    MoveBlock,
+    RemoveBlock,
     SetGoal,
     SetOrder,
     SetSortingPolicy,
@@ -47,7 +47,7 @@ def test_block_that_is_added_while_the_robot_works_reaches_the_longer_goal() -> 
     world = empty_world()
     lay(world, {"cell5": "red-small", "cell9": "red-medium"}, {"red": ("medium", "small")})
     carrying = until(world, phase("carry"))
-    world.apply(AddObject(colour="red", size="large", at="cell6"))
+    world.apply(AddBlock(colour="red", size="large", at="cell6"))
     world.apply(SetGoal(towers={"red": ("large", "medium", "small")}))
     end = until(world, solved)
     assert end.t_s > carrying.t_s
@@ -59,7 +59,7 @@ def test_robot_takes_another_block_when_the_one_it_goes_for_is_removed() -> None
     lay(world, {"cell5": "red-large", "cell6": "red-large"}, {"red": ("large",)})
     going = until(world, phase("approach")).sorting.move
     assert going.pick == "cell5"
-    world.apply(RemoveObject(id=going.piece))
+    world.apply(RemoveBlock(id=going.block))
     assert world.snapshot().sorting.move.pick == "cell6"
     assert towers(until(world, solved))["red"] == ["red-large"]
 
@@ -67,10 +67,10 @@ def test_robot_takes_another_block_when_the_one_it_goes_for_is_removed() -> None
 def test_block_at_the_magnet_that_is_removed_leaves_the_robot_with_a_smaller_goal() -> None:
     world = empty_world()
     lay(world, {"cell5": "red-large", "cell9": "blue-small"}, {"red": ("large",)})
-    held = until(world, phase("carry")).sorting.move.piece
-    world.apply(RemoveObject(id=held))
+    held = until(world, phase("carry")).sorting.move.block
+    world.apply(RemoveBlock(id=held))
     after = world.snapshot()
-    assert [one.id for one in after.sorting.pieces if one.held] == []
+    assert [one.id for one in after.sorting.blocks if one.held] == []
     assert after.sorting.goal == ()
     assert after.status == "no candidates"
     assert "also from the goal" in after.message
@@ -83,36 +83,36 @@ def test_held_block_goes_back_when_the_goal_does_not_ask_for_it_any_more() -> No
     world.apply(SetGoal(towers={"blue": ("small",)}))
     end = until(world, solved)
     assert towers(end) == {"red": [], "blue": ["blue-small"]}
-    assert {one.place for one in end.sorting.pieces} == {"cell5", "blue"}
+    assert {one.place for one in end.sorting.blocks} == {"cell5", "blue"}
 
 
 def test_held_block_whose_cell_was_taken_is_put_into_another() -> None:
     world = empty_world()
     ids = lay(world, {"cell5": "red-large", "cell9": "blue-small"}, {"red": ("large",)})
     until(world, phase("carry"))
-    world.apply(MoveObject(id=ids["cell9"], to="cell5"))
+    world.apply(MoveBlock(id=ids["cell9"], to="cell5"))
     world.apply(SetGoal(towers={}))
     end = until(world, lambda now: now.status == "no candidates")
-    assert sorted(one.place for one in end.sorting.pieces) == ["cell0", "cell5"]
+    assert sorted(one.place for one in end.sorting.blocks) == ["cell0", "cell5"]
 
 
 def test_place_occupied_during_placement_is_not_used_twice() -> None:
     world = empty_world()
     lay(world, {"cell5": "red-large", "cell9": "red-small"}, {"red": ("large",)})
     until(world, phase("place"))
-    world.apply(AddObject(colour="red", size="medium", at="red"))
+    world.apply(AddBlock(colour="red", size="medium", at="red"))
     end = until(world, solved)
     assert towers(end)["red"] == ["red-large"]
-    places = [(one.place, one.level) for one in end.sorting.pieces]
+    places = [(one.place, one.level) for one in end.sorting.blocks]
     assert len(set(places)) == len(places) == 3
 
 
 def test_goal_that_changes_while_the_tool_rises_with_a_block_is_followed() -> None:
     world = empty_world()
     ids = lay(world, {"cell5": "red-large", "cell9": "blue-small"}, {"red": ("large",)})
-    until(world, lambda now: any(one.held for one in now.sorting.pieces))
+    until(world, lambda now: any(one.held for one in now.sorting.blocks))
     assert world.snapshot().sorting.phase == "grasp"
-    world.apply(MoveObject(id=ids["cell9"], to="red"))
+    world.apply(MoveBlock(id=ids["cell9"], to="red"))
     world.apply(SetGoal(towers={"blue": ("small",), "red": ("large",)}))
     end = until(world, solved)
     assert towers(end) == {"red": ["red-large"], "blue": ["blue-small"]}
@@ -161,7 +161,7 @@ def test_same_seed_and_commands_give_the_same_snapshots() -> None:
     for one, other in zip(run(), run(), strict=True):
         np.testing.assert_array_equal(one.robot_q, other.robot_q)
         assert (one.message, one.status, one.t_s) == (other.message, other.status, other.t_s)
-        for a, b in zip(one.sorting.pieces, other.sorting.pieces, strict=True):
+        for a, b in zip(one.sorting.blocks, other.sorting.blocks, strict=True):
             assert (a.id, a.place, a.level, a.in_goal) == (b.id, b.place, b.level, b.in_goal)
 
 
@@ -172,9 +172,9 @@ def test_reset_draws_another_task_with_a_goal() -> None:
     world.apply(commands.Reset())
     second = world.snapshot().sorting
     for view in (first, second):
-        assert len(view.pieces) == 6
+        assert len(view.blocks) == 6
         assert view.moves_to_go > 0
-    assert [one.place for one in first.pieces] != [one.place for one in second.pieces]
+    assert [one.place for one in first.blocks] != [one.place for one in second.blocks]
 
 
 def test_critic_may_take_any_duplicate_that_fails_as_rarely() -> None:
@@ -184,7 +184,7 @@ def test_critic_may_take_any_duplicate_that_fails_as_rarely() -> None:
     assert set(going.sorting.duplicates) == set(ids.values())
     assert {one.id for one in going.candidates} == set(ids.values())
     taken = until(world, phase("grasp")).sorting.move
-    assert taken.piece == going.chosen
+    assert taken.block == going.chosen
     assert until(world, solved).sorting.counters.moves == 1
 
 
@@ -248,9 +248,9 @@ def test_person_of_a_test_adds_a_larger_block_at_the_goal() -> None:
     world.apply(StartTest(id="test-4"))
     world.apply(commands.MovePerson(pelvis=(0.0, 2.4, -1.57)))
     first = until(world, solved, 6000)
-    assert len(first.sorting.pieces) == 5
-    more = until(world, lambda now: len(now.sorting.pieces) == 6)
-    assert more.message == "A person adds a larger object, and the goal asks for it."
+    assert len(first.sorting.blocks) == 5
+    more = until(world, lambda now: len(now.sorting.blocks) == 6)
+    assert more.message == "A person adds a larger block, and the goal asks for it."
     end = until(world, solved, 6000)
     assert end.sorting.test == "test-4"
     assert end.sorting.counters.moves > 6
@@ -269,7 +269,7 @@ def test_contact_lets_a_held_block_fall_back_where_it_came_from() -> None:
     world.apply(commands.MovePerson(right=(-0.5, 0.5, 0.2), left=(-0.6, 0.6, 0.2)))
     until(world, lambda now: now.status == "contact")
     after = until(world, lambda now: now.status in ("moving", "blocked"))
-    assert [one.place for one in after.sorting.pieces] == ["cell7"]
+    assert [one.place for one in after.sorting.blocks] == ["cell7"]
     assert after.sorting.counters.moves == 0
 
 
@@ -339,11 +339,11 @@ def test_robot_rests_without_a_policy() -> None:
 @pytest.mark.parametrize(
     ("command", "field"),
     [
-        (AddObject(colour="green", size="small"), "colour"),
-        (AddObject(colour="red", size="huge"), "size"),
-        (AddObject(colour="red", size="small", at="cell5"), "at"),
-        (MoveObject(id="block99", to="cell0"), "id"),
-        (RemoveObject(id="block99"), "id"),
+        (AddBlock(colour="green", size="small"), "colour"),
+        (AddBlock(colour="red", size="huge"), "size"),
+        (AddBlock(colour="red", size="small", at="cell5"), "at"),
+        (MoveBlock(id="block99", to="cell0"), "id"),
+        (RemoveBlock(id="block99"), "id"),
         (ToggleGoal(id="blue-small"), "id"),
         (SetGoal(towers={"red": ("large", "large")}), "towers"),
         (SetGoal(towers={"green": ()}), "towers"),
@@ -361,5 +361,5 @@ def test_command_that_does_not_fit_is_named_and_changes_nothing(
         world.apply(command)
     assert caught.value.field == field
     after = world.snapshot().sorting
-    assert [one.id for one in after.pieces] == [one.id for one in before.pieces]
+    assert [one.id for one in after.blocks] == [one.id for one in before.blocks]
     assert after.goal == before.goal

@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 from app.live import commands
 from app.live.snapshot import WorldSnapshot
-from app.live.sorting.commands import AddObject, RemoveObject, SetGoal
+from app.live.sorting.commands import AddBlock, RemoveBlock, SetGoal
 from app.live.sorting.world import LiveSortingWorld
 from app.sim.cells.cell import load_cell
 from app.sim.pick.task_policy import TaskPolicy
@@ -26,8 +26,8 @@ def empty_world(
     )
     world.apply(commands.MovePerson(pelvis=(0.0, 2.4, -1.57)))
     world.apply(SetGoal(towers={}))
-    for piece in world.snapshot().sorting.pieces:
-        world.apply(RemoveObject(id=piece.id))
+    for block in world.snapshot().sorting.blocks:
+        world.apply(RemoveBlock(id=block.id))
     for _ in range(40):
         world.step()
     return world
@@ -37,9 +37,9 @@ def lay(world: LiveSortingWorld, blocks: Mapping[str, str], goal: Goal) -> dict[
     """Add blocks (kind by place) and set the goal; return the blocks' ids by place."""
     for place, kind in blocks.items():
         colour, size = kind.split("-")
-        world.apply(AddObject(colour=colour, size=size, at=place))
+        world.apply(AddBlock(colour=colour, size=size, at=place))
     world.apply(SetGoal(towers={name: tuple(sizes) for name, sizes in goal.items()}))
-    return {one.place: one.id for one in world.snapshot().sorting.pieces}
+    return {one.place: one.id for one in world.snapshot().sorting.blocks}
 
 
 def until(
@@ -61,7 +61,7 @@ def solved(snapshot: WorldSnapshot) -> bool:
 def towers(snapshot: WorldSnapshot) -> dict[str, list[str]]:
     """Return the kinds on the towers from the bottom."""
     found: dict[str, list[str]] = {"red": [], "blue": []}
-    for one in sorted(snapshot.sorting.pieces, key=lambda piece: piece.level):
+    for one in sorted(snapshot.sorting.blocks, key=lambda block: block.level):
         if one.place in found:
             found[one.place].append(f"{one.colour}-{one.size}")
     return found

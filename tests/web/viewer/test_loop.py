@@ -81,11 +81,11 @@ def refused_of(*places: str) -> list[tuple[int, str]]:
     live = LiveCell(load_cell("sorting-e0"), None)
     first = live.handle.snapshot().sorting
     assert first is not None
-    for one in first.pieces:
-        live.handle.submit(commands_of_sorting.RemoveObject(id=one.id))
+    for one in first.blocks:
+        live.handle.submit(commands_of_sorting.RemoveBlock(id=one.id))
     cleared = live.handle.submit(commands.ResumeClock())
     for place in places:
-        block = commands_of_sorting.AddObject(colour="red", size="large", at=place)
+        block = commands_of_sorting.AddBlock(colour="red", size="large", at=place)
         live.handle.submit(block)
     live.start()
     wait_until(lambda: live.handle.snapshot().commands == cleared + len(places))

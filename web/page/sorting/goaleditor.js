@@ -39,7 +39,7 @@ function progress(sorting, wanted) {
 /** One tower: now and goal side by side on its plate, and the kinds it can still be given. */
 function Tower({ tower, sorting, sizes, onPut, picked, onPick }) {
   const { colour } = tower;
-  const now = sorting.pieces.filter((one) => one.place === tower.id && !one.held)
+  const now = sorting.blocks.filter((one) => one.place === tower.id && !one.held)
     .sort((a, b) => a.level - b.level);
   const done = new Set(sorting.goal.filter((one) => one.tower === tower.id && one.done)
     .map((one) => one.level));
@@ -48,7 +48,7 @@ function Tower({ tower, sorting, sizes, onPut, picked, onPick }) {
     <div class="stacks">
       <div class="stack" role="group" aria-label="On it now">
         ${now.map((one) => html`<button type="button" key=${one.id} class="block-button"
-          data-piece=${one.id} aria-pressed=${String(picked === one.id)}
+          data-block=${one.id} aria-pressed=${String(picked === one.id)}
           aria-label=${`${capital(nameOf(one))}, level ${one.level + 1}`}
           onClick=${() => onPick(one.id)}><${Block} ...${one} sizes=${sorting.sizes} /></button>`)}
       </div>
@@ -75,7 +75,7 @@ function Tower({ tower, sorting, sizes, onPut, picked, onPick }) {
 function Offer({ colour, size, sizes, sorting, asked, onAdd }) {
   const kind = kindOf({ colour, size });
   const name = nameOf({ colour, size });
-  const there = sorting.pieces.filter((one) => kindOf(one) === kind).length;
+  const there = sorting.blocks.filter((one) => kindOf(one) === kind).length;
   const left = there - asked.filter((one) => one === size).length;
   const why = there === 0 ? `There is no ${name}: add one below`
     : `All ${plural(there, name)} are in the goal: add another below`;

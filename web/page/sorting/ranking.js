@@ -57,17 +57,17 @@ function Decider({ sorting }) {
 }
 
 function Rank({ move, sorting, cell, chosen, share }) {
-  const id = move.piece ?? (chosen ? sorting.move.piece : null);
-  const piece = sorting.pieces.find((one) => one.id === id);
+  const id = move.block ?? (chosen ? sorting.move.block : null);
+  const block = sorting.blocks.find((one) => one.id === id);
   const from = capital(placeName(cell, move.pick));
   const to = placeName(cell, move.place);
-  const what = piece ? nameOf(piece) : "block";
+  const what = block ? nameOf(block) : "block";
   const why = [worth(move.value, sorting.decided_by),
     move.best ? "It begins a shortest plan." : "It makes the plan longer."].join(" ");
   return html`<li class=${chosen ? "rank is-chosen" : "rank"} data-rank=${`${move.pick}-${move.place}`}
     data-chosen=${String(chosen)} title=${why}>
     <span class="sr">${what}</span>
-    ${piece ? html`<${Block} ...${piece} sizes=${sorting.sizes} />` : html`<span></span>`}
+    ${block ? html`<${Block} ...${block} sizes=${sorting.sizes} />` : html`<span></span>`}
     <span class="rank-path">${from} <i aria-hidden="true">→</i><span class="sr">to</span> ${to}</span>
     <span class="bar-track" aria-hidden="true">
       <i class="bar-fill" style=${{ left: 0, width: `${100 * share}%` }}></i></span>

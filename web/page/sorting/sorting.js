@@ -17,7 +17,7 @@ export function SortingDecision({ world, cell, send, checkpoints, jobs }) {
   const { sorting } = world;
   const [picked, setPicked] = useState(null);
   const there = picked === null || cell.stations.some((one) => one.id === picked)
-    || sorting.pieces.some((one) => one.id === picked);
+    || sorting.blocks.some((one) => one.id === picked);
   useEffect(() => {
     if (!there) setPicked(null);
   }, [there]);

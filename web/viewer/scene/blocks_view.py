@@ -6,7 +6,7 @@ import numpy as np
 import viser
 
 from app.live.sorting.commands import ToggleGoal
-from app.live.sorting.snapshot import PieceSnapshot
+from app.live.sorting.snapshot import BlockSnapshot
 from web.viewer.poses import Vec
 from web.viewer.scene.sorting_bodies import BLOCKS, block_body
 
@@ -28,28 +28,28 @@ class BlocksView:
         self._scene, self._submit = server.scene, submit
         self._drawn: dict[str, tuple[viser.GlbHandle, Vec]] = {}
 
-    def draw(self, pieces: tuple[PieceSnapshot, ...]) -> None:
+    def draw(self, blocks: tuple[BlockSnapshot, ...]) -> None:
         """Show the blocks where they are."""
-        here = {piece.id for piece in pieces}
+        here = {block.id for block in blocks}
         for id in self._drawn.keys() - here:
             self._drawn.pop(id)[0].remove()
-        for piece in pieces:
-            if piece.id not in self._drawn:
-                self._drawn[piece.id] = self._add(piece), piece.position
+        for block in blocks:
+            if block.id not in self._drawn:
+                self._drawn[block.id] = self._add(block), block.position
                 continue
-            handle, before = self._drawn[piece.id]
-            if np.abs(piece.position - before).max() > MIN_SHIFT_M:
-                handle.position = piece.position
-                self._drawn[piece.id] = handle, piece.position
+            handle, before = self._drawn[block.id]
+            if np.abs(block.position - before).max() > MIN_SHIFT_M:
+                handle.position = block.position
+                self._drawn[block.id] = handle, block.position
 
-    def _add(self, piece: PieceSnapshot) -> viser.GlbHandle:
-        x, y, z = piece.half_size.tolist()
+    def _add(self, block: BlockSnapshot) -> viser.GlbHandle:
+        x, y, z = block.half_size.tolist()
         body = self._scene.add_glb(
-            f"/blocks/{piece.id}",
-            block_body(BLOCKS[piece.colour], (x, y, z)),
-            position=piece.position,
+            f"/blocks/{block.id}",
+            block_body(BLOCKS[block.colour], (x, y, z)),
+            position=block.position,
         )
-        name = piece.id
+        name = block.id
 
         async def toggle(_: object) -> None:
             self._submit(ToggleGoal(id=name))

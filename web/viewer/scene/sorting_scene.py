@@ -51,7 +51,7 @@ class SortingScene:
             return
         self._clutter.draw(view.failure)
         self._towers.draw(view.goal)
-        self._blocks.draw(view.pieces)
+        self._blocks.draw(view.blocks)
         ends = _ends(view, self._cell, self._floor)
         self._ring("pick", None if ends is None or ends[2] else ends[0])
         self._ring("place", None if ends is None else ends[1])
@@ -71,19 +71,19 @@ def _ends(view: SortingSnapshot, cell: Cell, floor: float) -> tuple[Vec, Vec, bo
     """Return where the block is and where it will stand [m], and whether it is held."""
     if view.move is None or view.phase == "idle":
         return None
-    piece = next((one for one in view.pieces if one.id == view.move.piece), None)
-    if piece is None:
+    block = next((one for one in view.blocks if one.id == view.move.block), None)
+    if block is None:
         return None
-    below = np.array([0.0, 0.0, piece.half_size[2]])
-    start = piece.position - below
-    return start, _place(view, cell, floor), piece.held
+    below = np.array([0.0, 0.0, block.half_size[2]])
+    start = block.position - below
+    return start, _place(view, cell, floor), block.held
 
 
 def _place(view: SortingSnapshot, cell: Cell, floor: float) -> Vec:
     """Return the middle of the free place that the move ends on [m], shape (3,)."""
     assert view.move is not None
     station = cell.station(view.move.place)
-    level = sum(one.place == station.id and not one.held for one in view.pieces)
+    level = sum(one.place == station.id and not one.held for one in view.blocks)
     stands = level if station.kind == "cluster" else 0
     height = floor + stands * (station.level_height or 0.0)
     return np.array([station.position[0], station.position[1], height])

@@ -21,25 +21,25 @@ def sorting_cell(client: TestClient) -> Iterator[None]:
 @pytest.fixture(autouse=True)
 def at_rest(client: TestClient) -> None:
     """Draw a new task and empty its goal, so that blocks stay where they are."""
-    before = pieces(client.get(WORLD).json())
+    before = blocks(client.get(WORLD).json())
     send(client, tag="resume")
     send(client, tag="reset")
     send(client, tag="set-goal", towers={})
     until(
         client,
-        lambda now: now["sorting"]["goal"] == [] and not before.keys() & pieces(now).keys(),
+        lambda now: now["sorting"]["goal"] == [] and not before.keys() & blocks(now).keys(),
     )
 
 
-def pieces(world: dict[str, Any]) -> dict[str, Any]:
-    return {one["id"]: one for one in world["sorting"]["pieces"]}
+def blocks(world: dict[str, Any]) -> dict[str, Any]:
+    return {one["id"]: one for one in world["sorting"]["blocks"]}
 
 
 def test_world_shows_blocks_goal_and_failure_map(client: TestClient) -> None:
     world = client.get(WORLD).json()
     sorting = world["sorting"]
     assert world["cell"] == "sorting-e0"
-    assert len(sorting["pieces"]) == 6
+    assert len(sorting["blocks"]) == 6
     assert (sorting["failure"][2], sorting["colours"]) == (0.4, ["red", "blue"])
     assert world["checkpoint"] is not None
     listed = client.get("/v1/worlds").json()["items"][0]
@@ -47,7 +47,7 @@ def test_world_shows_blocks_goal_and_failure_map(client: TestClient) -> None:
 
 
 def test_choice_among_places_can_be_asked_again(client: TestClient) -> None:
-    send(client, tag="toggle-goal", id=next(iter(pieces(client.get(WORLD).json()))))
+    send(client, tag="toggle-goal", id=next(iter(blocks(client.get(WORLD).json()))))
     moving = until(
         client, lambda now: now["sorting"]["phase"] == "approach" and now["chosen"] is not None
     )
@@ -57,20 +57,20 @@ def test_choice_among_places_can_be_asked_again(client: TestClient) -> None:
 
 def test_objects_and_goal_change_while_the_robot_works(client: TestClient) -> None:
     before = client.get(WORLD).json()
-    free = {f"cell{k}" for k in range(10)} - {one["place"] for one in pieces(before).values()}
+    free = {f"cell{k}" for k in range(10)} - {one["place"] for one in blocks(before).values()}
     first, second = sorted(free)[:2]
     assert (
-        send(client, tag="add-object", colour="red", size="large", at=first).status_code == 202
+        send(client, tag="add-block", colour="red", size="large", at=first).status_code == 202
     )
-    added = until(client, lambda now: len(pieces(now)) == 7)
-    (id,) = set(pieces(added)) - set(pieces(before))
-    send(client, tag="move-object", id=id, to=second)
-    until(client, lambda now: pieces(now)[id]["place"] == second)
+    added = until(client, lambda now: len(blocks(now)) == 7)
+    (id,) = set(blocks(added)) - set(blocks(before))
+    send(client, tag="move-block", id=id, to=second)
+    until(client, lambda now: blocks(now)[id]["place"] == second)
     send(client, tag="toggle-goal", id="red-large")
     wanted = until(client, lambda now: now["sorting"]["moves_to_go"] > 0)
     assert [one["size"] for one in wanted["sorting"]["goal"]] == ["large"]
-    send(client, tag="remove-object", id=id)
-    until(client, lambda now: id not in pieces(now))
+    send(client, tag="remove-block", id=id)
+    until(client, lambda now: id not in blocks(now))
 
 
 def test_test_is_started(client: TestClient) -> None:
@@ -78,12 +78,12 @@ def test_test_is_started(client: TestClient) -> None:
     assert [one["id"] for one in tests] == [f"test-{k}" for k in range(1, 7)]
     assert send(client, tag="start-test", id="test-2").status_code == 202
     world = until(client, lambda now: now["sorting"]["test"] == "test-2")
-    assert len(pieces(world)) == 10
+    assert len(blocks(world)) == 10
 
 
 def test_planner_decides_alone_where_no_sorting_policy_is_set(client: TestClient) -> None:
     assert send(client, tag="set-sorting-policy", checkpoint=None).status_code == 202
-    send(client, tag="toggle-goal", id=next(iter(pieces(client.get(WORLD).json()))))
+    send(client, tag="toggle-goal", id=next(iter(blocks(client.get(WORLD).json()))))
     world = until(client, lambda now: now["sorting"]["move"] is not None)
     assert world["sorting"]["decided_by"] == "planner"
     assert world["sorting"]["sorting_policy"] is None
@@ -92,10 +92,10 @@ def test_planner_decides_alone_where_no_sorting_policy_is_set(client: TestClient
 @pytest.mark.parametrize(
     ("command", "field"),
     [
-        ({"tag": "add-object", "colour": "green", "size": "small"}, "colour"),
-        ({"tag": "add-object", "colour": "red", "size": "small", "at": "shelf"}, "at"),
-        ({"tag": "remove-object", "id": "block999"}, "id"),
-        ({"tag": "move-object", "id": "block999", "to": "cell0"}, "id"),
+        ({"tag": "add-block", "colour": "green", "size": "small"}, "colour"),
+        ({"tag": "add-block", "colour": "red", "size": "small", "at": "shelf"}, "at"),
+        ({"tag": "remove-block", "id": "block999"}, "id"),
+        ({"tag": "move-block", "id": "block999", "to": "cell0"}, "id"),
         ({"tag": "set-goal", "towers": {"red": ["large"] * 11}}, "towers.red"),
         ({"tag": "set-goal", "towers": {"red": ["large"] * 10}}, "towers"),
         ({"tag": "toggle-goal", "id": "purple-large"}, "id"),
@@ -118,7 +118,7 @@ def test_policy_that_chooses_tasks_does_not_sort(client: TestClient) -> None:
 
 def test_full_table_takes_no_more_blocks(client: TestClient) -> None:
     send(client, tag="start-test", id="test-2")
-    until(client, lambda now: len(pieces(now)) == 10)
-    refused = send(client, tag="add-object", colour="red", size="small")
+    until(client, lambda now: len(blocks(now)) == 10)
+    refused = send(client, tag="add-block", colour="red", size="small")
     assert refused.status_code == 422
-    assert refused.json()["field"] == "objects"
+    assert refused.json()["field"] == "blocks"

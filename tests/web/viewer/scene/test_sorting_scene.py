@@ -14,7 +14,7 @@ from app.live.sorting.snapshot import HELD, SortingSnapshot
 from app.sim.cells.cell import Cell, load_cell
 from tests.support.waiting import wait_until
 from tests.web.conftest import node
-from tests.web.sorting_views import a_view, centre, piece
+from tests.web.sorting_views import a_view, block, centre
 from tests.web.viewer_client import ViewerClient
 from web.viewer.scene.cell_scene import CellScene
 from web.viewer.scene.sorting_bodies import BLOCKS, FAILURES, failure_color
@@ -55,11 +55,11 @@ def test_blocks_stand_where_they_are_and_follow(
 ) -> None:
     view = a_view(cell)
     scene.draw(replace(still, sorting=view), 0.05)
-    for one in view.pieces:
+    for one in view.blocks:
         assert np.allclose(node(server, f"/blocks/{one.id}").position, one.position)
-    first, *others = view.pieces
+    first, *others = view.blocks
     up = replace(first, place=HELD, held=True, position=first.position + [0.1, 0.0, 0.3])
-    scene.draw(replace(still, sorting=replace(view, pieces=(up, *others[1:]))), 0.05)
+    scene.draw(replace(still, sorting=replace(view, blocks=(up, *others[1:]))), 0.05)
     assert np.allclose(node(server, f"/blocks/{first.id}").position, up.position)
     assert server.scene.get_handle_by_name(f"/blocks/{others[0].id}") is None
 
@@ -82,8 +82,8 @@ def test_rings_mark_the_block_and_the_top_of_its_tower(
     scene: CellScene, server: viser.ViserServer, still: WorldSnapshot, cell: Cell
 ) -> None:
     view = a_view(cell)
-    low = piece(cell, "block6", "red-large", "red")
-    scene.draw(replace(still, sorting=replace(view, pieces=(*view.pieces, low))), 0.05)
+    low = block(cell, "block6", "red-large", "red")
+    scene.draw(replace(still, sorting=replace(view, blocks=(*view.blocks, low))), 0.05)
     bottom = centre(cell, "cell2", 0) - [0.0, 0.0, 0.015]
     assert np.allclose(node(server, "/marks/pick").position, bottom)
     above = centre(cell, "red", 1) - [0.0, 0.0, 0.015]
