@@ -175,21 +175,21 @@ def has_safer_duplicate(table: SortingTable, cell: int) -> bool:
 
 def _for_held(table: SortingTable, decision: SortingDecision, kept: Move | None) -> MoveChoice:
     """Return the place of the held block: the same, another, or back to where it counts."""
-    block, seat = table.held, table.seat
+    block, position = table.held, table.held_position
     assert block is not None
 
     def going(place: int, *, back: bool = False) -> MoveChoice:
-        move = Move(seat, place)
+        move = Move(position, place)
         return MoveChoice(move=move, block=block, options=((block, move),), back=back)
 
-    own = [one for one in decision.ranked if one.move.pick == seat]
+    own = [one for one in decision.ranked if one.move.pick == position]
     if kept is not None and _is_fewest(own, kept.place):
         return going(kept.place)
     best = decision.move
-    if best is not None and (best.pick == seat or _is_duplicate(table, best, block)):
-        if _is_fewest(own, best.place) or best.pick == seat:
+    if best is not None and (best.pick == position or _is_duplicate(table, best, block)):
+        if _is_fewest(own, best.place) or best.pick == position:
             return going(best.place)
-    return going(seat, back=True)
+    return going(position, back=True)
 
 
 def _is_duplicate(table: SortingTable, move: Move, block: Block) -> bool:

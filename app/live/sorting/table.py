@@ -1,8 +1,8 @@
 """Blocks and goal of a live sorting cell, and changes by robot and people.
 
 Blocks have constant ids; :attr:`SortingTable.state` has no ids, like the observation of the
-sorting policy. A held block counts at its *seat*: its former place or, if that is occupied, the
-first free clutter cell. One is always free, since there are at most as many blocks as cells.
+sorting policy. A held block counts at its former place or, if that is occupied, at the first
+free clutter cell. One is always free, since there are at most as many blocks as cells.
 
 Source: docs/method.md 1.1 and 1.2.
 """
@@ -70,8 +70,8 @@ class SortingTable:
         return frozenset(self._wanted)
 
     @property
-    def seat(self) -> int:
-        """Position at which the held block counts."""
+    def held_position(self) -> int:
+        """Position at which the held block counts in the state."""
         k = self.shape.n_cells
         if self._origin >= k or self.clutter[self._origin] is None:
             return self._origin
@@ -84,10 +84,10 @@ class SortingTable:
         towers = np.zeros_like(self.goal)
         for c, tower in enumerate(self.towers):
             towers[c, : len(tower)] = [one.code for one in tower]
-        if self.held is not None and self.seat < len(clutter):
-            clutter[self.seat] = self.held.code
+        if self.held is not None and self.held_position < len(clutter):
+            clutter[self.held_position] = self.held.code
         elif self.held is not None:
-            c = self.seat - len(clutter)
+            c = self.held_position - len(clutter)
             towers[c, len(self.towers[c])] = self.held.code
         return SortingState(
             clutter=clutter, towers=towers, goal=self.goal.copy(), fail=self.fail.copy()
@@ -320,7 +320,7 @@ class SortingTable:
         return self._known(id).code
 
     def _free_cell(self) -> int:
-        taken = self.seat if self.held is not None else None
+        taken = self.held_position if self.held is not None else None
         free = [k for k in range(self.shape.n_cells) if self.is_free(k) and k != taken]
         if not free:
             raise InvalidInput("at", None, "has no default: no clutter cell is free")

@@ -141,7 +141,7 @@ def _goal(inputs: SnapshotInputs) -> tuple[GoalBlockSnapshot, ...]:
 
 
 def _ranked(table: SortingTable, one: RankedMove) -> MoveSnapshot:
-    held = table.held is not None and one.move.pick == table.seat
+    held = table.held is not None and one.move.pick == table.held_position
     block = table.held if held else table.top(one.move.pick)
     return _move(table, one.move, block, one.value, one.fewest)
 

@@ -95,9 +95,9 @@ class LiveSortingWorld(BaseWorld[LiveWorkers]):
     def _prepare_restart(self) -> None:
         table = self._table
         if table.held is not None:
-            block, seat = table.held, table.seat
-            table.drop(seat)
-            self.set_message(self._messages.returned(block, seat))
+            block, position = table.held, table.held_position
+            table.drop(position)
+            self.set_message(self._messages.returned(block, position))
 
     # Commands.
 

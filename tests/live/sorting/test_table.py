@@ -41,7 +41,7 @@ def test_held_block_counts_on_the_first_free_cell_once_its_own_is_taken(
 ) -> None:
     table.lift(0)
     table.add("blue", "small", "cell0")
-    assert table.seat == 3
+    assert table.held_position == 3
     check_state(table.state, table.shape)
 
 
