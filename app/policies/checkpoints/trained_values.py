@@ -25,7 +25,7 @@ ROBOT = (
 """Names of ``q``, ``qd`` and ``goal`` of a ``trained_range`` in messages."""
 _SIZES = {"q": 6, "qd": 6, "goal": 3, "human": len(HUMAN)}
 
-Seen = tuple[int | None, Vec]
+PersonValues = tuple[int | None, Vec]
 """Index of a person, bodies first, or None, and the observed cylinder, shape (6,)."""
 
 
@@ -48,7 +48,7 @@ class TrainedValues:
         self._least, self._most = self._low - SLACK, self._high + SLACK
 
     def outside(
-        self, state: Vec, seen: Iterable[Seen], order: Sequence[int]
+        self, state: Vec, seen: Iterable[PersonValues], order: Sequence[int]
     ) -> tuple[OutsideField, ...]:
         """Return the inputs outside the training range, each field once.
 
@@ -88,9 +88,9 @@ class TrainedValues:
 
 
 def as_given(
-    seen: Iterable[Seen], given: Sequence[Person], viewed: Sequence[Person]
-) -> list[Seen]:
-    """Return observed people with the given values where the policy observed others.
+    seen: Iterable[PersonValues], given: Sequence[Person], viewed: Sequence[Person]
+) -> list[PersonValues]:
+    """Return the observed values, with those of the query where policies observe others.
 
     Args:
         seen: Observed people.

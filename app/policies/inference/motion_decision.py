@@ -14,7 +14,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from app.errors import InvalidInput
-from app.policies.checkpoints.trained_values import Seen, TrainedValues, as_given
+from app.policies.checkpoints.trained_values import PersonValues, TrainedValues, as_given
 from app.policies.inference.controllers import person_weights
 from app.policies.inference.rollout import (
     CANDIDATES,
@@ -255,7 +255,7 @@ class MotionDecider:
 
     def _act(
         self, stage: QueryState, question: MotionQuestion, goal: Vec, mode: MotionMode
-    ) -> tuple[Vec, tuple[TargetWeight, ...], list[float], list[Seen]]:
+    ) -> tuple[Vec, tuple[TargetWeight, ...], list[float], list[PersonValues]]:
         """Return action, targets, weights of the people, and the observed people."""
         apart = stage.distances
         nearest = int(apart.argmin()) if len(apart) else None
@@ -271,7 +271,7 @@ class MotionDecider:
             counts = person_weights(apart[None])[0]
             first, weights = apart.argsort(), counts.tolist()
             obs = np.empty((len(first), len(places), stage.obs_size), dtype=np.float32)
-            seen: list[Seen] = []
+            seen: list[PersonValues] = []
             for row, who in enumerate(first.tolist()):
                 obs[row] = stage.observe(places, who)
                 seen.append((who, stage.seen.copy()))

@@ -141,12 +141,14 @@ class RolloutImprovement:
         """
         world, state, chosen = envs.world, envs.state, np.empty(len(act), dtype=np.int64)
         if self._work is None or self._envs is not envs:
-            sight = new_observation_workspace(
+            workspace = new_observation_workspace(
                 world.arm, world.people, state.people, new_motion_predictor()
             )
             self._envs, self._work = (
                 envs,
-                new_rollout_workspace(world.arm, self._network, BASE_WEIGHT, sight, len(act)),
+                new_rollout_workspace(
+                    world.arm, self._network, BASE_WEIGHT, workspace, len(act)
+                ),
             )
             arguments = world, self._rule, state, act, self._work, chosen
             self._call = direct(kernel.improve_batch, arguments)

@@ -67,7 +67,7 @@ Rule = Callable[[View], Index]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Sight:
+class ObservedPeople:
     """Observed people of each running environment, the nearest to the robot first."""
 
     q: NDArray[np.float64]
@@ -78,11 +78,11 @@ class Sight:
     """Body dimensions [m], shape (n, P, 12)."""
 
 
-Seen = Callable[[PickBatch, Index], Sight]
+PeopleObserver = Callable[[PickBatch, Index], ObservedPeople]
 """Observation model: called once per step for the running environments."""
 
 
-def seen_exactly(batch: PickBatch, rows: Index) -> Sight:
+def observe_exactly(batch: PickBatch, rows: Index) -> ObservedPeople:
     """Return the people of each environment as they are, the nearest to its robot first.
 
     Angles beyond the limits of the model, as in recordings, are clipped to them, as in the live
@@ -91,15 +91,12 @@ def seen_exactly(batch: PickBatch, rows: Index) -> Sight:
     shared, state, n = batch.world.people, batch.state, len(rows)
     n_workers, n_cylinders = state.people.q.shape[1], state.people.cylinders.shape[1]
     n_people = max(1, n_workers + n_cylinders)
-    seen = Sight(
-        q=np.empty((n, n_people, 18)),
-        qd=np.empty((n, n_people, 18)),
-        size=np.empty((n, n_people, shared.bodies.shape[1])),
-    )
+    q, qd = np.empty((n, n_people, 18)), np.empty((n, n_people, 18))
+    size = np.empty((n, n_people, shared.bodies.shape[1]))
     geometry = new_people_geometry(shared, n_workers, n_cylinders)
-    see_rows(shared, state.people, state.robot, rows, geometry, seen.q, seen.qd, seen.size)
-    np.clip(seen.q[..., 3:], shared.limits[0, 3:], shared.limits[1, 3:], out=seen.q[..., 3:])
-    return seen
+    see_rows(shared, state.people, state.robot, rows, geometry, q, qd, size)
+    np.clip(q[..., 3:], shared.limits[0, 3:], shared.limits[1, 3:], out=q[..., 3:])
+    return ObservedPeople(q=q, qd=qd, size=size)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -187,7 +184,7 @@ class Evaluator:
     ) -> None:
         self._networks = networks
         self.batch = new_batch(cell, n_episodes, seed, settings)
-        self._sight = observation_workspace_of(self.batch.cell)
+        self._workspace = observation_workspace_of(self.batch.cell)
         world, grasp = self.batch.world, settings.grasp
         found = target_configurations(self.batch.arm, grasp, world.stations)
         self._station_q, self._grasp_q, _ = found
@@ -196,7 +193,7 @@ class Evaluator:
         self,
         rule: Rule,
         n_recorded: int = 0,
-        seen: Seen = seen_exactly,
+        observe: PeopleObserver = observe_exactly,
         start: Callable[[PickBatch], None] = lambda _batch: None,
         predicts: bool = False,
         planned: bool = False,
@@ -206,7 +203,7 @@ class Evaluator:
         Args:
             rule: Selection rule.
             n_recorded: Number of episodes with recorded poses.
-            seen: Observation model; a stateful one serves one run only.
+            observe: Observation model; a stateful one serves one run only.
             start: Changes the starts of the episodes.
             predicts: Whether the rule reads the predicted outcomes.
             planned: Whether a planner moves the robot beside people at rest.
@@ -219,9 +216,9 @@ class Evaluator:
         trace, first = Trace(batch, n_recorded), True
         planners = [RestingPeoplePlanner(batch.arm) for _ in range(n if planned else 0)]
         while (rows := np.flatnonzero(batch.state.outcome == kernel.RUNNING)).size:
-            sight = seen(batch, rows)
-            actions, view = self._view(rows, chosen[rows], first, sight, predicts)
-            resting = self._beside_resting(planners, rows, sight) if planners else {}
+            observed = observe(batch, rows)
+            actions, view = self._view(rows, chosen[rows], first, observed, predicts)
+            resting = self._beside_resting(planners, rows, observed) if planners else {}
             if resting:
                 view = self._without_blocked(view, resting, planners)
             choice = rule(view)
@@ -245,14 +242,16 @@ class Evaluator:
         )
 
     def _beside_resting(
-        self, planners: list[RestingPeoplePlanner], rows: Index, sight: Sight
+        self, planners: list[RestingPeoplePlanner], rows: Index, observed: ObservedPeople
     ) -> dict[int, Shapes]:
         """Return the people of the running environments where all have been at rest."""
-        people, speeds = self.batch.world.people, np.abs(sight.qd).max(axis=(1, 2))
+        people, speeds = self.batch.world.people, np.abs(observed.qd).max(axis=(1, 2))
         found = {}
         for k, e in enumerate(rows):
             if planners[e].note(float(speeds[k])):
-                crowd = people_geometry_of(people, sight.q[k], NO_CYLINDERS, sight.size[k])
+                crowd = people_geometry_of(
+                    people, observed.q[k], NO_CYLINDERS, observed.size[k]
+                )
                 found[k] = Shapes(columns=crowd.columns, cylinders=np.zeros((0, 4)))
         return found
 
@@ -291,7 +290,7 @@ class Evaluator:
                 act[e] = found
 
     def _view(
-        self, rows: Index, chosen: Index, first: bool, sight: Sight, predicts: bool
+        self, rows: Index, chosen: Index, first: bool, observed: ObservedPeople, predicts: bool
     ) -> tuple[NDArray[np.float32], View]:
         """Return the policy's action for each candidate, (n, k, 5), and the rule's input."""
         batch, state = self.batch, self.batch.state
@@ -306,12 +305,12 @@ class Evaluator:
         states = queries(
             batch.settings.grasp,
             (state.q[env], state.qd[env]),
-            (sight.q[owner], sight.qd[owner], sight.size[owner]),
+            (observed.q[owner], observed.qd[owner], observed.size[owner]),
             (batch.world.stations[station], self._station_q[station], self._grasp_q[station]),
             (phase, np.where(phase != APPROACH, state.closing[env], 0.0)),
         )
         floor_z, left = batch.world.people.floor_z, state.time_left[env]
-        observe_batch(batch.arm, floor_z, states, left, self._sight, obs)
+        observe_batch(batch.arm, floor_z, states, left, self._workspace, obs)
         act, value, predicted = self._networks.evaluate(obs, predict=predicts)
         actions = np.zeros((len(rows), width, act.shape[1]), dtype=np.float32)
         values = np.full((len(rows), width), -np.inf, dtype=np.float32)

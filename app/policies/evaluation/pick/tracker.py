@@ -24,7 +24,12 @@ import numpy as np
 
 from app.policies.checkpoints.checkpoint import Checkpoint
 from app.policies.evaluation.pick import selection_rules as choice_rules
-from app.policies.evaluation.pick.episodes import Index, Seen, Sight, seen_exactly
+from app.policies.evaluation.pick.episodes import (
+    Index,
+    ObservedPeople,
+    PeopleObserver,
+    observe_exactly,
+)
 from app.policies.evaluation.pick.tasks import evaluators_of, settings_of
 from app.policies.evaluation.rows import EvaluationRequest, Json
 from app.policies.inference.task_selection import HYSTERESIS
@@ -104,24 +109,24 @@ class KeypointObserver:
         self.wrist_errors: list[float] = []
         """Distance of observed and true wrists at each step of each environment [m]."""
 
-    def __call__(self, batch: PickBatch, rows: Index) -> Sight:
+    def __call__(self, batch: PickBatch, rows: Index) -> ObservedPeople:
         """Update the estimators with the frames available now and return their estimates."""
         people, t = batch.state.people, batch.state.elapsed
         if self._before is None:
             self._start(batch, rows)
             self._before = t.copy(), people.q[:, 0].copy(), people.qd[:, 0].copy()
         t0, q0, qd0 = self._before
-        seen = Sight(
+        observed = ObservedPeople(
             q=np.empty((len(rows), 1, 18)),
             qd=np.empty((len(rows), 1, 18)),
             size=people.size[rows, :1].copy(),
         )
         for k, e in enumerate(rows.tolist()):
             motion = between(t0[e], q0[e], qd0[e], float(t[e]), people.q[e, 0], people.qd[e, 0])
-            seen.q[k, 0], seen.qd[k, 0] = self._look(batch, e, float(t[e]), motion)
-            self._measure(seen.q[k, 0], people.q[e, 0], seen.size[k, 0])
+            observed.q[k, 0], observed.qd[k, 0] = self._estimate(batch, e, float(t[e]), motion)
+            self._measure(observed.q[k, 0], people.q[e, 0], observed.size[k, 0])
         self._before = t.copy(), people.q[:, 0].copy(), people.qd[:, 0].copy()
-        return seen
+        return observed
 
     def _start(self, batch: PickBatch, rows: Index) -> None:
         settings = self._row.tracker
@@ -137,7 +142,7 @@ class KeypointObserver:
             )
             self._estimators[e] = PersonEstimator(size)
 
-    def _look(
+    def _estimate(
         self, batch: PickBatch, e: int, t: float, motion: Callable[[float], Vec]
     ) -> tuple[Vec, Vec]:
         """Return estimated joint positions and speeds of one environment's person at ``t``."""
@@ -152,8 +157,8 @@ class KeypointObserver:
             return batch.world.people.no_person, np.zeros(18)
         return person.q, person.qd
 
-    def _measure(self, seen: Vec, true: Vec, size: Vec) -> None:
-        one, other = human.joint_points(seen, size), human.joint_points(true, size)
+    def _measure(self, observed: Vec, true: Vec, size: Vec) -> None:
+        one, other = human.joint_points(observed, size), human.joint_points(true, size)
         for wrist in ("wrist_r", "wrist_l"):
             self.wrist_errors.append(float(np.linalg.norm(one[wrist] - other[wrist])))
 
@@ -163,12 +168,14 @@ def run_tracker(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
     n = request.episodes or DEFAULT_EPISODES
     evaluator = evaluators_of(checkpoint, (2, 3), n, request.seed)[""]
     rule = choice_rules.critic(HYSTERESIS)
-    looks: dict[str, Seen] = {"exact": seen_exactly}
-    looks |= {name: KeypointObserver(row, request.seed) for name, row in ROWS.items()}
-    results = request.rows(len(looks))
-    for name, look in looks.items():
-        row = evaluator.run(rule, seen=look).row(name)
-        errors = np.array(look.wrist_errors if isinstance(look, KeypointObserver) else [0.0])
+    observers: dict[str, PeopleObserver] = {"exact": observe_exactly}
+    observers |= {name: KeypointObserver(row, request.seed) for name, row in ROWS.items()}
+    results = request.rows(len(observers))
+    for name, observe in observers.items():
+        row = evaluator.run(rule, observe=observe).row(name)
+        errors = np.array(
+            observe.wrist_errors if isinstance(observe, KeypointObserver) else [0.0]
+        )
         row["wrist_error_median_mm"] = 1e3 * float(np.median(errors))
         row["wrist_error_p95_mm"] = 1e3 * float(np.percentile(errors, 95))
         results.append(row)

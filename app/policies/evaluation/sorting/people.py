@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from app.policies.checkpoints.checkpoint import Checkpoint
 from app.policies.checkpoints.trained_cell import cell_of
-from app.policies.evaluation.pick.episodes import Sight, seen_exactly, settings_for
+from app.policies.evaluation.pick.episodes import ObservedPeople, observe_exactly, settings_for
 from app.policies.evaluation.rows import EvaluationRequest, Json
 from app.policies.evaluation.sorting.full_tasks import FullTasks
 from app.policies.evaluation.sorting.order_rules import (
@@ -99,9 +99,9 @@ USUAL = CellCondition()
 """The policy under the safety layer."""
 
 
-def _of(sight: Sight, rows: Index) -> People:
+def _of(observed: ObservedPeople, rows: Index) -> People:
     """Return the people that some rows observe."""
-    return sight.q[rows], sight.qd[rows], sight.size[rows]
+    return observed.q[rows], observed.qd[rows], observed.size[rows]
 
 
 class SortingBesidePeople:
@@ -131,7 +131,7 @@ class SortingBesidePeople:
         self._goals = above(self.tasks.points, grasp.depth or APPROACH_M)
         found = target_configurations(self.batch.arm, grasp, self._goals)
         self._q_goals, self._q_grasps, _ = found
-        self._sight = observation_workspace_of(self.batch.cell)
+        self._workspace = observation_workspace_of(self.batch.cell)
 
     def run(self, rule: OrderRule) -> FullTasks:
         """Run all tasks under an order rule."""
@@ -196,18 +196,18 @@ class SortingBesidePeople:
         owner = np.repeat(np.arange(len(rows)), counts)
         point = np.concatenate([tasks.targets[e] for e in rows])
         place = np.arange(len(owner)) - np.repeat(np.cumsum(counts) - counts, counts)
-        env, sight = rows[owner], seen_exactly(self.batch, rows)
+        env, observed = rows[owner], observe_exactly(self.batch, rows)
         phase = np.where(place == self._chosen[env], state.phase[env], APPROACH)
         progress = phase, np.where(phase != APPROACH, state.closing[env], 0.0)
         robot, left = (state.q[env], state.qd[env]), state.time_left[env]
-        obs = self._observe(robot, _of(sight, owner), point, progress, left)
+        obs = self._observe(robot, _of(observed, owner), point, progress, left)
         act, value, _ = self._networks.evaluate(obs, predict=False)
         act = obs[:, LAYOUT["base"]] if self._straight else act
         later = np.flatnonzero((tasks.held[env] == NOTHING) & (counts[owner] > 1))
         if rule is critic and later.size:
             ends = np.concatenate([tasks.places[e] for e in rows])[later]
             value = value.copy()
-            value[later] += self._place_values(point[later], ends, _of(sight, owner[later]))
+            value[later] += self._place_values(point[later], ends, _of(observed, owner[later]))
         shape = (len(rows), int(counts.max()))
         values, distances = np.full(shape, -np.inf, np.float32), np.full(shape, np.inf)
         actions, points = np.zeros((*shape, CONTROLLED), np.float32), np.zeros(shape, np.int64)
@@ -244,7 +244,7 @@ class SortingBesidePeople:
         states = queries(batch.settings.grasp, robot, people, targets, progress)
         obs = np.empty((len(points), self._networks.n_obs), dtype=np.float32)
         floor_z = batch.world.people.floor_z
-        observe_batch(batch.arm, floor_z, states, left, self._sight, obs)
+        observe_batch(batch.arm, floor_z, states, left, self._workspace, obs)
         return obs
 
     # Events.

@@ -8,7 +8,7 @@ import pytest
 from app.policies.checkpoints import pretrained
 from app.policies.configs.pick import PickPreset
 from app.policies.evaluation.pick import selection_rules as choice_rules
-from app.policies.evaluation.pick.episodes import Evaluator, seen_exactly, settings_for
+from app.policies.evaluation.pick.episodes import Evaluator, observe_exactly, settings_for
 from app.policies.inference.task_selection import TaskChooser
 from app.policies.inference.value_networks import ValueNetworks
 from app.sim.cells.cell import load_cell
@@ -29,7 +29,7 @@ def test_the_nearest_of_several_workers_is_seen_in_their_own_size():
     batch = PickBatch(load_cell(), 40, 7, PickSettings(people=("worker",) * 3))
     batch.reset()
     rows, people, seen = np.arange(3, 40, 2), batch.state.people, set()
-    sight = seen_exactly(batch, rows)
+    observed = observe_exactly(batch, rows)
     for k, e in enumerate(rows):
         clearances = [
             clearance(
@@ -45,19 +45,19 @@ def test_the_nearest_of_several_workers_is_seen_in_their_own_size():
         nearest = int(np.argmin(clearances))
         seen.add(nearest)
         others = [w for w in range(3) if w != nearest]
-        np.testing.assert_array_equal(sight.q[k, 1:], people.q[e, others])
-        np.testing.assert_array_equal(sight.q[k, 0], people.q[e, nearest])
-        np.testing.assert_array_equal(sight.qd[k, 0], people.qd[e, nearest])
-        np.testing.assert_array_equal(sight.size[k, 0], people.size[e, nearest])
+        np.testing.assert_array_equal(observed.q[k, 1:], people.q[e, others])
+        np.testing.assert_array_equal(observed.q[k, 0], people.q[e, nearest])
+        np.testing.assert_array_equal(observed.qd[k, 0], people.qd[e, nearest])
+        np.testing.assert_array_equal(observed.size[k, 0], people.size[e, nearest])
     assert seen == {0, 1, 2}
 
 
 def test_an_empty_cell_is_observed_as_a_person_far_away():
     batch = PickBatch(load_cell(), 2, 7, PickSettings(people=()))
     batch.reset()
-    sight = seen_exactly(batch, np.arange(2))
-    np.testing.assert_array_equal(sight.q, np.tile(batch.world.people.no_person, (2, 1, 1)))
-    assert sight.q[0, 0, 1] > 3.0 and not sight.qd.any()
+    observed = observe_exactly(batch, np.arange(2))
+    np.testing.assert_array_equal(observed.q, np.tile(batch.world.people.no_person, (2, 1, 1)))
+    assert observed.q[0, 0, 1] > 3.0 and not observed.qd.any()
 
 
 @pytest.mark.parametrize("workers", [1, 2])
@@ -107,9 +107,9 @@ def test_an_angle_beyond_its_limit_is_observed_as_the_limit():
     work = HumanMotionConfig(motion="recorded", recorded=(run,))
     batch = PickBatch(cell, 3, 7, PickSettings(work=work))
     batch.reset()
-    sight = seen_exactly(batch, np.arange(3))
-    np.testing.assert_array_equal(sight.q[:, 0, 13], human.Q_MAX[13])
-    others = np.delete(sight.q[:, 0], 13, axis=1)
+    observed = observe_exactly(batch, np.arange(3))
+    np.testing.assert_array_equal(observed.q[:, 0, 13], human.Q_MAX[13])
+    others = np.delete(observed.q[:, 0], 13, axis=1)
     np.testing.assert_array_equal(others, np.delete(batch.state.people.q[:, 0], 13, axis=1))
 
 

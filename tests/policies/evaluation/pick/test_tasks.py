@@ -9,7 +9,7 @@ from app.errors import InvalidInput, NotFound
 from app.policies.checkpoints import pretrained
 from app.policies.configs.pick import THESIS, PickPreset
 from app.policies.evaluation.pick import selection_rules as choice_rules
-from app.policies.evaluation.pick.episodes import Evaluator, View, seen_exactly, settings_for
+from app.policies.evaluation.pick.episodes import Evaluator, View, observe_exactly, settings_for
 from app.policies.evaluation.registry import evaluate
 from app.policies.inference.value_networks import ValueNetworks
 from app.policies.training.pick import start
@@ -91,12 +91,12 @@ def test_the_observation_model_sees_running_rows_only_and_changes_episodes(evalu
 
     def no_person(batch, rows):
         running.append(batch.state.outcome[rows])
-        sight = seen_exactly(batch, rows)
-        q = sight.q.copy()
+        observed = observe_exactly(batch, rows)
+        q = observed.q.copy()
         q[:, :2] = 100.0
-        return replace(sight, q=q, qd=np.zeros_like(q))
+        return replace(observed, q=q, qd=np.zeros_like(q))
 
-    blind = evaluator.run(choice_rules.critic(0.2), seen=no_person)
+    blind = evaluator.run(choice_rules.critic(0.2), observe=no_person)
     assert not np.concatenate(running).any()
     assert not np.array_equal(
         blind.duration_s, evaluator.run(choice_rules.critic(0.2)).duration_s

@@ -8,7 +8,7 @@ import pytest
 from app.policies.checkpoints import pretrained
 from app.policies.configs.pick import PickPreset
 from app.policies.evaluation.pick import selection_rules as choice_rules
-from app.policies.evaluation.pick.episodes import Evaluator, seen_exactly, settings_for
+from app.policies.evaluation.pick.episodes import Evaluator, observe_exactly, settings_for
 from app.policies.evaluation.pick.tracker import (
     ROWS,
     KeypointObserver,
@@ -34,15 +34,15 @@ def evaluator():
 
 def misses(evaluator, row, seed=1):
     """Return the largest difference of observed and true joints at each step [m, rad]."""
-    look, found = KeypointObserver(row, seed), []
+    observer, found = KeypointObserver(row, seed), []
 
     def compared(batch, rows):
-        seen, true = look(batch, rows), seen_exactly(batch, rows)
-        found.extend(np.abs(seen.q - true.q).max(axis=(1, 2)))
-        np.testing.assert_array_equal(seen.size, true.size)
-        return seen
+        observed, true = observer(batch, rows), observe_exactly(batch, rows)
+        found.extend(np.abs(observed.q - true.q).max(axis=(1, 2)))
+        np.testing.assert_array_equal(observed.size, true.size)
+        return observed
 
-    episodes = evaluator.run(choice_rules.critic(0.2), seen=compared)
+    episodes = evaluator.run(choice_rules.critic(0.2), observe=compared)
     return np.array(found), episodes
 
 
