@@ -30,7 +30,7 @@ from app.api.registry import (
     PolicyRegistry,
 )
 from app.api.service_state import ServiceState
-from app.api.services import LiveWorld, Services, StoredAnswers
+from app.api.services import LiveWorld, ResponseCache, Services
 from app.errors import Damaged, InvalidInput, MissingPackage, NotReady, ServiceError
 from app.live.reach.interfaces import LiveReachPolicy
 from app.policies.checkpoints import pretrained
@@ -282,7 +282,7 @@ def assemble(
     names = CheckpointNames(store)
     return Services(
         store=store,
-        answers=StoredAnswers(store),
+        response_cache=ResponseCache(store),
         supervisor=supervisor,
         retention=retention,
         data=data,

@@ -1,20 +1,20 @@
 """HTTP and WebSocket: application, access control, problems, routes, schemas.
 
-answers           Outermost ASGI layer: completes every answer
 application       The HTTP application: routers, error handlers, access control and the
                   page
-bodies            ASGI layer that checks address and body of a request before its route
+bodies            ASGI middleware that checks address and body of a request before its route
 description       The OpenAPI document: answers of every operation, access, and names of
                   operations
 following         Live worlds that follow a training
 job_requests      Jobs of requests: the one a path names, checks before one is queued,
                   its answer
-direct_routes     ASGI layer that answers decision routes before the routing
+direct_routes     ASGI middleware that answers decision routes before the routing
 known_people      Conversion of the people of a request to person states
 metrics           Metrics for Prometheus that are counted at requests
 problems          Errors as problem documents (RFC 9457, ``application/problem+json``)
 registry          Cache of loaded policies, and names of stored checkpoints
-security          Access control: one ASGI layer around every route, mount and socket
+responses         Outermost ASGI middleware: completes every response
+security          Access control: one ASGI middleware around every route, mount and socket
 service_state     Metrics that are read from the service at a scrape
 services          Parts of the service that routes use; ``app.main`` creates them
 sockets           Limits of WebSocket messages, and refusal of a socket with a reason

@@ -12,10 +12,10 @@ from starlette.responses import FileResponse, Response
 from starlette.staticfiles import StaticFiles
 
 from app.api import description, problems
-from app.api.answers import Answers
-from app.api.bodies import BodyRules
-from app.api.direct_routes import DirectRoutes
+from app.api.bodies import BodyMiddleware
+from app.api.direct_routes import DirectRouteMiddleware
 from app.api.metrics import Metrics
+from app.api.responses import ResponseMiddleware
 from app.api.routes import (
     aliases,
     attempts,
@@ -36,7 +36,7 @@ from app.api.routes import (
     worlds,
 )
 from app.api.routes.decisions import motion, plan, risk_map, sorting, task_selection
-from app.api.security import SESSION_PATH, Guard
+from app.api.security import SESSION_PATH, AccessMiddleware
 
 ICON_PATH = "/favicon.ico"
 """Default path of a page's icon; open, as the sign-in page is."""
@@ -112,12 +112,14 @@ def build_app(
         app.include_router(part.router)
     description.install(app)
     add_page(app, static)
-    app.add_middleware(BodyRules, files=recordings.FILES | checkpoints.FILES | attempts.FILES)
+    app.add_middleware(
+        BodyMiddleware, files=recordings.FILES | checkpoints.FILES | attempts.FILES
+    )
     if traces is None:
-        app.add_middleware(DirectRoutes, routes=decision_routes())
+        app.add_middleware(DirectRouteMiddleware, routes=decision_routes())
     open_paths = (SESSION_PATH, ICON_PATH, *health.PATHS)
-    app.add_middleware(Guard, token=token, open_paths=open_paths)
-    app.add_middleware(Answers, metrics=counts)
+    app.add_middleware(AccessMiddleware, token=token, open_paths=open_paths)
+    app.add_middleware(ResponseMiddleware, metrics=counts)
     return app
 
 

@@ -1,4 +1,4 @@
-"""ASGI layer that checks address and body of a request before its route.
+"""ASGI middleware that checks address and body of a request before its route.
 
 A body is JSON or, on some routes, a file; uncompressed and of limited size. Wrong encoding,
 type or size and unstorable text or integers (``texts.py``) are answered by problems.
@@ -25,8 +25,8 @@ _MANY_PATHS, _MANY_TYPES = 256, 64
 """Sizes of the caches of paths and content types."""
 
 
-class BodyRules:
-    """ASGI layer that refuses unacceptable requests.
+class BodyMiddleware:
+    """ASGI middleware that refuses unacceptable requests.
 
     Status 413 for large bodies, 415 for compressed ones or a wrong type, 422 for unstorable
     text and integers.

@@ -1,9 +1,9 @@
-"""ASGI layer that answers decision routes before the framework's routing.
+"""ASGI middleware that answers decision routes before the framework's routing.
 
 The route is called with its body, validated as JSON bytes, and its answer is written once.
-Whatever is no ordinary request or no success is left to the body rules and the framework, which
-receive the body again, so that every problem is written in one place. With traces this layer is
-not used: the framework makes the spans of requests.
+Other requests, and those without success, are left to the body middleware and the framework,
+which receive the body again, so that every problem is written in one place. With traces this
+middleware is not used: the framework makes the spans of requests.
 """
 
 from collections.abc import Awaitable, Callable, Iterable
@@ -34,11 +34,11 @@ class _Direct(NamedTuple):
     """Model of the body."""
 
 
-class DirectRoutes:
-    """ASGI layer around the body rules and the framework.
+class DirectRouteMiddleware:
+    """ASGI middleware around the body middleware and the framework.
 
     Args:
-        app: The body rules and the framework.
+        app: The body middleware and the framework.
         routes: The decision routes, with the method ``POST``.
     """
 

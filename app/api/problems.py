@@ -263,7 +263,7 @@ async def on_socket_error(client: WebSocket, error: Exception) -> None:
 
 
 def install(app: FastAPI) -> None:
-    """Register the handlers; unexpected errors are answered by ``answers.py``."""
+    """Register the handlers; unexpected errors are answered by ``responses.py``."""
     app.add_exception_handler(WebSocketRequestValidationError, on_socket_error)
     app.add_exception_handler(ServiceError, on_service_error)
     app.add_exception_handler(RequestValidationError, on_validation_error)

@@ -1,4 +1,4 @@
-"""Access control: one ASGI layer around every route, mount and socket.
+"""Access control: one ASGI middleware around every route, mount and socket.
 
 On loopback no token is required, but ``Host`` must be a loopback name (against DNS rebinding)
 and an ``Origin`` must be this site. With a token every request must carry it: as
@@ -76,8 +76,8 @@ def is_loopback_name(host: str | None) -> bool:
         return False
 
 
-class Guard:
-    """ASGI layer that checks Host, Origin and token.
+class AccessMiddleware:
+    """ASGI middleware that checks Host, Origin and token.
 
     Args:
         app: The inner layers.

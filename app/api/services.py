@@ -36,8 +36,8 @@ MAX_UPLOADS = 4
 """Largest number of uploads at once; each file is held in memory."""
 MAX_VIEWERS = 16
 """Largest number of open 3D viewers."""
-MAX_ANSWERS = 64
-"""Largest number of answers that are kept until the next commit."""
+MAX_CACHED_RESPONSES = 64
+"""Largest number of responses that are kept until the next commit."""
 
 
 class LiveWorld(Protocol):
@@ -109,32 +109,32 @@ class Follows:
 
 
 @dataclass(slots=True)
-class StoredAnswers:
-    """Answers from the database that are kept until its next commit; none on PostgreSQL."""
+class ResponseCache:
+    """Cache of responses, until the next commit of the database; empty on PostgreSQL."""
 
     store: Store
     """The database."""
-    kept: dict[Hashable, bytes] = field(default_factory=dict)
-    """Answers by what they depend on beside the database."""
+    entries: dict[Hashable, bytes] = field(default_factory=dict)
+    """Responses by what they depend on beside the database."""
     commit: int | None = None
     """Number of the commit for which they hold."""
 
     async def find(self, key: Hashable, read: Callable[[], bytes]) -> bytes:
-        """Return an answer; called on the event loop.
+        """Return a response; called on the event loop.
 
         Args:
-            key: Everything that the answer depends on beside the database.
-            read: Reads the answer, on a thread.
+            key: Everything that the response depends on beside the database.
+            read: Reads the response, on a thread.
         """
         commit = self.store.commit_number()
-        if commit is None or commit != self.commit or len(self.kept) >= MAX_ANSWERS:
-            self.kept.clear()
+        if commit is None or commit != self.commit or len(self.entries) >= MAX_CACHED_RESPONSES:
+            self.entries.clear()
         self.commit = commit
-        found = self.kept.get(key)
+        found = self.entries.get(key)
         if found is None:
             found = await run_in_threadpool(read)
             if commit is not None and commit == self.commit:
-                self.kept[key] = found
+                self.entries[key] = found
         return found
 
 
@@ -144,8 +144,8 @@ class Services:
 
     store: Store
     """The database."""
-    answers: StoredAnswers
-    """Answers from the database."""
+    response_cache: ResponseCache
+    """Responses read from the database."""
     supervisor: Supervisor
     """Runs the jobs; woken when one is posted."""
     retention: Retention

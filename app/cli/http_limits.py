@@ -10,8 +10,8 @@ from collections.abc import Callable
 
 from uvicorn.protocols.http.httptools_impl import STATUS_LINE, HttpToolsProtocol
 
-from app.api.answers import HEADERS
 from app.api.problems import problem
+from app.api.responses import HEADERS
 
 HEAD_BYTES = 32 * 1024
 """Limit of a request's head: URL and headers, trailers included [bytes]."""

@@ -14,8 +14,8 @@ from starlette.types import Receive, Scope, Send
 
 from app.api import problems
 from app.api.application import decision_routes
-from app.api.bodies import BodyRules
-from app.api.direct_routes import DirectRoutes
+from app.api.bodies import BodyMiddleware
+from app.api.direct_routes import DirectRouteMiddleware
 from app.api.schemas import examples
 from tests.api.conftest import ADDRESS, services_of
 
@@ -66,7 +66,7 @@ def plain(client: TestClient) -> Iterator[TestClient]:
     assert [one.path for one in routes] == list(BODIES)
     for route in routes:
         app.add_api_route(route.path, route.endpoint, methods=["POST"])
-    app.add_middleware(BodyRules)
+    app.add_middleware(BodyMiddleware)
     yield TestClient(app, base_url=ADDRESS)
 
 
@@ -146,7 +146,7 @@ def test_only_other_requests_and_failures_reach_the_framework(client: TestClient
         reached.append((await receive())["body"])
         await Response(status_code=204)(scope, receive, send)
 
-    layer = DirectRoutes(framework, routes=decision_routes())
+    layer = DirectRouteMiddleware(framework, routes=decision_routes())
 
     async def served(scope: Scope, receive: Receive, send: Send) -> None:
         await layer({**scope, "app": client.app}, receive, send)

@@ -8,8 +8,8 @@ from fastapi.testclient import TestClient
 from starlette.types import ASGIApp, Receive, Scope, Send
 
 from app.api import problems
-from app.api.answers import Answers
 from app.api.metrics import Metrics
+from app.api.responses import ResponseMiddleware
 from app.errors import (
     CheckpointMismatch,
     Conflict,
@@ -68,7 +68,7 @@ def broken_app(where: str) -> FastAPI:
             await self.app(scope, receive, send)
 
     app.add_middleware(Layer)
-    app.add_middleware(Answers, metrics=Metrics("0"))
+    app.add_middleware(ResponseMiddleware, metrics=Metrics("0"))
     return app
 
 

@@ -13,9 +13,9 @@ from fastapi import FastAPI, Request
 from starlette.responses import Response, StreamingResponse
 from starlette.websockets import WebSocket
 
-from app.api.bodies import BodyRules
+from app.api.bodies import BodyMiddleware
 from app.api.problems import install
-from app.api.security import Guard
+from app.api.security import AccessMiddleware
 from app.cli import http_limits
 from app.cli.preflight import address_of, listen
 from app.cli.uvicorn_server import new_server
@@ -65,8 +65,8 @@ async def echo(socket: WebSocket) -> None:
         await socket.send_text(text)
 
 
-app.add_middleware(BodyRules, files={"/length": 64 * 1024 * 1024})
-app.add_middleware(Guard, token=TOKEN, open_paths=())
+app.add_middleware(BodyMiddleware, files={"/length": 64 * 1024 * 1024})
+app.add_middleware(AccessMiddleware, token=TOKEN, open_paths=())
 
 if __name__ == "__main__":
     for name in ("HEAD_S", "BODY_S", "DRAIN_S", "LINGER_S", "BODY_BYTES", "BODY_TOTAL_S"):

@@ -69,7 +69,7 @@ async def list_jobs(
 ) -> Response:
     """Return one page, newest first."""
     asked = PageQuery(cursor, limit, state, part_of), services.supervisor.waiting
-    content = await services.answers.find(asked, lambda: page_of_jobs(services, *asked))
+    content = await services.response_cache.find(asked, lambda: page_of_jobs(services, *asked))
     return Response(content, media_type="application/json")
 
 

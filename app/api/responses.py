@@ -1,4 +1,4 @@
-"""Outermost ASGI layer: completes every answer.
+"""Outermost ASGI middleware: completes every response.
 
 Adds security headers, the id of the request and the root path of ``Location``, turns an
 unexpected error into a problem, measures the time to the answer, and answers ``HEAD`` with the
@@ -57,8 +57,8 @@ def id_of(scope: Scope) -> str:
     return f"{_RANDOM.getrandbits(64):016x}"
 
 
-class Answers:
-    """ASGI layer around all others."""
+class ResponseMiddleware:
+    """ASGI middleware around all others."""
 
     def __init__(self, app: ASGIApp, *, metrics: Metrics) -> None:
         self.app = app
