@@ -16,7 +16,7 @@ from typing import Any
 
 from app.errors import ServiceError
 from app.storage_errors import StaleAttempt, StorageDamaged, StorageFull, StorageUnavailable
-from app.store.records import JobRecord, NewCheckpoint, ResumeState, Spent
+from app.store.records import EarlyEnd, JobRecord, NewCheckpoint, ResumeState
 from jobs.access import EndOfAttempt, JobAccess
 
 logger = logging.getLogger(__name__)
@@ -52,7 +52,7 @@ class JobWorker:
         self._lost = threading.Event()
         self._stop_seen = False
         self._waiting: str | None = None
-        self._spent: Spent | None = None
+        self._early_end: EarlyEnd | None = None
         self._budgeted = self.job
         self._run_before, self._started = self.job.run_s, time.monotonic()
 
@@ -95,7 +95,7 @@ class JobWorker:
         self.wait_to(write)
         budget = self._budgeted.step_budget
         if budget is not None and budget <= step != total_steps:
-            self._spent = "step budget"
+            self._early_end = "step budget"
 
     def record_checkpoint(
         self, step: int, policy: NewCheckpoint, resume: ResumeState | None
@@ -111,9 +111,9 @@ class JobWorker:
     def should_stop(self) -> bool:
         """Whether the runner must write a last checkpoint and return; for every step."""
         budget = self._budgeted.time_budget_s
-        if self._spent is None and budget is not None and self.run_s >= budget:
-            self._spent = "time budget"
-        return self._interrupted_now() or self._spent is not None
+        if self._early_end is None and budget is not None and self.run_s >= budget:
+            self._early_end = "time budget"
+        return self._interrupted_now() or self._early_end is not None
 
     def _interrupted_now(self) -> bool:
         stop = self._cancelled.is_set() or self._interrupted.is_set() or self._lost.is_set()
@@ -162,10 +162,10 @@ class JobWorker:
             self.access.end(EndOfAttempt("interrupted"))
             logger.info("interrupted: the job resumes with the next attempt")
         else:
-            spent = self._spent
-            end = EndOfAttempt("succeeded", result, ended_by=spent, run_s=self.run_s)
+            early_end = self._early_end
+            end = EndOfAttempt("succeeded", result, ended_by=early_end, run_s=self.run_s)
             self.access.end(end)
-            logger.info("succeeded" if spent is None else f"ended by its {spent}")
+            logger.info("succeeded" if early_end is None else f"ended by its {early_end}")
 
     def _fail(self, message: str) -> int:
         try:

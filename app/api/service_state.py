@@ -15,8 +15,8 @@ from app.store.cursors import MAX_PAGE
 from app.store.jobs import count_jobs, list_jobs
 from app.store.records import JobRecord
 
-Labelled = Iterable[tuple[tuple[str, ...], float]]
-"""Values with their labels."""
+Samples = Iterable[tuple[tuple[str, ...], float]]
+"""Values of a metric with the values of its labels."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,8 +29,8 @@ class StateMetric:
     """Description."""
     labels: tuple[str, ...]
     """Names of the labels."""
-    read: Callable[[Services], Labelled]
-    """Returns the values."""
+    read: Callable[[Services], Samples]
+    """Returns the samples."""
     counts: bool = False
     """Whether it is a counter; a counter of a live world starts again at its reset."""
 
@@ -66,18 +66,18 @@ class ServiceState(Collector):
         return family
 
 
-def _family(one: StateMetric, values: Labelled) -> GaugeMetricFamily | CounterMetricFamily:
+def _family(one: StateMetric, samples: Samples) -> GaugeMetricFamily | CounterMetricFamily:
     kind = CounterMetricFamily if one.counts else GaugeMetricFamily
     family = kind(one.name, one.text, labels=one.labels)
-    for labels, value in values:
+    for labels, value in samples:
         family.add_metric(labels, value)
     return family
 
 
 def _of_worlds(
     value: Callable[[WorldSnapshot], float | None],
-) -> Callable[[Services], Labelled]:
-    def read(services: Services) -> Labelled:
+) -> Callable[[Services], Samples]:
+    def read(services: Services) -> Samples:
         for world_id, world in services.worlds.copy().items():
             snapshot = world.handle.snapshot()
             if (found := value(snapshot)) is not None:
@@ -91,17 +91,17 @@ def _stop_ratio(snapshot: WorldSnapshot) -> float | None:
     return safety.stopped_s / safety.moving_s if safety.moving_s > 0.0 else None
 
 
-def _tracker_ages(services: Services) -> Labelled:
+def _tracker_ages(services: Services) -> Samples:
     for one in services.trackers.all():
         yield (one.id, one.cell), one.since_frame_s()
 
 
-def _sockets(services: Services) -> Labelled:
+def _sockets(services: Services) -> Samples:
     yield ("motion",), services.motion_load.n_open
     yield ("viewer",), MAX_VIEWERS - services.viewers._value
 
 
-def _limits(_services: Services) -> Labelled:
+def _limits(_services: Services) -> Samples:
     yield ("motion",), MAX_SOCKETS
     yield ("viewer",), MAX_VIEWERS
 
@@ -116,12 +116,12 @@ def _running(services: Services) -> Iterator[JobRecord]:
         more = cursor is not None
 
 
-def _steps(services: Services) -> Labelled:
+def _steps(services: Services) -> Samples:
     for job in _running(services):
         yield (job.id, job.kind, job.preset or ""), job.step
 
 
-def _total_steps(services: Services) -> Labelled:
+def _total_steps(services: Services) -> Samples:
     for job in _running(services):
         if job.total_steps is not None:
             yield (job.id, job.kind, job.preset or ""), job.total_steps

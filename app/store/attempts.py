@@ -20,7 +20,7 @@ from app.store.engine import Store
 from app.store.events import append_event
 from app.store.fencing import change_state, fenced_update
 from app.store.jobs import read_job, select_jobs
-from app.store.records import COMPOSED, Claim, JobRecord, NewCheckpoint, ResumeState
+from app.store.records import COMPOSITE_KINDS, Claim, JobRecord, NewCheckpoint, ResumeState
 
 logger = logging.getLogger(__name__)
 
@@ -51,7 +51,9 @@ def claim_next(store: Store) -> tuple[Claim, JobRecord] | None:
     Returns:
         The claim and the job, or None if nothing is queued.
     """
-    queued = sa.select(jobs.c.id).where(jobs.c.state == "queued", jobs.c.kind.not_in(COMPOSED))
+    queued = sa.select(jobs.c.id).where(
+        jobs.c.state == "queued", jobs.c.kind.not_in(COMPOSITE_KINDS)
+    )
     first = queued.order_by(jobs.c.priority.desc(), jobs.c.number)
     with store.reading() as connection:  # an empty queue needs no write lock
         if connection.execute(first.limit(1)).scalar() is None:
@@ -218,7 +220,7 @@ def running_jobs(store: Store) -> tuple[RunningJob, ...]:
     """Return the running jobs that have a worker."""
     running = jobs.c.state == "running"
     with store.reading() as connection:
-        found = select_jobs(connection, running, jobs.c.kind.not_in(COMPOSED))
+        found = select_jobs(connection, running, jobs.c.kind.not_in(COMPOSITE_KINDS))
     return tuple(
         RunningJob(
             claim=Claim(job_id=job.id, attempt=job.attempt),

@@ -16,7 +16,7 @@ from app.store.database.tables import jobs, resume_states
 from app.store.engine import Store
 from app.store.fencing import change_state, fenced_update
 from app.store.jobs import read_job
-from app.store.records import COMPOSED, Claim, JobRecord, Spent
+from app.store.records import COMPOSITE_KINDS, Claim, EarlyEnd, JobRecord
 
 MAX_ERROR = 4000
 """Longest error text of a job [characters]."""
@@ -30,7 +30,7 @@ def finish(
     *,
     state: Literal["succeeded", "cancelled"] = "succeeded",
     result: Mapping[str, Any] | None = None,
-    ended_by: Spent | None = None,
+    ended_by: EarlyEnd | None = None,
     run_s: float | None = None,
 ) -> None:
     """End a job as succeeded or cancelled.
@@ -137,7 +137,7 @@ def requeue_orphans(store: Store) -> tuple[str, ...]:
         StorageFull: No room is left.
     """
     running = sa.select(jobs.c.id).where(
-        jobs.c.state == "running", jobs.c.kind.not_in(COMPOSED)
+        jobs.c.state == "running", jobs.c.kind.not_in(COMPOSITE_KINDS)
     )
     running = running.order_by(jobs.c.number)
 

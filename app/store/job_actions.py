@@ -10,7 +10,7 @@ from app.store.database.tables import jobs, resume_states
 from app.store.engine import Store
 from app.store.fencing import change_state
 from app.store.jobs import NOTHING, read_job
-from app.store.records import COMPOSED, JobRecord, References
+from app.store.records import COMPOSITE_KINDS, JobRecord, References
 from app.store.references import require_stored
 
 REPEATABLE = ("cancelled", "failed")
@@ -54,7 +54,7 @@ def resume_job(
             require_repeatable(job, "resume")
         newest = sa.select(sa.func.max(resume_states.c.step))
         step = connection.execute(newest.where(resume_states.c.job_id == job_id)).scalar()
-        if step is None and job.kind in COMPOSED:
+        if step is None and job.kind in COMPOSITE_KINDS:
             step = job.step
         elif step is None:
             rule = (

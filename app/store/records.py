@@ -16,10 +16,10 @@ JobState = Literal["queued", "running", "cancelling", "succeeded", "failed", "ca
 FINAL_STATES: tuple[JobState, ...] = ("succeeded", "failed", "cancelled")
 """Final states."""
 
-Spent = Literal["step budget", "time budget", "pruned"]
+EarlyEnd = Literal["step budget", "time budget", "pruned"]
 """What ended a job before its last step: a budget, or the pruner of its sweep."""
 
-COMPOSED = ("sweep", "report")
+COMPOSITE_KINDS = ("sweep", "report")
 """Kinds of jobs that have no worker: the supervisor starts their parts, jobs likewise."""
 
 
@@ -121,7 +121,7 @@ class JobRecord(NewJob):
     """Reason for which its worker cannot write, such as ``"disk full"``."""
     run_s: float
     """Run time of all its attempts, at the last heartbeat [s]."""
-    ended_by: Spent | None
+    ended_by: EarlyEnd | None
     """The budget that ended it, or that the pruner of its sweep did; it can be resumed."""
 
     @property

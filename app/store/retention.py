@@ -11,13 +11,13 @@ from app.store.database.reserve import write_with_reserve
 from app.store.database.tables import checkpoints, jobs, resume_states
 from app.store.engine import Store
 from app.store.jobs import read_job, select_jobs
-from app.store.records import COMPOSED, FINAL_STATES, JobRecord
+from app.store.records import COMPOSITE_KINDS, FINAL_STATES, JobRecord
 from app.store.references import unfinished
 
 logger = logging.getLogger(__name__)
 
 _ENDED = jobs.c.state.in_(FINAL_STATES)
-_OPEN = sa.select(jobs.c.id).where(sa.not_(_ENDED), jobs.c.kind.in_(COMPOSED))
+_OPEN = sa.select(jobs.c.id).where(sa.not_(_ENDED), jobs.c.kind.in_(COMPOSITE_KINDS))
 """The sweeps and reports that still need their parts."""
 
 

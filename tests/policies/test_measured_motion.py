@@ -222,10 +222,12 @@ def test_distances_and_stops_are_those_of_the_measured_state() -> None:
     q[1] = HIGH[1] + 0.05
     inside = np.clip(q, LOW, HIGH)
     measured, clamped = one.decide(question(q=q)), one.decide(question(q=inside))
-    assert measured.met[0].separation != clamped.met[0].separation
+    assert measured.person_weights[0].separation != clamped.person_weights[0].separation
     layer = measured.safe
     assert layer is not None and measured.terms is not None
-    assert measured.terms.separation == pytest.approx(measured.met[0].separation, abs=1e-9)
+    assert measured.terms.separation == pytest.approx(
+        measured.person_weights[0].separation, abs=1e-9
+    )
     np.testing.assert_allclose(measured.segment.q - q, layer.q - q, atol=0.01)
 
 
@@ -241,9 +243,11 @@ def test_far_people_are_seen_at_five_metres_and_kept_where_they_are(
         people[x] = person if known_by == "cylinder" else replace(person, cylinder=None)
     far, near = (one.decide(question(people=(people[x],))) for x in (away, 5.0))
     np.testing.assert_array_equal(far.act, near.act)
-    assert far.met[0].separation > near.met[0].separation + 0.9 * (away - 5.0)
+    assert far.person_weights[0].separation > near.person_weights[0].separation + 0.9 * (
+        away - 5.0
+    )
     assert far.terms is not None
-    assert far.terms.separation == pytest.approx(far.met[0].separation, abs=1e-9)
+    assert far.terms.separation == pytest.approx(far.person_weights[0].separation, abs=1e-9)
 
 
 def test_a_wide_cylinder_stops_the_robot_however_far_its_axis_is() -> None:
@@ -251,4 +255,4 @@ def test_a_wide_cylinder_stops_the_robot_however_far_its_axis_is() -> None:
     wide = person_from_cylinder(20.0, 3.0, 0.0, 0.0, 25.0)
     decision = one.decide(question(people=(wide,), qd=np.full(6, 0.2)))
     assert decision.safe is not None and decision.safe.override == 0.0
-    assert decision.met[0].separation < 0.0
+    assert decision.person_weights[0].separation < 0.0

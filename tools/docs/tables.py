@@ -24,7 +24,7 @@ ROOT = Path(__file__).resolve().parents[2]
 
 BLOCK = re.compile(r"(<!-- begin ([a-z0-9_-]+) -->\n).*?(<!-- end \2 -->)", re.DOTALL)
 Json = dict[str, Any]
-COMPOSED = {"headline": headline.lines, "pick-seeds": pick_seeds.lines}
+MULTI_RESULT_TABLES = {"headline": headline.lines, "pick-seeds": pick_seeds.lines}
 """Tables of several results by their names."""
 UNITS = {
     "rad_s": "rad/s",
@@ -49,8 +49,8 @@ def render(text: str, results: Path) -> str:
     """
 
     def block(match: re.Match[str]) -> str:
-        if match[2] in COMPOSED:
-            lines = COMPOSED[match[2]](results)
+        if match[2] in MULTI_RESULT_TABLES:
+            lines = MULTI_RESULT_TABLES[match[2]](results)
             return match[0] if lines is None else f"{match[1]}{_table(lines)}\n{match[3]}"
         path = results / f"{match[2].removesuffix(reach_tables.DIRECTED)}.json"
         if not path.exists():

@@ -15,7 +15,7 @@ from app.sim.cells.cell import Cell, require_cell
 from app.sim.safety.layer import safety_settings
 
 PATH = "/v1/motion"
-UNMET = {"separation": None, "weight": 0.0}
+NO_WEIGHT = {"separation": None, "weight": 0.0}
 """Distance and weight of a person who is not used."""
 
 
@@ -74,10 +74,10 @@ def decide(
             terms_of=None if decision.terms_of is None else monitored[decision.terms_of],
             outside=renumbered(decision.outside, seen),
         )
-    met = dict(zip(seen, decision.met, strict=True))
+    weights = dict(zip(seen, decision.person_weights, strict=True))
     uses = [
         one.use(i == decision.seen, i in last and i not in monitored)
-        | (met[i]._asdict() if i in met else UNMET)
+        | (weights[i]._asdict() if i in weights else NO_WEIGHT)
         for i, one in enumerate(people)
     ]
     return MotionAnswer.data_of(decision, question, uses, cell.robot.dt, request.stamp)

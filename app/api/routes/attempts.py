@@ -33,13 +33,13 @@ from jobs.remote.uploads import (
     require_sha256,
 )
 
-HELD: dict[int | str, dict[str, Any]] = {
+STALE_ATTEMPT: dict[int | str, dict[str, Any]] = {
     409: {"description": "The attempt no longer holds the job"},
 }
-WRITTEN: dict[int | str, dict[str, Any]] = {**HELD, 507: {}}
+WRITE_RESPONSES: dict[int | str, dict[str, Any]] = {**STALE_ATTEMPT, 507: {}}
 FILE = "application/octet-stream"
-CONTENT: dict[int | str, dict[str, Any]] = {
-    **HELD,
+FILE_RESPONSES: dict[int | str, dict[str, Any]] = {
+    **STALE_ATTEMPT,
     200: {"content": {FILE: {}}, "description": "the file"},
 }
 router = APIRouter(prefix="/v1/jobs/{job_id}/attempts/{attempt}", tags=["attempts"])
@@ -69,38 +69,40 @@ async def access_of(claim: ClaimDep, services: ServicesDep) -> StoreAccess:
 AccessDep = Annotated[StoreAccess, Depends(access_of)]
 
 
-@router.get("", summary="The job of an attempt", responses=HELD)
+@router.get("", summary="The job of an attempt", responses=STALE_ATTEMPT)
 def get_attempt(access: AccessDep) -> JobPublic:
     """Return the job, as long as the attempt holds it."""
     return JobPublic.from_domain(access.job())
 
 
-@router.post("/heartbeat", summary="Record a heartbeat", responses=WRITTEN)
+@router.post("/heartbeat", summary="Record a heartbeat", responses=WRITE_RESPONSES)
 def record_heartbeat(body: AttemptHeartbeat, access: AccessDep) -> JobPublic:
     """Record that the worker runs; return the job with `cancel_requested`."""
     return JobPublic.from_domain(access.heartbeat(body.waiting, body.run_s))
 
 
-@router.post("/progress", status_code=204, summary="Add a point to a curve", responses=WRITTEN)
+@router.post(
+    "/progress", status_code=204, summary="Add a point to a curve", responses=WRITE_RESPONSES
+)
 def record_progress(body: AttemptProgress, access: AccessDep) -> None:
     """Add a point beyond the last one."""
     access.record_progress(body.step, body.values, body.total_steps)
 
 
-@router.post("/start", status_code=204, summary="Start from a state", responses=WRITTEN)
+@router.post("/start", status_code=204, summary="Start from a state", responses=WRITE_RESPONSES)
 def start_attempt(body: AttemptStart, access: AccessDep) -> None:
     """Start from an earlier state than the job states, where a later one is damaged."""
     access.resume_earlier(body.step)
 
 
-@router.post("/end", status_code=204, summary="End an attempt", responses=WRITTEN)
+@router.post("/end", status_code=204, summary="End an attempt", responses=WRITE_RESPONSES)
 def end_attempt(body: AttemptEnd, access: AccessDep, services: ServicesDep) -> None:
     """Record the end of the attempt with its result or error."""
     access.end(EndOfAttempt(**dict(body)))
     services.supervisor.wake()
 
 
-@router.get("/cell", summary="The cell of a training", responses=HELD)
+@router.get("/cell", summary="The cell of a training", responses=STALE_ATTEMPT)
 def get_attempt_cell(access: AccessDep, services: ServicesDep) -> dict[str, Any]:
     """Return the definition of the cell that the job trains in."""
     job = access.job()
@@ -114,7 +116,7 @@ def get_attempt_cell(access: AccessDep, services: ServicesDep) -> dict[str, Any]
     "/recordings/{name}",
     summary="A recording with its runs",
     response_class=Response,
-    responses=CONTENT,
+    responses=FILE_RESPONSES,
 )
 def get_attempt_recording(name: str, access: AccessDep, services: ServicesDep) -> Response:
     """Return a line of JSON, the recording, followed by its runs as a safetensors file."""
@@ -124,7 +126,10 @@ def get_attempt_recording(name: str, access: AccessDep, services: ServicesDep) -
 
 
 @router.get(
-    "/state", summary="A state to resume from", response_class=Response, responses=CONTENT
+    "/state",
+    summary="A state to resume from",
+    response_class=Response,
+    responses=FILE_RESPONSES,
 )
 def get_attempt_state(
     access: AccessDep,
@@ -147,7 +152,7 @@ def get_attempt_state(
     summary="Store a policy and a state",
     openapi_extra=FILE_BODY,
     responses={
-        **WRITTEN,
+        **WRITE_RESPONSES,
         409: {"description": "The attempt no longer holds the job, or the format is another"},
     },
 )
@@ -177,7 +182,7 @@ async def record_checkpoint(
     status_code=204,
     summary="Store a file of a replay memory",
     openapi_extra=FILE_BODY,
-    responses=WRITTEN,
+    responses=WRITE_RESPONSES,
 )
 async def put_attempt_file(
     request: Request, sha256: str, claim: ClaimDep, services: ServicesDep
@@ -192,7 +197,7 @@ async def put_attempt_file(
     "/files/{sha256}",
     summary="A file of a replay memory",
     response_class=Response,
-    responses=CONTENT,
+    responses=FILE_RESPONSES,
 )
 def get_attempt_file(sha256: str, claim: ClaimDep, services: ServicesDep) -> Response:
     """Return a file that an attempt of the job has stored."""

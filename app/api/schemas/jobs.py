@@ -7,7 +7,7 @@ from pydantic import Field
 
 from app.api.schemas.numbers import Answer, Body, Finite
 from app.store.cursors import MAX_INTEGER
-from app.store.records import JobRecord, MetricRow, Spent
+from app.store.records import EarlyEnd, JobRecord, MetricRow
 
 
 class JobPublic(Answer):
@@ -173,5 +173,5 @@ class AttemptEnd(Body):
     )
     result: dict[str, Any] | None = Field(None, description="result of the job")
     error: str | None = Field(None, description="cause of a failure", max_length=100_000)
-    ended_by: Spent | None = Field(None, description="the budget that ended it")
+    ended_by: EarlyEnd | None = Field(None, description="the budget that ended it")
     run_s: RunTime | None = None

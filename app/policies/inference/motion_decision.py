@@ -134,7 +134,7 @@ class MotionDecider:
             safe, terms_of, terms = self._monitored(question, robot, segment, *last)
             state = np.concatenate((robot.clamped.q, robot.clamped.qd, goal))
             outside = self._trained.outside(state, as_given(seen, known, viewed), order)
-        met = [
+        people_weights = [
             PersonWeight(separation=d, weight=w) for d, w in zip(apart, weights, strict=True)
         ]
         place = sorted(range(len(order)), key=order.__getitem__)
@@ -146,7 +146,7 @@ class MotionDecider:
             unfeasible=unfeasible,
             inference_mode=mode,
             targets=targets,
-            met=tuple(met[i] for i in place),
+            person_weights=tuple(people_weights[i] for i in place),
             seen=None if nearest is None else order[nearest],
             safe=safe,
             terms=terms,

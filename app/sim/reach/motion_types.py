@@ -88,7 +88,7 @@ class MotionDecision(NamedTuple):
     """Mode that was used."""
     targets: tuple[TargetWeight, ...]
     """Targets of an interpolated action; empty for ``direct``."""
-    met: tuple[PersonWeight, ...]
+    person_weights: tuple[PersonWeight, ...]
     """The people, in the order of the query."""
     seen: int | None
     """Index of the nearest person; None in an empty cell."""

@@ -116,7 +116,7 @@ def test_people_may_come_in_any_order() -> None:
         first = one.decide(replace(asked, beside=beside))
         second = one.decide(replace(turned, beside=beside))
         np.testing.assert_allclose(first.act, second.act, atol=1e-12)
-        for here, there in zip(first.met, second.met[::-1], strict=True):
+        for here, there in zip(first.person_weights, second.person_weights[::-1], strict=True):
             assert here.separation == there.separation
             assert here.weight == pytest.approx(there.weight, abs=1e-12)
         assert first.seen == 2 - second.seen
@@ -129,7 +129,7 @@ def test_distance_weighted_actions_equal_those_of_the_controller() -> None:
     for e in np.flatnonzero(batch.state.outcome == 0):
         decision = decide(replace(question_of(batch, e), beside="distance-weighted"))
         np.testing.assert_allclose(decision.act, expected[e], atol=2e-6)
-        assert sum(one.weight for one in decision.met) == pytest.approx(1.0)
+        assert sum(one.weight for one in decision.person_weights) == pytest.approx(1.0)
 
 
 def test_weights_of_targets_sum_to_one_and_give_the_goal_back() -> None:
@@ -200,7 +200,7 @@ def test_with_monitoring_a_person_inside_the_robot_is_a_stop(speed: float) -> No
     asked = question(qd=qd, people=people, safety=SafetySettings())
     decision = decider().decide(asked)
     assert decision.safe is not None and decision.safe.override == 0.0
-    assert decision.terms_of == 1 and decision.met[1].separation < 0.0
+    assert decision.terms_of == 1 and decision.person_weights[1].separation < 0.0
     arm = decider().arm
     np.testing.assert_allclose(
         np.abs(decision.safe.qd),
@@ -222,7 +222,7 @@ def test_monitoring_tells_the_terms_that_make_up_the_distance() -> None:
     mode = 1.2 * (terms.reaction_time + 0.1) + terms.robot_speed * terms.reaction_time
     mode += terms.robot_speed * 0.1 / 2 + 0.05 + 0.02 + 0.3
     assert terms.required == pytest.approx(mode) == decision.safe.required
-    assert terms.separation == pytest.approx(decision.met[0].separation, abs=1e-9)
+    assert terms.separation == pytest.approx(decision.person_weights[0].separation, abs=1e-9)
 
 
 @pytest.mark.parametrize(("measured", "speed"), [(True, 0.1), (False, 1.6)])

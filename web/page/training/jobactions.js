@@ -13,7 +13,7 @@ const LABELS = [
   { name: "priority", default: 0, help: "Waiting jobs of a higher priority start first",
     minimum: -100, maximum: 100 },
 ];
-const COMPOSED = new Set(["sweep", "report"]); // resumed from their parts
+const COMPOSITE_KINDS = new Set(["sweep", "report"]); // resumed from their parts
 const REPEATABLE = new Set(["failed", "cancelled"]);
 
 export function isActive(job) {
@@ -29,10 +29,10 @@ export function JobActions({ job, onChanged, onOpen, onClone }) {
   const repeatable = REPEATABLE.has(job.state);
   const act = (name) => again.run(() => post(`v1/jobs/${job.id}/${name}`));
   return html`
-    ${repeatable && (job.resume_step !== null || COMPOSED.has(job.kind)) && html`<button type="button" class="tool"
+    ${repeatable && (job.resume_step !== null || COMPOSITE_KINDS.has(job.kind)) && html`<button type="button" class="tool"
       data-action="resume" disabled=${again.busy} onClick=${() => act("resume")}
       title="Continue this job from its last state">
-      ${COMPOSED.has(job.kind) ? "Resume" : `Resume at ${format.steps(job.resume_step)} steps`}</button>`}
+      ${COMPOSITE_KINDS.has(job.kind) ? "Resume" : `Resume at ${format.steps(job.resume_step)} steps`}</button>`}
     ${repeatable && html`<button type="button" class="tool" data-action="retry"
       disabled=${again.busy} onClick=${() => act("retry")}
       title="Run a new job with the same values from its start">Retry</button>`}
