@@ -67,7 +67,7 @@ def flagged(value: Any, place: str = "") -> list[str]:
         return []
     found = [
         f"{place}.{name} = {value[name]}"
-        for name in ("flags", "outside", "state_outside", "unfeasible", "strays")
+        for name in ("flags", "outside", "state_outside", "unfeasible", "outliers")
         if value.get(name)
     ]
     return found + [

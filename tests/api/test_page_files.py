@@ -33,10 +33,10 @@ def page(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
     app = create_app(Settings(data=tmp_path_factory.mktemp("below")))
     with running(app, root_path=PREFIX) as (_, address):
         wait_until_ready(address)
-        strays: list[str] = []
-        with below_path(address, strays) as shown:
+        outside_paths: list[str] = []
+        with below_path(address, outside_paths) as shown:
             yield shown
-        assert strays == []
+        assert outside_paths == []
 
 
 @pytest.fixture

@@ -13,25 +13,25 @@ pytestmark = pytest.mark.browser
 
 
 @pytest.fixture(scope="module")
-def strays() -> list[str]:
+def outside_paths() -> list[str]:
     """Paths outside the proxy's that were asked for."""
     return []
 
 
 @pytest.fixture(scope="module")
-def server(tmp_path_factory: pytest.TempPathFactory, strays: list[str]) -> Iterator[str]:
+def server(tmp_path_factory: pytest.TempPathFactory, outside_paths: list[str]) -> Iterator[str]:
     """Run a server below a path; yields the address of its page."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("TANDEM_ROOT_PATH", PREFIX)
         with (
             serving(tmp_path_factory.mktemp("below"), free_port()) as (address, _),
-            below_path(address, strays) as shown,
+            below_path(address, outside_paths) as shown,
         ):
             yield f"{shown}/"
 
 
 def test_page_scene_and_commands_work_below_a_path(
-    open_page: Callable[..., Page], server: str, strays: list[str]
+    open_page: Callable[..., Page], server: str, outside_paths: list[str]
 ) -> None:
     page = open_page()
     page.frame_locator('[data-role="viewer"]').locator("canvas").first.wait_for()
@@ -46,4 +46,4 @@ def test_page_scene_and_commands_work_below_a_path(
         page.click("a.docs")
     assert page.url == f"{server}docs"
     assert page.problems == []  # type: ignore[attr-defined]
-    assert strays == []
+    assert outside_paths == []

@@ -13,19 +13,19 @@ _REQUEST = re.compile(rb"(GET|HEAD|POST|PUT|DELETE) (/[^ ]*) HTTP/1\.1\r\n")
 
 
 @contextmanager
-def below_path(address: str, strays: list[str]) -> Iterator[str]:
+def below_path(address: str, outside_paths: list[str]) -> Iterator[str]:
     """Show a server below ``PREFIX``; yields the address of its page.
 
     Args:
         address: The server's own.
-        strays: Filled with the paths outside ``PREFIX`` that were asked for; they get 404.
+        outside_paths: Filled with the requested paths outside ``PREFIX``; they get 404.
     """
     target = urlsplit(address)
 
     def shorten(found: re.Match[bytes]) -> bytes:
         path = found[2].decode()
         if not path.startswith(f"{PREFIX}/"):
-            strays.append(path)
+            outside_paths.append(path)
             path = f"{PREFIX}/nothing-here"
         return found[1] + b" " + path.removeprefix(PREFIX).encode() + b" HTTP/1.1\r\n"
 

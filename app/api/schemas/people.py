@@ -272,7 +272,7 @@ class PersonUse(Answer):
     )
     held: list[str] = Field(description="unobserved joints, at rest or at their last angle")
     missing: list[str] = Field(description="unknown key-points")
-    strays: list[str] = Field(description="key-points dropped: too far from all others")
+    outliers: list[str] = Field(description="key-points dropped: too far from all others")
     unusable: list[str] = Field(description=UNUSABLE)
     implausible: str | None = Field(description=IMPLAUSIBLE)
     age_s: float | None = Field(
@@ -310,7 +310,7 @@ class PersonUse(Answer):
             ],
             "held": [] if estimate is None else list(estimate.held),
             "missing": [] if estimate is None else list(estimate.missing),
-            "strays": [] if estimate is None else list(estimate.strays),
+            "outliers": [] if estimate is None else list(estimate.outliers),
             "unusable": [] if estimate is None else list(estimate.unusable),
             "implausible": None if estimate is None else estimate.implausible,
             "age_s": estimate.age_s if estimate and math.isfinite(estimate.age_s) else None,

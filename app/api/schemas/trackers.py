@@ -83,7 +83,7 @@ class EstimatePublic(Answer):
     flags: list[str] = Field(description="degradations of the estimate")
     held: list[str] = Field(description="unobserved joints at their last angle")
     missing: list[str] = Field(description="key-points missing for longer than the hold time")
-    strays: list[str] = Field(description="key-points dropped: too far from all others")
+    outliers: list[str] = Field(description="key-points dropped: too far from all others")
     unusable: list[str] = Field(description=UNUSABLE)
     implausible: str | None = Field(description=IMPLAUSIBLE)
     misfit_m: float | None = Field(

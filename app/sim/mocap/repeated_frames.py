@@ -16,7 +16,7 @@ MIN_CHANGES = 20
 """Least number of changes from which a rate is found."""
 MIN_STEP = 1.15
 """Least interval of changes [frames]; lower ones are due to single dropped frames."""
-MAX_STRAY = 0.05
+MAX_IRREGULAR = 0.05
 """Largest share of changes off the regular interval."""
 Frames = NDArray[np.signedinteger]
 
@@ -53,7 +53,7 @@ def _whole_step(changes: Frames, n: int) -> tuple[float, Frames] | None:
     """
     step = int(np.bincount(np.diff(changes)).argmax())
     first = int(changes[0])
-    if step < 2 or ((changes - first) % step != 0).mean() > MAX_STRAY:
+    if step < 2 or ((changes - first) % step != 0).mean() > MAX_IRREGULAR:
         return None
     start = first - step * -(-first // step)  # before the file where its first group is cut
     return float(step), np.arange(start, n, step).clip(min=0)

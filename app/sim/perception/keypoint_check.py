@@ -19,10 +19,10 @@ from app.sim.core.arrays import Vec
 from app.sim.human.kernels.kinematics import MEDIAN_TRUNK
 from app.sim.perception.keypoints import BODY_25, FARTHEST_M, N_KEYPOINTS, K
 
-STRAY_M = 1.6
+OUTLIER_M = 1.6
 """Largest distance of a key-point from the median of all [m]; stretched arms reach 1.3 m."""
 _ENOUGH = 5
-"""Least number of key-points for the detection of strays."""
+"""Least number of key-points for the detection of outliers."""
 _PLACEHOLDERS = (0.0, -1.0)
 """Values of all three coordinates that mark a missing key-point."""
 _HUGE = 1e9
@@ -79,7 +79,7 @@ class Keypoints:
     """Key-points [m], shape (25, 3); rows of NaN are missing."""
     confidences: Vec
     """Confidences in (0, 1], 0 for missing key-points, shape (25,)."""
-    strays: tuple[str, ...] = ()
+    outliers: tuple[str, ...] = ()
     """Names of key-points dropped because they are too far from all others."""
     unusable: tuple[str, ...] = ()
     """Names of key-points dropped because of unusable values."""
@@ -137,12 +137,12 @@ def check_keypoints(
     missing |= unusable
     points[missing], trust[missing] = np.nan, 0.0
     implausible = why_implausible(points, floor_z)
-    strays = _strays(points, ~missing) if implausible is None else np.arange(N_KEYPOINTS)
-    points[strays], trust[strays] = np.nan, 0.0
+    outliers = _outliers(points, ~missing) if implausible is None else np.arange(N_KEYPOINTS)
+    points[outliers], trust[outliers] = np.nan, 0.0
     return Keypoints(
         points=points,
         confidences=trust,
-        strays=_names(strays) if implausible is None else (),
+        outliers=_names(outliers) if implausible is None else (),
         unusable=_names(np.flatnonzero(unusable)),
         implausible=implausible,
     )
@@ -178,13 +178,13 @@ def _too_far(points: Vec, there: NDArray[np.bool_]) -> NDArray[np.bool_]:
     return far if 2 * (far & others).sum() < others.sum() else repeated
 
 
-def _strays(points: Vec, seen: NDArray[np.bool_]) -> NDArray[np.intp]:
+def _outliers(points: Vec, seen: NDArray[np.bool_]) -> NDArray[np.intp]:
     """Return the indices of key-points far from the others."""
     there = np.flatnonzero(seen)
     if len(there) < _ENOUGH:
         return there[:0]
     away = np.linalg.norm(points[there] - np.median(points[there], axis=0), axis=1)
-    return np.asarray(there[away > STRAY_M])
+    return np.asarray(there[away > OUTLIER_M])
 
 
 def _bone_ratio(points: Vec) -> float:

@@ -131,7 +131,7 @@ class PersonEstimate:
     """Joints that keep their last angle for lack of key-points."""
     missing: tuple[str, ...]
     """Key-points unseen for longer than the hold time."""
-    strays: tuple[str, ...]
+    outliers: tuple[str, ...]
     """Key-points of the last frame far from all others."""
     misfit_m: float
     """Median distance of the model's joints from the filtered key-points [m]; NaN unknown."""
@@ -352,7 +352,7 @@ class PersonEstimator:
             person=None if self._unfit else person,
             held=tuple(human.JOINT_NAMES[int(j)] for j in np.flatnonzero(held)),
             missing=tuple(BODY_25[int(k)] for k in np.flatnonzero(~known)),
-            strays=() if self._frame is None else self._frame.strays,
+            outliers=() if self._frame is None else self._frame.outliers,
             misfit_m=misfit,
             flags=tuple(flags),
             unusable=() if self._frame is None else self._frame.unusable,

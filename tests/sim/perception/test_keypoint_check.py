@@ -42,7 +42,7 @@ def test_a_missing_point_costs_that_point_and_needs_no_name(point: list[float]) 
     frame = check_keypoints(points, floor_z=FLOOR)
     assert np.flatnonzero(~frame.seen).tolist() == [K["wrist_l"]]
     assert np.isnan(frame.points[K["wrist_l"]]).all()
-    assert frame.unusable == frame.strays == ()
+    assert frame.unusable == frame.outliers == ()
 
 
 @pytest.mark.parametrize("trust", [0.0, 0.05, NAN, -0.005])
@@ -97,11 +97,11 @@ def test_a_keypoint_far_from_the_others_is_dropped_and_named() -> None:
     points = person()
     points[K["ankle_r"]] = [50.0, 0.0, 0.0]
     frame = check_keypoints(points)
-    assert frame.strays == ("ankle_r",)
+    assert frame.outliers == ("ankle_r",)
     assert frame.seen.sum() == 24
 
 
-def test_no_person_at_work_has_strays_or_is_implausible() -> None:
+def test_no_person_at_work_has_outliers_or_is_implausible() -> None:
     for seed in (1, 2, 3):
         for q in work(seed, 12.0)[1][::10]:
             frame = check_keypoints(seen(q), floor_z=FLOOR)
