@@ -13,7 +13,7 @@ from itertools import combinations
 import numpy as np
 
 from app.errors import Fault, digits, interval
-from app.sim.cell_validation.places import Sound, places
+from app.sim.cell_validation.places import FaultlessParts, places
 from app.sim.cell_validation.reachability import Reach, Touching
 from app.sim.cell_validation.units import numbers, shown
 from app.sim.cells.cell import LIMITS, MAX_TARGETS, Cell
@@ -43,16 +43,16 @@ def check_cell(cell: Cell, known: Sequence[Fault] = ()) -> list[Fault]:
         known: Faults found before, in reading; nothing is built on the values they name.
     """
     faults = [*_counts(cell, known), *_ids(cell), *numbers(cell)]
-    sound = Sound(cell, [*known, *faults])
-    faults += [*_kinds(cell), *_people(sound)]
-    faults += _table(cell) if sound.table else []
-    faults += _robot(cell.robot) if sound.robot else []
-    faults += _grid(sound.goal_region) if sound.goal_region is not None else []
-    sound = Sound(cell, [*known, *faults])
-    faults += [*_overlaps(sound), *places(sound)] if sound.few else []
-    sound = Sound(cell, [*known, *faults])
-    if sound.robot and sound.few:
-        faults += _reach(sound)
+    parts = FaultlessParts(cell, [*known, *faults])
+    faults += [*_kinds(cell), *_people(parts)]
+    faults += _table(cell) if parts.table else []
+    faults += _robot(cell.robot) if parts.robot else []
+    faults += _grid(parts.goal_region) if parts.goal_region is not None else []
+    parts = FaultlessParts(cell, [*known, *faults])
+    faults += [*_overlaps(parts), *places(parts)] if parts.counts_valid else []
+    parts = FaultlessParts(cell, [*known, *faults])
+    if parts.robot and parts.counts_valid:
+        faults += _reach(parts)
     return faults
 
 
@@ -135,8 +135,8 @@ def _kinds(cell: Cell) -> Iterator[Fault]:
             yield Fault(place=place, value=station.colour, rule=rule)
 
 
-def _people(sound: Sound) -> Iterator[Fault]:
-    for index, person in sound.people:
+def _people(parts: FaultlessParts) -> Iterator[Fault]:
+    for index, person in parts.people:
         place = f"people[{index}]"
         for name in ("x", "y", "speed", "radius"):
             low, high = (getattr(person, f"{name}_{end}", None) for end in ("min", "max"))
@@ -175,8 +175,8 @@ def _grid(region: GoalRegion) -> list[Fault]:
     return faults
 
 
-def _overlaps(sound: Sound) -> Iterator[Fault]:
-    for a, b in combinations(sound.stations, 2):
+def _overlaps(parts: FaultlessParts) -> Iterator[Fault]:
+    for a, b in combinations(parts.stations, 2):
         if (distance := station_distance(a, b)) < MIN_SPACING:
             yield Fault(
                 place=f"stations.{b.id}.position",
@@ -184,7 +184,7 @@ def _overlaps(sound: Sound) -> Iterator[Fault]:
                 rule=f"must be at least {digits(MIN_SPACING)} m from every other station",
                 hint=f"{a.id} is {distance:.3g} m away",
             )
-    for one, other in combinations(sound.obstacles, 2):
+    for one, other in combinations(parts.obstacles, 2):
         pair = [obstacle_box(box, 0.5 * MAX_OVERLAP) for box in (one, other)]
         if touch(*pair):
             yield Fault(
@@ -203,18 +203,18 @@ def station_distance(a: Station, b: Station) -> float:
     return math.hypot(flat, gap)
 
 
-def _reach(sound: Sound) -> Iterator[Fault]:
-    cell = sound.cell.model_copy(update={"obstacles": sound.obstacles})
+def _reach(parts: FaultlessParts) -> Iterator[Fault]:
+    cell = parts.cell.model_copy(update={"obstacles": parts.obstacles})
     found = list(Reach(cell).touching(np.array(cell.robot.home_q)))
     yield from _home_contacts(cell, found)
     # Obstacles that touch the robot at home would be reported again for every station.
     touching = {one.other for one in found if one.kind == "obstacle"}
-    apart = tuple(box for box in sound.obstacles if box.id not in touching)
+    apart = tuple(box for box in parts.obstacles if box.id not in touching)
     reach = Reach(cell.model_copy(update={"obstacles": apart}))
-    for station in sound.stations:
+    for station in parts.stations:
         yield from _station_reach(reach, station)
-    if sound.goal_region is not None:
-        yield from _region_reach(reach, sound.goal_region)
+    if parts.goal_region is not None:
+        yield from _region_reach(reach, parts.goal_region)
 
 
 def _home_contacts(cell: Cell, found: list[Touching]) -> Iterator[Fault]:

@@ -15,25 +15,25 @@ FACING = 1.4
 """Greatest angle between a worker's gaze at home and the direction to the table [rad]."""
 
 
-class Sound:
+class FaultlessParts:
     """The parts of a cell that no fault names, for checks that build on them."""
 
     def __init__(self, cell: Cell, faults: list[Fault]) -> None:
         named = [fault.place for fault in faults]
 
-        def fine(place: str) -> bool:
+        def is_faultless(place: str) -> bool:
             inside = (f"{place}.", f"{place}[")
             return not any(one == place or one.startswith(inside) for one in named)
 
         self.cell = cell
-        self.table, self.robot = fine("table"), fine("robot")
-        self.few = "stations" not in named and "obstacles" not in named
-        self.stations = tuple(s for s in cell.stations if fine(f"stations.{s.id}"))
-        self.obstacles = tuple(o for o in cell.obstacles if fine(f"obstacles.{o.id}"))
+        self.table, self.robot = is_faultless("table"), is_faultless("robot")
+        self.counts_valid = "stations" not in named and "obstacles" not in named
+        self.stations = tuple(s for s in cell.stations if is_faultless(f"stations.{s.id}"))
+        self.obstacles = tuple(o for o in cell.obstacles if is_faultless(f"obstacles.{o.id}"))
         self.people = tuple(
-            (k, person) for k, person in enumerate(cell.people) if fine(f"people[{k}]")
+            (k, person) for k, person in enumerate(cell.people) if is_faultless(f"people[{k}]")
         )
-        self.goal_region = cell.goal_region if fine("goal_region") else None
+        self.goal_region = cell.goal_region if is_faultless("goal_region") else None
 
 
 def _over(box: Obstacle, point: Sequence[float]) -> bool:
@@ -44,11 +44,11 @@ def _over(box: Obstacle, point: Sequence[float]) -> bool:
     return along <= box.half_size[0] and across <= box.half_size[1]
 
 
-def places(sound: Sound) -> Iterator[Fault]:
+def places(parts: FaultlessParts) -> Iterator[Fault]:
     """Check that stations are supported and free, and people clear of table and obstacles."""
-    for station in sound.stations:
+    for station in parts.stations:
         place, value = f"stations.{station.id}.position", shown(station.position)
-        under = [box for box in sound.obstacles if _over(box, station.position)]
+        under = [box for box in parts.obstacles if _over(box, station.position)]
         inside = [
             box
             for box in under
@@ -61,23 +61,23 @@ def places(sound: Sound) -> Iterator[Fault]:
             yield Fault(
                 place=place, value=value, rule="must not lie below the table top, z = 0"
             )
-        elif sound.table and not under and not _on_table(sound.cell, station.position):
+        elif parts.table and not under and not _on_table(parts.cell, station.position):
             yield Fault(
                 place=place,
                 value=value,
                 rule="must lie over the table or over an obstacle that carries it",
-                hint=_table_text(sound.cell),
+                hint=_table_text(parts.cell),
             )
-        elif sound.table and (hint := _hangs(sound.cell, station, under)):
+        elif parts.table and (hint := _hangs(parts.cell, station, under)):
             rule = (
                 f"must be carried by the table or an obstacle at most {HIGHEST_PART:g} m below"
             )
             yield Fault(place=place, value=value, rule=rule, hint=hint)
-    region = sound.goal_region
+    region = parts.goal_region
     if region is not None and region.center[2] - 0.5 * region.size[2] < 0.0:
         rule = "must keep the whole region over the table top, z = 0"
         yield Fault(place="goal_region.center", value=shown(region.center), rule=rule)
-    yield from _standing(sound)
+    yield from _standing(parts)
 
 
 def _hangs(cell: Cell, station: Station, under: Sequence[Obstacle]) -> str:
@@ -107,10 +107,10 @@ def _table_text(cell: Cell) -> str:
     return f"the table is x in [{t.x_min:g}, {t.x_max:g}] m, y in [{t.y_min:g}, {t.y_max:g}] m"
 
 
-def _standing(sound: Sound) -> Iterator[Fault]:
+def _standing(parts: FaultlessParts) -> Iterator[Fault]:
     """Check that workers stand beside the table; cylinders include arms and may cross it."""
-    table = sound.cell.table
-    for index, person in sound.people:
+    table = parts.cell.table
+    for index, person in parts.people:
         if not isinstance(person, Worker):
             continue
         place = f"people[{index}]"
@@ -120,18 +120,18 @@ def _standing(sound: Sound) -> Iterator[Fault]:
             or person.y_min >= table.y_max - 1e-9
             or person.y_max <= table.y_min + 1e-9
         )
-        if sound.table and not apart:
+        if parts.table and not apart:
             yield Fault(
                 place=f"{place}.y_min",
                 value=shown(person.y_min),
                 rule="must keep a worker's walking area off the table",
-                hint=_table_text(sound.cell),
+                hint=_table_text(parts.cell),
             )
-        if sound.table and apart:
-            yield from _facing(sound.cell, person, place)
-        for box in sound.obstacles:
+        if parts.table and apart:
+            yield from _facing(parts.cell, person, place)
+        for box in parts.obstacles:
             on_floor = (
-                box.center[2] - box.half_size[2] < person.pelvis_height + sound.cell.floor_z
+                box.center[2] - box.half_size[2] < person.pelvis_height + parts.cell.floor_z
             )
             if on_floor and _over(box, person.home):
                 rule = f"must not lie inside the obstacle {box.id}"

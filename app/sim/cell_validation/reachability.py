@@ -65,7 +65,7 @@ class Reach:
     """The robot of one cell, looking for postures; not thread-safe.
 
     Args:
-        cell: A cell whose robot and obstacles are sound numbers.
+        cell: A cell whose robot and obstacles have no faults.
     """
 
     def __init__(self, cell: Cell) -> None:
