@@ -39,7 +39,7 @@ KEYS = (
 Json = dict[str, Any]
 
 
-class Still(torch.nn.Module):
+class StandingStill(torch.nn.Module):
     """Actor that commands no motion.
 
     Args:
@@ -96,7 +96,7 @@ def standing_still(preset: ReachPreset | PickPreset) -> float:
         batch: PickBatch | ReachEnvironments = pick.curve_batch(preset, cell)
     else:
         batch = reach.curve_batch(preset, cell)
-    _, returns = play(Still(batch.n_act), batch)
+    _, returns = play(StandingStill(batch.n_act), batch)
     return float(returns.mean())
 
 

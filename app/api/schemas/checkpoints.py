@@ -59,7 +59,7 @@ class CheckpointList(Answer):
 
 
 class ObservedOutcome(Body):
-    """A pick that was carried out after a task selection: what was predicted, what came."""
+    """A pick that was carried out after a task selection: its prediction and outcome."""
 
     success: float = Field(ge=0.0, le=1.0, description="`success.mean` of the answer")
     contact: float = Field(ge=0.0, le=1.0, description="`contact.mean` of the answer")
@@ -87,9 +87,9 @@ class Recalibration(Body):
 
     def to_domain(self) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
         """Return predicted probabilities, shape (n, 3), and indices of outcomes, (n,)."""
-        said = np.array([(one.success, one.contact) for one in self.outcomes])
-        came = np.array([OUTCOMES.index(one.outcome) for one in self.outcomes])
-        return with_timeout(said[:, 0], said[:, 1]), came
+        predicted = np.array([(one.success, one.contact) for one in self.outcomes])
+        observed = np.array([OUTCOMES.index(one.outcome) for one in self.outcomes])
+        return with_timeout(predicted[:, 0], predicted[:, 1]), observed
 
 
 class AliasTarget(Body):

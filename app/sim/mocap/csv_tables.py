@@ -86,7 +86,7 @@ def read_csv(text: str, names: Mapping[str, str] | None = None) -> AngleTrack:
     if "time" in sound:
         times = check_times(sound["time"], file.table, good)
     else:
-        times = np.asarray(_dt(file.said.get("rate_hz")) * np.flatnonzero(good))
+        times = np.asarray(_dt(file.declared.get("rate_hz")) * np.flatnonzero(good))
     return AngleTrack(
         times=times,
         q=q,
@@ -117,13 +117,13 @@ def _columns(table: TextTable, names: Mapping[str, str]) -> dict[str, int]:
 
 def _declared_degrees(file: CsvText, columns: Mapping[str, int]) -> bool:
     """Return whether a comment or all units declare angles in degrees."""
-    said = file.said.get("angles", "")
+    declared = file.declared.get("angles", "")
     stated = {file.units.get(columns[name]) for name in JOINT_NAMES[2:]}
     for unit, spellings in ANGLE_UNITS.items():
-        if said == unit or (not said and stated <= set(spellings)):
+        if declared == unit or (not declared and stated <= set(spellings)):
             return unit == "degrees"
     rule = "must be declared in the first line: # angles = degrees, or # angles = radians"
-    raise bad("angles", shown(said) if said else "", rule)
+    raise bad("angles", shown(declared) if declared else "", rule)
 
 
 def _check_units(file: CsvText, columns: Mapping[str, int], degrees: bool) -> None:

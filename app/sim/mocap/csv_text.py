@@ -32,7 +32,7 @@ Lines = list[tuple[int, str]]
 class CsvText:
     """Declarations and table of a CSV file."""
 
-    said: Mapping[str, str]
+    declared: Mapping[str, str]
     """Declarations in comments, ``# key = value``, in lower case."""
     table: TextTable
     """Columns and rows, without the row of units."""
@@ -64,7 +64,7 @@ def read_csv_text(text: str, known: Sequence[str]) -> CsvText:
     if rows and (below := _units_row(split(rows[0][1], len(names)))):
         units, rows = {**units, **below}, rows[1:]
     return CsvText(
-        said=dict(_declared(line) for _, line in comments),
+        declared=dict(_declaration(line) for _, line in comments),
         table=TextTable(
             names=names,
             labels=tuple("" if _is_index(name) else name for name in names),
@@ -125,7 +125,7 @@ def _split_at(separator: str | None) -> Split:
     return split
 
 
-def _declared(line: str) -> tuple[str, str]:
+def _declaration(line: str) -> tuple[str, str]:
     key, _, value = line.replace(":", "=").strip(PADDING).lstrip("# ").partition("=")
     return key.strip(PADDING).lower(), value.strip(PADDING).lower()
 

@@ -82,13 +82,13 @@ def read_opensim(text: str, names: Mapping[str, str] | None = None) -> AngleTrac
     if end is None:
         rule = "has no line endheader"
         raise bad(f"line {len(lines)}", "", rule, "the file is cut off or not OpenSim's")
-    said = _head(lines[:end])
-    degrees = _in_degrees(said)
+    head = _head(lines[:end])
+    degrees = _in_degrees(head)
     rows = [(k + 1, lines[k]) for k in range(end + 1, len(lines)) if lines[k].strip()]
     if not rows:
         raise bad(f"line {len(lines)}", "", "ends after endheader", "the file is cut off")
     table = _table(rows)
-    _check_counts(said, table)
+    _check_counts(head, table)
     columns = _columns(table, names or {})
     values = table.values(columns)
     good = complete_rows(values)
@@ -137,10 +137,10 @@ def _head(lines: Sequence[str]) -> dict[str, str]:
     }
 
 
-def _in_degrees(said: Mapping[str, str]) -> bool:
-    degrees = {"yes": True, "no": False}.get(said.get("indegrees", "").lower())
+def _in_degrees(head: Mapping[str, str]) -> bool:
+    degrees = {"yes": True, "no": False}.get(head.get("indegrees", "").lower())
     if degrees is None:
-        value = shown(said["indegrees"]) if "indegrees" in said else ""
+        value = shown(head["indegrees"]) if "indegrees" in head else ""
         raise bad("head, inDegrees", value, "must be declared: inDegrees=yes or inDegrees=no")
     return degrees
 
@@ -163,13 +163,13 @@ def _table(rows: Sequence[tuple[int, str]]) -> TextTable:
     )
 
 
-def _check_counts(said: Mapping[str, str], table: TextTable) -> None:
+def _check_counts(head: Mapping[str, str], table: TextTable) -> None:
     """Check the numbers of columns and rows against the head."""
     n_columns, n_rows = len(table.names), len(table.rows)
-    if said.get("ncolumns", str(n_columns)) != str(n_columns):
-        rule = f"must be the nColumns={said['ncolumns'][:20]} that the head states"
+    if head.get("ncolumns", str(n_columns)) != str(n_columns):
+        rule = f"must be the nColumns={head['ncolumns'][:20]} that the head states"
         raise bad(f"line {table.line}", f"<{n_columns} columns>", rule)
-    word = said.get("nrows", said.get("datarows", str(n_rows)))
+    word = head.get("nrows", head.get("datarows", str(n_rows)))
     if not word.isascii() or not word.isdigit():
         raise bad("head, nRows", shown(word), "must be a whole number")
     if (word.lstrip("0") or "0") != str(n_rows):

@@ -24,7 +24,7 @@ TARGETS = CELL.goal_region.targets()
 USUAL = ReachSettings()
 
 
-class Still:
+class StillController:
     """Controller without motion that records the observed remaining time."""
 
     def __init__(self) -> None:
@@ -80,7 +80,7 @@ def test_a_longer_limit_changes_only_what_would_time_out() -> None:
 
 
 def test_long_episodes_show_no_more_remaining_time_than_training() -> None:
-    still = Still()
+    still = StillController()
     found = run_episodes(CELL, replace(USUAL, time_limit_s=7.0), still, TARGETS[:40], 5)
     waited = found.outcome == TIMEOUT
     assert waited.any()
@@ -92,7 +92,7 @@ def test_long_episodes_show_no_more_remaining_time_than_training() -> None:
 
 def test_starts_in_contact_are_those_that_end_at_once() -> None:
     found = run_episodes(
-        CELL, replace(USUAL, start="uniform"), Still(), target_goals(TARGETS, 400), 5
+        CELL, replace(USUAL, start="uniform"), StillController(), target_goals(TARGETS, 400), 5
     )
     in_contact = found.start_m <= 0.0
     assert 4 <= in_contact.sum() <= 40
@@ -124,7 +124,8 @@ def test_a_row_counts_every_episode_once() -> None:
 def test_a_difference_is_paired() -> None:
     goals = target_goals(TARGETS, 100)
     one, other = (
-        run_episodes(CELL, USUAL, controller, goals, 5) for controller in (Straight(), Still())
+        run_episodes(CELL, USUAL, controller, goals, 5)
+        for controller in (Straight(), StillController())
     )
     same = against(one, one)
     assert same == {"mean": 0.0, "low": 0.0, "high": 0.0}
