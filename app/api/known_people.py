@@ -109,21 +109,21 @@ class PeopleForPolicy(NamedTuple):
         """Return a decision about them with the request's indices of people."""
         if self.places == _SAME[: len(self.places)]:
             return decision
-        seen = decision.seen
+        nearest = decision.nearest_person
         return replace(
             decision,
-            seen=None if seen is None else self.places[seen],
+            nearest_person=None if nearest is None else self.places[nearest],
             outside=renumbered(decision.outside, self.places),
         )
 
-    def uses(self, seen: int | None) -> list[Data]:
+    def uses(self, nearest: int | None) -> list[Data]:
         """Return the data of the use of each person of the request.
 
         Args:
-            seen: Index in the request of the observed person nearest to the robot.
+            nearest: Index in the request of the observed person nearest to the robot.
         """
         return [
-            one.use(i == seen, one.person is not None and i not in self.places)
+            one.use(i == nearest, one.person is not None and i not in self.places)
             for i, one in enumerate(self.known)
         ]
 

@@ -27,7 +27,7 @@ from app.sim.core.arrays import Vec
 from app.sim.people.kernels.pedestrian import GROWTH, VX, VY, R, X, Y
 from app.sim.perception.observed_people import person_from_cylinder
 from app.sim.reach.batch import VIEWS, ReachBatch, ReachSettings
-from app.sim.reach.motion_types import MotionQuestion
+from app.sim.reach.motion_types import MotionQuery
 from app.sim.safety.layer import SafetySettings
 from tests.policies.untrained import untrained_reach
 
@@ -45,7 +45,7 @@ def decider() -> tuple[MotionDecider, str]:
     return found, "shipped" if shipped else "untrained, of the preset's size"
 
 
-def questions(one: MotionDecider, seed: int) -> list[MotionQuestion]:
+def queries(one: MotionDecider, seed: int) -> list[MotionQuery]:
     """Return states met while the robot moves at random, with goals between the targets."""
     settings = ReachSettings(people=("walker",), goals="box", observation=one.actor.view)
     batch = ReachBatch(one.cell, STATES, seed, settings)
@@ -58,7 +58,7 @@ def questions(one: MotionDecider, seed: int) -> list[MotionQuestion]:
         batch.state.people.walkers.rows[:, 0, [X, Y, VX, VY, R, GROWTH]],
     )
     return [
-        MotionQuestion(
+        MotionQuery(
             q=state.q[e].copy(),
             qd=state.qd[e].copy(),
             goal=state.goal[e].copy(),
@@ -73,7 +73,7 @@ def questions(one: MotionDecider, seed: int) -> list[MotionQuestion]:
 def requests(seed: int) -> list[dict[str, object]]:
     """Return the same states as requests of ``/v1/motion``, beside a person each."""
     found = []
-    for one in questions(decider()[0], seed):
+    for one in queries(decider()[0], seed):
         (person,) = one.people
         assert person.cylinder is not None
         (x, y, r), (vx, vy) = person.cylinder.tolist(), person.qd[:2].tolist()
@@ -113,16 +113,16 @@ class _Spaces(gym.Env[np.ndarray, np.ndarray]):
 def motion_times(seed: int, seconds: float) -> tuple[dict[str, Vec], str]:
     """Return the times of each kind of call [ms], by name, and which policy decided."""
     one, policy = decider()
-    turn = itertools.cycle(questions(one, seed))
+    turn = itertools.cycle(queries(one, seed))
     predict = predicting(one, seed)
 
-    def asked(question: MotionQuestion) -> Sequence[tuple[str, Callable[[], object]]]:
-        question = replace(question, rollout=False)
-        alone = replace(question, safety=None)
+    def asked(query: MotionQuery) -> Sequence[tuple[str, Callable[[], object]]]:
+        query = replace(query, rollout=False)
+        alone = replace(query, safety=None)
         direct, ahead = replace(alone, inference_mode="direct"), replace(alone, rollout=True)
         return (
             ("motion", lambda: one.decide(alone)),
-            ("motion-monitored", lambda: one.decide(question)),
+            ("motion-monitored", lambda: one.decide(query)),
             ("motion-direct", lambda: one.decide(direct)),
             ("motion-rollout", lambda: one.decide(ahead)),
             ("motion-sb3-predict", predict),

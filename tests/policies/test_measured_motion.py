@@ -11,7 +11,7 @@ from app.policies.inference.reach_policy import ReachPolicy
 from app.sim.cells.cell import load_cell
 from app.sim.human.person import Person
 from app.sim.perception.observed_people import person_from_cylinder
-from app.sim.reach.motion_types import MotionDecision, MotionQuestion
+from app.sim.reach.motion_types import MotionDecision, MotionQuery
 from app.sim.robot.actions import ActionSettings
 from app.sim.safety.layer import SafetySettings
 from tests.policies.reach_actor import RandomActor
@@ -30,8 +30,8 @@ ACTIONS = {
 }
 
 
-def question(**changes: object) -> MotionQuestion:
-    asked = MotionQuestion(
+def query(**changes: object) -> MotionQuery:
+    asked = MotionQuery(
         q=HOME, qd=np.zeros(6), goal=GOAL, people=(WALKER,), safety=SafetySettings()
     )
     return replace(asked, **changes)  # type: ignore[arg-type]
@@ -50,7 +50,7 @@ def near_the_limits(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray, n
     )
 
 
-def assert_leads_inside(decision: MotionDecision, asked: MotionQuestion) -> None:
+def assert_leads_inside(decision: MotionDecision, asked: MotionQuery) -> None:
     """Every joint outside is turned inward with its whole acceleration, until it is fast."""
     q, qd, segment = asked.q, asked.qd, decision.segment
     np.testing.assert_allclose(segment.q, q + DT * (qd + DT * (segment.c + DT * segment.d)))
@@ -69,7 +69,7 @@ def test_every_state_near_the_limits_has_an_answer_that_leads_inside(kind: str) 
     flagged = 0
     for _ in range(300):
         q, qd, qdd = near_the_limits(rng)
-        asked = question(q=q, qd=qd, qdd=qdd)
+        asked = query(q=q, qd=qd, qdd=qdd)
         decision = one.decide(asked)
         assert_leads_inside(decision, asked)
         over = (q < LOW) | (q > HIGH), np.abs(qd) > FAST, np.abs(qdd) > HARD
@@ -87,7 +87,7 @@ def test_a_jerk_limited_policy_leads_inside_from_the_clamped_acceleration() -> N
     rng, jerk = np.random.default_rng(4), np.array(CELL.robot.jerk_max)
     for _ in range(200):
         q, qd, qdd = near_the_limits(rng)
-        decision = one.decide(question(q=q, qd=qd, qdd=qdd))
+        decision = one.decide(query(q=q, qd=qd, qdd=qdd))
         segment, begun = decision.segment, np.clip(qdd, -HARD, HARD)
         np.testing.assert_allclose(2.0 * segment.c, begun)
         assert (np.abs(6.0 * segment.d) <= jerk + 1e-6).all()
@@ -110,10 +110,10 @@ def test_a_joint_left_outside_comes_back_and_every_step_is_answered(
     q, qd, qdd = HOME.copy(), np.zeros(6), np.zeros(6)
     q[2] = (HIGH if side > 0 else LOW)[2] + side * over
     qd[2] = side * 1.01 * FAST[2]
-    first = one.decide(question(q=q, qd=qd, qdd=qdd, people=()))
+    first = one.decide(query(q=q, qd=qd, qdd=qdd, people=()))
     assert first.unfeasible and {one.of for one in first.state_outside} == {"limits"}
     for _ in range(60):
-        decision = one.decide(question(q=q, qd=qd, qdd=qdd, people=()))
+        decision = one.decide(query(q=q, qd=qd, qdd=qdd, people=()))
         safe = decision.safe
         assert safe is not None
         q, qd, qdd = safe.q, safe.qd, safe.qdd
@@ -129,7 +129,7 @@ def test_monitoring_lets_a_robot_go_on_that_is_measured_a_hair_too_fast() -> Non
     rng = np.random.default_rng(5)
     for _ in range(60):
         qd = rng.choice([-1.0, 1.0], 6) * FAST * (1.0 + rng.normal(0.0, 0.01, 6))
-        decision = one.decide(question(q=0.3 * HOME, qd=qd, people=(far,)))
+        decision = one.decide(query(q=0.3 * HOME, qd=qd, people=(far,)))
         assert decision.safe is not None and decision.safe.override == 1.0
         assert (np.abs(decision.safe.qd) <= FAST + 1e-9).all()
 
@@ -141,7 +141,7 @@ def test_noisy_measurements_of_a_closed_loop_never_lose_a_decision() -> None:
     goals = (np.array([-0.45, 0.65, 0.15]), np.array([0.45, 0.95, 0.45]))
     for k in range(240):
         seen = qd * (1.0 + rng.uniform(-0.01, 0.01, 6))
-        asked = question(q=q, qd=seen, goal=goals[k // 60 % 2], people=(), rollout=False)
+        asked = query(q=q, qd=seen, goal=goals[k // 60 % 2], people=(), rollout=False)
         decision = one.decide(asked)
         safe = decision.safe
         assert safe is not None
@@ -161,7 +161,7 @@ def test_a_joint_at_its_limit_at_full_speed_outward_brakes_and_is_flagged(
     q, qd = HOME.copy(), np.zeros(6)
     q[joints] = (HIGH if side > 0 else LOW)[joints]
     qd[joints] = side * FAST[joints]
-    decision = one.decide(question(q=q, qd=qd, qdd=np.zeros(6), people=()))
+    decision = one.decide(query(q=q, qd=qd, qdd=np.zeros(6), people=()))
     assert decision.unfeasible and decision.state_outside == ()
     slower = side * (qd - decision.segment.qd)[joints]
     most = HARD * DT if kind != "jerk" else 0.5 * np.array(CELL.robot.jerk_max) * DT**2
@@ -177,7 +177,7 @@ def test_a_faster_measured_robot_needs_more_distance_and_is_never_let_run_faster
     for share in (1.0, 1.02, 1.05):
         qd = share * FAST * [1.0, 0.0, 0.0, 0.0, 0.0, 0.0]
         person = person_from_cylinder(0.2, away, 0.0, 0.0, 0.3)
-        decision = one.decide(question(qd=qd, people=(person,)))
+        decision = one.decide(query(qd=qd, people=(person,)))
         assert decision.safe is not None and decision.terms is not None
         found.append(
             (decision.terms.required, decision.terms.stop_time, decision.safe.override)
@@ -190,7 +190,7 @@ def test_a_faster_measured_robot_needs_more_distance_and_is_never_let_run_faster
 
 
 def test_accelerations_that_no_policy_needs_cost_no_decision() -> None:
-    noisy = question(qdd=np.array([80.0, -40.0, 3.0, 0.0, 6.0, -5.01]))
+    noisy = query(qdd=np.array([80.0, -40.0, 3.0, 0.0, 6.0, -5.01]))
     decision = MotionDecider(RandomActor(), CELL).decide(noisy)
     names = [one.field for one in decision.state_outside]
     assert [one.rsplit(".", 1)[1] for one in names] == [
@@ -199,7 +199,7 @@ def test_accelerations_that_no_policy_needs_cost_no_decision() -> None:
         "wrist_2",
         "wrist_3",
     ]
-    plain = MotionDecider(RandomActor(), CELL).decide(question())
+    plain = MotionDecider(RandomActor(), CELL).decide(query())
     np.testing.assert_array_equal(decision.act, plain.act)
 
 
@@ -207,8 +207,8 @@ def test_the_policy_sees_a_state_over_its_limits_as_the_one_at_them() -> None:
     one, qd = MotionDecider(RandomActor(), CELL), np.zeros(6)
     qd[0], q = 1.03 * FAST[0], HOME.copy()
     q[5] = HIGH[5] + 0.03
-    over = one.decide(question(q=q, qd=qd))
-    at = one.decide(question(q=np.clip(q, LOW, HIGH), qd=np.clip(qd, -FAST, FAST)))
+    over = one.decide(query(q=q, qd=qd))
+    at = one.decide(query(q=np.clip(q, LOW, HIGH), qd=np.clip(qd, -FAST, FAST)))
     np.testing.assert_array_equal(over.act, at.act)
     assert [one.field for one in over.state_outside] == [
         "robot.q.wrist_3",
@@ -221,7 +221,7 @@ def test_distances_and_stops_are_those_of_the_measured_state() -> None:
     one, q = MotionDecider(RandomActor(), CELL), HOME.copy()
     q[1] = HIGH[1] + 0.05
     inside = np.clip(q, LOW, HIGH)
-    measured, clamped = one.decide(question(q=q)), one.decide(question(q=inside))
+    measured, clamped = one.decide(query(q=q)), one.decide(query(q=inside))
     assert measured.person_weights[0].separation != clamped.person_weights[0].separation
     layer = measured.safe
     assert layer is not None and measured.terms is not None
@@ -241,7 +241,7 @@ def test_far_people_are_seen_at_five_metres_and_kept_where_they_are(
     for x in (away, 5.0):
         person = person_from_cylinder(x, 0.2 * x, 0.0, 0.0, 0.3)
         people[x] = person if known_by == "cylinder" else replace(person, cylinder=None)
-    far, near = (one.decide(question(people=(people[x],))) for x in (away, 5.0))
+    far, near = (one.decide(query(people=(people[x],))) for x in (away, 5.0))
     np.testing.assert_array_equal(far.act, near.act)
     assert far.person_weights[0].separation > near.person_weights[0].separation + 0.9 * (
         away - 5.0
@@ -253,6 +253,6 @@ def test_far_people_are_seen_at_five_metres_and_kept_where_they_are(
 def test_a_wide_cylinder_stops_the_robot_however_far_its_axis_is() -> None:
     one = MotionDecider(RandomActor(), CELL)
     wide = person_from_cylinder(20.0, 3.0, 0.0, 0.0, 25.0)
-    decision = one.decide(question(people=(wide,), qd=np.full(6, 0.2)))
+    decision = one.decide(query(people=(wide,), qd=np.full(6, 0.2)))
     assert decision.safe is not None and decision.safe.override == 0.0
     assert decision.person_weights[0].separation < 0.0

@@ -59,7 +59,7 @@ def decide(
     last = {i: one.observed for i, one in enumerate(people) if one.observed is not None}
     q = request.robot.joints(request.robot.q)
     seen, monitored = (nearest_places(some, cell, q) for some in (present, last))
-    question = request.to_domain(
+    query = request.to_domain(
         [present[i] for i in seen],
         None if as_seen else [last[i] for i in monitored],
         safety_settings(cell),
@@ -67,17 +67,18 @@ def decide(
         max((one.displaced_m for one in people), default=0.0),
     )
     with request.robot.faults_in_place():
-        decision = decider.decide(question)
+        decision = decider.decide(query)
     if not seen == monitored == list(range(len(people))):
+        nearest = decision.nearest_person
         decision = decision._replace(
-            seen=None if decision.seen is None else seen[decision.seen],
+            nearest_person=None if nearest is None else seen[nearest],
             terms_of=None if decision.terms_of is None else monitored[decision.terms_of],
             outside=renumbered(decision.outside, seen),
         )
     weights = dict(zip(seen, decision.person_weights, strict=True))
     uses = [
-        one.use(i == decision.seen, i in last and i not in monitored)
+        one.use(i == decision.nearest_person, i in last and i not in monitored)
         | (weights[i]._asdict() if i in weights else NO_WEIGHT)
         for i, one in enumerate(people)
     ]
-    return MotionAnswer.data_of(decision, question, uses, cell.robot.dt, request.stamp)
+    return MotionAnswer.data_of(decision, query, uses, cell.robot.dt, request.stamp)

@@ -19,7 +19,7 @@ from app.sim.reach.motion_types import (
     Beside,
     MotionDecision,
     MotionMode,
-    MotionQuestion,
+    MotionQuery,
 )
 from app.sim.robot.trajectory_segment import TrajectorySegment
 from app.sim.safety.decision import SafetyDecision, powers_of_time
@@ -100,8 +100,8 @@ class MotionRequest(Body):
         own: SafetySettings,
         age_s: float,
         displaced_m: float,
-    ) -> MotionQuestion:
-        """Return the question.
+    ) -> MotionQuery:
+        """Return the query.
 
         Args:
             people: The people for the policy.
@@ -115,7 +115,7 @@ class MotionRequest(Body):
         safety = None if self.safety is None else self.safety.to_domain(own)
         if safety is not None and safety.human_speed > 0.0:
             age_s += displaced_m / safety.human_speed
-        return MotionQuestion(
+        return MotionQuery(
             q=robot.joints(robot.q),
             qd=robot.joints(robot.qd),
             qdd=None if robot.qdd is None else robot.joints(robot.qdd),
@@ -160,9 +160,9 @@ class SegmentPublic(Answer):
         }
 
     @staticmethod
-    def executed(safe: SafetyDecision, question: MotionQuestion, dt: float) -> Data:
+    def executed(safe: SafetyDecision, query: MotionQuery, dt: float) -> Data:
         """Return the data of the segment scaled by monitoring."""
-        powers = powers_of_time(safe, question.q, question.qd)
+        powers = powers_of_time(safe, query.q, query.qd)
         used = np.flatnonzero(powers.any(axis=0))
         n = max(3, int(used[-1]) + 1 if used.size else 0)
         until = dt if safe.path_deceleration * dt <= 1.0 else 1.0 / safe.path_deceleration
@@ -262,19 +262,19 @@ class MotionAnswer(Answer):
     @staticmethod
     def data_of(
         decision: MotionDecision,
-        question: MotionQuestion,
+        query: MotionQuery,
         people: list[Data],
         dt: float,
         stamp: Stamp,
     ) -> Data:
         """Return the data of the answer of a decision."""
         segment, safe = (
-            SegmentPublic.commanded(decision.segment, question.q, question.qd, dt),
+            SegmentPublic.commanded(decision.segment, query.q, query.qd, dt),
             decision.safe,
         )
         commanded = segment
         if safe is not None and safe.override < 1.0:
-            segment = SegmentPublic.executed(safe, question, dt)
+            segment = SegmentPublic.executed(safe, query, dt)
         to_people, to_cell, to_itself = decision.clearance
         return {
             "joints": ROS_NAMES,

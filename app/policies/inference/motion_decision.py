@@ -44,7 +44,7 @@ from app.sim.reach.motion_types import (
     MOTION_MODES,
     MotionDecision,
     MotionMode,
-    MotionQuestion,
+    MotionQuery,
     PersonWeight,
     TargetWeight,
 )
@@ -98,7 +98,7 @@ class MotionDecider:
         """SHA-256 of the checkpoint."""
         return self.actor.checkpoint
 
-    def decide(self, question: MotionQuestion) -> MotionDecision:
+    def decide(self, query: MotionQuery) -> MotionDecision:
         """Return the next trajectory segment.
 
         Raises:
@@ -107,18 +107,18 @@ class MotionDecider:
             GoalOutside: The goal of an interpolated action lies outside the training targets.
         """
         started = time.perf_counter()
-        robot, goal = self._numbers(question)
-        people, known_people = checked_and_known(question.people)
-        mode = self._mode(question.inference_mode)
-        rollout = self._rollout(question.rollout)
+        robot, goal = self._numbers(query)
+        people, known_people = checked_and_known(query.people)
+        mode = self._mode(query.inference_mode)
+        rollout = self._rollout(query.rollout)
         order = _bodies_first(people)
         known, viewed = [people[i] for i in order], [known_people[i] for i in order]
         with self._busy:
             stage = self._stage(known, self._stages)
-            time_left = min(max(0.0, question.time_left_s), HORIZON_S)
+            time_left = min(max(0.0, query.time_left_s), HORIZON_S)
             stage.load(robot.measured, known, time_left)
             apart, clearance = stage.distances.tolist(), stage.clear.tolist()
-            point, monitors = goal.tolist(), question.safety is not None
+            point, monitors = goal.tolist(), query.safety is not None
             distance = math.dist(stage.tcp.tolist(), point)
             shapes = stage.shapes if monitors else None
             if not monitors:
@@ -127,11 +127,11 @@ class MotionDecider:
             if robot.outside or any(a is not b for a, b in zip(known, viewed, strict=True)):
                 stage.load(robot.clamped, viewed, time_left)
             nearest = int(stage.distances.argmin()) if order else None
-            act, targets, weights, seen = self._act(stage, question, goal, mode)
-            candidate = self._improve(stage, question, goal, act) if rollout else None
+            act, targets, weights, seen = self._act(stage, query, goal, mode)
+            candidate = self._improve(stage, query, goal, act) if rollout else None
             segment, unfeasible = self._segment(robot, act)
-            last = self._observed(question.observed, robot) or (shapes, order)
-            safe, terms_of, terms = self._monitored(question, robot, segment, *last)
+            last = self._observed(query.observed, robot) or (shapes, order)
+            safe, terms_of, terms = self._monitored(query, robot, segment, *last)
             state = np.concatenate((robot.clamped.q, robot.clamped.qd, goal))
             outside = self._trained.outside(state, as_given(seen, known, viewed), order)
         people_weights = [
@@ -147,7 +147,7 @@ class MotionDecider:
             inference_mode=mode,
             targets=targets,
             person_weights=tuple(people_weights[i] for i in place),
-            seen=None if nearest is None else order[nearest],
+            nearest_person=None if nearest is None else order[nearest],
             safe=safe,
             terms=terms,
             terms_of=terms_of,
@@ -170,7 +170,7 @@ class MotionDecider:
         qdd = np.zeros(6)
         for seen in ((), people[:1], people[1:]):
             self.decide(
-                MotionQuestion(
+                MotionQuery(
                     q=q,
                     qd=np.zeros(6),
                     qdd=qdd,
@@ -180,21 +180,21 @@ class MotionDecider:
                 )
             )
 
-    def _numbers(self, question: MotionQuestion) -> tuple[MeasuredState, Vec]:
+    def _numbers(self, query: MotionQuery) -> tuple[MeasuredState, Vec]:
         """Return the checked state of the robot and the checked goal."""
-        if question.qdd is None and self.actor.action.degree == 3:
+        if query.qdd is None and self.actor.action.degree == 3:
             rule = "must be given: this policy limits jerk, which needs the accelerations"
             raise InvalidInput("robot.qdd", None, rule)
-        robot = self._limits.take(question.q, question.qd, question.qdd)
-        goal = checked_vector("goal", question.goal, 3, -_FAR, _FAR, "m")
-        if not math.isfinite(question.time_left_s):
-            raise InvalidInput("time_left_s", question.time_left_s, "must be finite [s]")
+        robot = self._limits.take(query.q, query.qd, query.qdd)
+        goal = checked_vector("goal", query.goal, 3, -_FAR, _FAR, "m")
+        if not math.isfinite(query.time_left_s):
+            raise InvalidInput("time_left_s", query.time_left_s, "must be finite [s]")
         for name in ("elapsed_s", "age_s"):
-            value = getattr(question, name)
+            value = getattr(query, name)
             if not 0.0 <= value < math.inf:
                 raise InvalidInput(name, value, "must be finite and not negative [s]")
-        if question.beside not in BESIDES:
-            raise InvalidInput("beside", question.beside, "must name a rule", BESIDES)
+        if query.beside not in BESIDES:
+            raise InvalidInput("beside", query.beside, "must name a rule", BESIDES)
         return robot, goal
 
     def _mode(self, asked: MotionMode | None) -> MotionMode:
@@ -214,16 +214,16 @@ class MotionDecider:
         return self._can_roll_out if asked is None else asked
 
     def _improve(
-        self, stage: QueryState, question: MotionQuestion, goal: Vec, act: Vec
+        self, stage: QueryState, query: MotionQuery, goal: Vec, act: Vec
     ) -> str | None:
         """Improve an action in place by rollouts; return the candidate, None for the policy."""
         if stage not in self._improvements:
             self._improvements[stage] = RolloutImprovement(self.actor)
         improvement = self._improvements[stage]
         improvement.forget()
-        improvement.constraint = ssm_constraint_of(question.safety, self.arm.dt, question.age_s)
+        improvement.constraint = ssm_constraint_of(query.safety, self.arm.dt, query.age_s)
         state = stage.state
-        state.goal[0], state.elapsed[0] = goal, question.elapsed_s
+        state.goal[0], state.elapsed[0] = goal, query.elapsed_s
         improved = act[None].astype(np.float32)
         chosen = int(improvement.improve(stage, improved)[0])
         if chosen == POLICY:
@@ -254,7 +254,7 @@ class MotionDecider:
         return stages[kinds]
 
     def _act(
-        self, stage: QueryState, question: MotionQuestion, goal: Vec, mode: MotionMode
+        self, stage: QueryState, query: MotionQuery, goal: Vec, mode: MotionMode
     ) -> tuple[Vec, tuple[TargetWeight, ...], list[float], list[PersonValues]]:
         """Return action, targets, weights of the people, and the observed people."""
         apart = stage.distances
@@ -266,7 +266,7 @@ class MotionDecider:
             used = mix.weights[0] > 0.0
             places, shares = around[0][used], mix.weights[0][used]
         weights = [float(who == nearest) for who in range(len(apart))]
-        if question.beside == "distance-weighted" and len(apart) > 1:
+        if query.beside == "distance-weighted" and len(apart) > 1:
             # The nearest first: rounding depends on the place in the batch.
             counts = person_weights(apart[None])[0]
             first, weights = apart.argsort(), counts.tolist()
@@ -304,21 +304,21 @@ class MotionDecider:
 
     def _monitored(
         self,
-        question: MotionQuestion,
+        query: MotionQuery,
         robot: MeasuredState,
         segment: TrajectorySegment,
         people: Shapes | None,
         order: Sequence[int],
     ) -> Monitored:
         """Return the decision of the safety layer and the terms of the decisive person."""
-        settings = question.safety
+        settings = query.safety
         if settings is None or people is None:
             return None, None, None
         q, qd, _ = robot.measured
         if settings != self._layer.settings:
             self._layer = SafetyLayer(self.arm, settings)
-        safe = self._layer.decide(q, qd, segment.c, segment.d, people, question.age_s)
-        decisive = self._layer.terms(safe, qd, people, question.age_s)
+        safe = self._layer.decide(q, qd, segment.c, segment.d, people, query.age_s)
+        decisive = self._layer.terms(safe, qd, people, query.age_s)
         if decisive is None:
             return safe, None, None
         return safe, order[decisive[0]], decisive[1]

@@ -89,7 +89,7 @@ def select(
     return np.where(gain > hysteresis, best, previous)
 
 
-class _Question(NamedTuple):
+class _SelectionQuery(NamedTuple):
     """Checked input of a decision."""
 
     state: MeasuredState
@@ -164,25 +164,25 @@ class TaskChooser(TrainedPolicy):
         """
         started = time.perf_counter()
         terms = ChoiceTerms(previous, progress, time_left_s, objective)
-        asked = self._ask(q, qd, candidates, terms)
-        observed = self._observed(asked.state.measured.q, people)
-        found = self._evaluate(asked, _arrays(observed, self._people.bodies[0]))
+        query = self._query(q, qd, candidates, terms)
+        observed = self._observed(query.state.measured.q, people)
+        found = self._evaluate(query, _arrays(observed, self._people.bodies[0]))
         index = int(found.chosen[0])
-        seen, person = observed[0]
-        q, qd, _ = asked.state.clamped
+        nearest, person = observed[0]
+        q, qd, _ = query.state.clamped
         return Decision(
-            chosen=asked.ids[index],
+            chosen=query.ids[index],
             index=index,
             values=tuple(found.values[0].tolist()),
             actions=found.act,
             qd_target=self._speeds(q, qd, found.act),
             reachable=tuple(found.reachable.tolist()),
-            outside=asked.state.outside + self._ranges.of_state(q, qd, person, seen),
-            outside_candidates=self._ranges.of_goals(asked.goals),
+            outside=query.state.outside + self._ranges.of_state(q, qd, person, nearest),
+            outside_candidates=self._ranges.of_goals(query.goals),
             outcomes=None if found.outcomes is None else estimates_of(found.outcomes),
             checkpoint=self.checkpoint,
             elapsed_ms=1e3 * (time.perf_counter() - started),
-            seen=seen,
+            nearest_person=nearest,
         )
 
     def risk_map(
@@ -197,10 +197,10 @@ class TaskChooser(TrainedPolicy):
     ) -> RiskMap:
         """Choose beside a person in several postures, in one batch."""
         started = time.perf_counter()
-        asked = self._ask(q, qd, candidates, terms)
-        known, at = checked_people(people), asked.state.measured.q
+        query = self._query(q, qd, candidates, terms)
+        known, at = checked_people(people), query.state.measured.q
         scenes = scenes_of(self._arm, self._people, at, known, moved)
-        found = self._evaluate(asked, scenes)
+        found = self._evaluate(query, scenes)
         m, k = found.values.shape
         rows = np.arange(m) * k + found.chosen
         risk = None if found.outcomes is None else found.outcomes.probability[rows]
@@ -214,10 +214,10 @@ class TaskChooser(TrainedPolicy):
             elapsed_ms=1e3 * (time.perf_counter() - started),
         )
 
-    def _ask(
+    def _query(
         self, q: Vec, qd: Vec, candidates: Sequence[Candidate], terms: ChoiceTerms
-    ) -> "_Question":
-        """Return a checked question."""
+    ) -> "_SelectionQuery":
+        """Return a checked query."""
         state = self._limits.take(q, qd)
         ids, goals = _check_candidates(candidates)
         if not math.isfinite(terms.time_left_s):
@@ -226,18 +226,20 @@ class TaskChooser(TrainedPolicy):
             rule = "needs a checkpoint with outcome probabilities"
             raise InvalidInput("objective", terms.objective, rule, ("value",))
         last = ids.index(terms.previous) if terms.previous in ids else None
-        return _Question(state, ids, goals, last, terms)
+        return _SelectionQuery(state, ids, goals, last, terms)
 
-    def _evaluate(self, asked: "_Question", seen: tuple[Vec, Vec, Vec]) -> "_Evaluation":
+    def _evaluate(
+        self, query: "_SelectionQuery", people: tuple[Vec, Vec, Vec]
+    ) -> "_Evaluation":
         """Return values and choices beside people, or beside each of m sets of people."""
-        terms, last = asked.terms, asked.last
-        q, qd, _ = asked.state.clamped
+        terms, last = query.terms, query.last
+        q, qd, _ = query.state.clamped
         left = min(LONGEST_S, max(0.0, terms.time_left_s))
         obs, reachable = self._observer.observe(
-            (q, qd), seen, asked.goals, left, last, terms.progress
+            (q, qd), people, query.goals, left, last, terms.progress
         )
         act, values, outcomes = self._networks.evaluate(obs)
-        by_set = values.reshape(-1, len(asked.ids))
+        by_set = values.reshape(-1, len(query.ids))
         if last is not None and terms.progress.phase == LIFT:
             chosen = np.full(len(by_set), last)
         elif outcomes is None or terms.objective == "value":

@@ -75,7 +75,7 @@ class Decision:
     outcomes: NDArray[np.float32] | None = None
     """Predicted outcome of each candidate, the fields of ``OutcomeEstimate``, shape (n, 7);
     None where the checkpoint predicts none."""
-    seen: int | None = None
+    nearest_person: int | None = None
     """Index of the observed person nearest to the robot; None without people."""
 
     def outcome(self, i: int) -> OutcomeEstimate | None:

@@ -20,7 +20,7 @@ BESIDES: tuple[Beside, ...] = get_args(Beside)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class MotionQuestion:
+class MotionQuery:
     """A state and a goal for which the next motion is queried."""
 
     q: Vec
@@ -90,7 +90,7 @@ class MotionDecision(NamedTuple):
     """Targets of an interpolated action; empty for ``direct``."""
     person_weights: tuple[PersonWeight, ...]
     """The people, in the order of the query."""
-    seen: int | None
+    nearest_person: int | None
     """Index of the nearest person; None in an empty cell."""
     safe: SafetyDecision | None
     """Executed part of the segment; None without monitoring."""

@@ -28,7 +28,7 @@ from app.sim.people.kernels.pedestrian import (
 from app.sim.perception.observed_people import person_from_cylinder
 from app.sim.reach.batch import ReachBatch, ReachSettings
 from app.sim.reach.goal_sets import halton_targets
-from app.sim.reach.motion_types import MotionDecision, MotionQuestion
+from app.sim.reach.motion_types import MotionDecision, MotionQuery
 from app.sim.robot.actions import ActionSettings
 from app.sim.safety.layer import SafetySettings
 from tests.policies.reach_actor import RandomActor
@@ -44,8 +44,8 @@ def decider(goals: str = "grid", **other: Any) -> MotionDecider:
     return MotionDecider(RandomActor(goals, **other), CELL)
 
 
-def question(**changes: Any) -> MotionQuestion:
-    asked = MotionQuestion(q=HOME, qd=np.zeros(6), goal=GOAL, people=(FAR_PERSON,))
+def query(**changes: Any) -> MotionQuery:
+    asked = MotionQuery(q=HOME, qd=np.zeros(6), goal=GOAL, people=(FAR_PERSON,))
     return replace(asked, **changes)
 
 
@@ -55,7 +55,7 @@ def driven(n_envs: int, people: tuple[str, ...], **other: Any) -> ReachBatch:
     return drive(ReachBatch(CELL, n_envs, 7, settings), 25, seed=8, auto_reset=False)
 
 
-def question_of(batch: ReachBatch, e: int) -> MotionQuestion:
+def query_of(batch: ReachBatch, e: int) -> MotionQuery:
     """Return the query with the state of one environment."""
     state, rows = batch.state, batch.state.people
     people = [
@@ -63,7 +63,7 @@ def question_of(batch: ReachBatch, e: int) -> MotionQuestion:
     ]
     for walker in rows.walkers.rows[e]:
         people.append(person_from_cylinder(*walker[[X, Y, VX, VY, R, GROWTH]]))
-    return MotionQuestion(
+    return MotionQuery(
         q=state.q[e].copy(),
         qd=state.qd[e].copy(),
         qdd=state.qdd[e].copy(),
@@ -73,9 +73,9 @@ def question_of(batch: ReachBatch, e: int) -> MotionQuestion:
     )
 
 
-def with_history(batch: ReachBatch, e: int) -> MotionQuestion:
+def with_history(batch: ReachBatch, e: int) -> MotionQuery:
     """Return the query of one environment with the history of its pedestrians."""
-    asked, rows = question_of(batch, e), batch.state.people.walkers.rows[e]
+    asked, rows = query_of(batch, e), batch.state.people.walkers.rows[e]
     past = [
         np.stack([row[k : k + N_PAST] for k in (PAST_RADIUS, PAST_SPEED)], axis=1)[1:]
         for row in rows
@@ -94,9 +94,7 @@ def test_one_state_gives_the_action_and_segment_of_training(
     batch, actor = driven(6, people), RandomActor()
     running = np.flatnonzero(batch.state.outcome == 0)
     expected, decide = controller_of(actor, mode).acts(batch), MotionDecider(actor, CELL).decide
-    found = {
-        int(e): decide(replace(question_of(batch, e), inference_mode=mode)) for e in running
-    }
+    found = {int(e): decide(replace(query_of(batch, e), inference_mode=mode)) for e in running}
     clear, distance = batch.state.clear.copy(), batch.state.distance.copy()
     batch.step(expected, auto_reset=False)
     assert len(found) > 2
@@ -110,7 +108,7 @@ def test_one_state_gives_the_action_and_segment_of_training(
 
 def test_people_may_come_in_any_order() -> None:
     batch = driven(4, ("worker", "walker", "constant"))
-    asked, one = question_of(batch, 1), decider()
+    asked, one = query_of(batch, 1), decider()
     turned = replace(asked, people=asked.people[::-1])
     for beside in ("nearest", "distance-weighted"):
         first = one.decide(replace(asked, beside=beside))
@@ -119,7 +117,7 @@ def test_people_may_come_in_any_order() -> None:
         for here, there in zip(first.person_weights, second.person_weights[::-1], strict=True):
             assert here.separation == there.separation
             assert here.weight == pytest.approx(there.weight, abs=1e-12)
-        assert first.seen == 2 - second.seen
+        assert first.nearest_person == 2 - second.nearest_person
 
 
 def test_distance_weighted_actions_equal_those_of_the_controller() -> None:
@@ -127,14 +125,14 @@ def test_distance_weighted_actions_equal_those_of_the_controller() -> None:
     expected = controller_of(actor, "distance-weighted-interpolated").acts(batch)
     decide = MotionDecider(actor, CELL).decide
     for e in np.flatnonzero(batch.state.outcome == 0):
-        decision = decide(replace(question_of(batch, e), beside="distance-weighted"))
+        decision = decide(replace(query_of(batch, e), beside="distance-weighted"))
         np.testing.assert_allclose(decision.act, expected[e], atol=2e-6)
         assert sum(one.weight for one in decision.person_weights) == pytest.approx(1.0)
 
 
 def test_weights_of_targets_sum_to_one_and_give_the_goal_back() -> None:
     for goals, most in (("grid", 8), ("halton", 4)):
-        decision = decider(goals).decide(question())
+        decision = decider(goals).decide(query())
         weights = np.array([one.weight for one in decision.targets])
         places = np.array([one.position for one in decision.targets])
         assert decision.inference_mode == "interpolated" and 1 < len(weights) <= most
@@ -148,7 +146,7 @@ def test_at_a_training_target_both_modes_agree(goals: str) -> None:
     targets = region.targets() if goals == "grid" else halton_targets(region)
     for target in targets[::7]:
         found = [
-            one.decide(question(goal=target, inference_mode=mode))
+            one.decide(query(goal=target, inference_mode=mode))
             for mode in ("interpolated", "direct")
         ]
         np.testing.assert_array_equal(found[0].act, found[1].act)
@@ -157,7 +155,7 @@ def test_at_a_training_target_both_modes_agree(goals: str) -> None:
 
 def test_interpolation_refuses_goals_outside_and_direct_flags_them() -> None:
     trained = {"goal": {"low": [-0.5, 0.6, 0.1], "high": [0.5, 1.0, 0.5]}}
-    far = question(goal=np.array([0.0, 1.6, 0.3]))
+    far = query(goal=np.array([0.0, 1.6, 0.3]))
     with pytest.raises(GoalOutside) as caught:
         decider(trained_range=trained).decide(far)
     (axis,) = caught.value.problem()["outside"]
@@ -169,7 +167,7 @@ def test_interpolation_refuses_goals_outside_and_direct_flags_them() -> None:
         assert [one.field for one in decision.outside] == ["goal.y"]
         assert decision.inference_mode == "direct"
         assert decision.beyond_reach == pytest.approx(np.hypot(1.6, 0.3 - 0.1273) - 1.45)
-    assert decider().decide(question()).beyond_reach == 0.0
+    assert decider().decide(query()).beyond_reach == 0.0
 
 
 def test_states_and_people_outside_training_are_flagged_by_name() -> None:
@@ -178,10 +176,10 @@ def test_states_and_people_outside_training_are_flagged_by_name() -> None:
         "human": {"low": [-2.0, 0.5, -1.0, -1.0, 0.2], "high": [1.0, 2.0, 1.0, 1.0, 0.5]},
     }
     people = (FAR_PERSON, person_from_cylinder(0.4, 1.2, 0.0, 1.8, 0.3))
-    decision = decider(trained_range=trained).decide(question(people=people))
-    assert decision.seen == 1
+    decision = decider(trained_range=trained).decide(query(people=people))
+    assert decision.nearest_person == 1
     assert [one.field for one in decision.outside] == ["robot.q[2]", "people[1].vy"]
-    alone = decider(trained_range=trained).decide(question(people=()))
+    alone = decider(trained_range=trained).decide(query(people=()))
     assert [one.field for one in alone.outside] == ["robot.q[2]"]
 
 
@@ -191,13 +189,13 @@ def inside_robot() -> Person:
 
 def test_people_inside_the_robot_are_refused_without_monitoring() -> None:
     with pytest.raises(InvalidInput, match=r"people\[1\] = -.* inside"):
-        decider().decide(question(people=(FAR_PERSON, inside_robot())))
+        decider().decide(query(people=(FAR_PERSON, inside_robot())))
 
 
 @pytest.mark.parametrize("speed", [0.0, 0.6])
 def test_with_monitoring_a_person_inside_the_robot_is_a_stop(speed: float) -> None:
     qd, people = np.full(6, speed), (FAR_PERSON, inside_robot())
-    asked = question(qd=qd, people=people, safety=SafetySettings())
+    asked = query(qd=qd, people=people, safety=SafetySettings())
     decision = decider().decide(asked)
     assert decision.safe is not None and decision.safe.override == 0.0
     assert decision.terms_of == 1 and decision.person_weights[1].separation < 0.0
@@ -212,7 +210,7 @@ def test_with_monitoring_a_person_inside_the_robot_is_a_stop(speed: float) -> No
 def test_monitoring_tells_the_terms_that_make_up_the_distance() -> None:
     settings = SafetySettings(human_speed=1.2, intrusion_distance=0.05, robot_uncertainty=0.02)
     person = person_from_cylinder(0.3, 1.3, 0.0, -0.5, 0.3)
-    asked = question(qd=np.full(6, 0.5), people=(person,), safety=settings, age_s=0.04)
+    asked = query(qd=np.full(6, 0.5), people=(person,), safety=settings, age_s=0.04)
     decision = decider().decide(asked)
     terms = decision.terms
     assert decision.safe is not None and terms is not None and decision.terms_of == 0
@@ -230,27 +228,27 @@ def test_only_a_measured_velocity_takes_the_place_of_the_assumed_one(
     measured: bool, speed: float
 ) -> None:
     person = person_from_cylinder(0.3, 1.3, 0.0, 0.0, 0.3, measured=measured)
-    asked = question(people=(person,), safety=SafetySettings(use_measured_velocity=True))
+    asked = query(people=(person,), safety=SafetySettings(use_measured_velocity=True))
     terms = decider().decide(asked).terms
     assert terms is not None and terms.human_speed == pytest.approx(speed)
 
 
 def test_far_from_people_monitoring_leaves_the_piece_as_it_is() -> None:
-    decision = decider().decide(question(safety=SafetySettings()))
+    decision = decider().decide(query(safety=SafetySettings()))
     assert decision.safe is not None and decision.safe.override == 1.0
     np.testing.assert_array_equal(decision.safe.q, decision.segment.q)
     assert decision.terms is not None and decision.terms_of == 0
     assert decision.terms.separation > decision.terms.required
-    no_people = decider().decide(question(people=(), safety=SafetySettings()))
-    assert no_people.terms is None and no_people.seen is None
+    no_people = decider().decide(query(people=(), safety=SafetySettings()))
+    assert no_people.terms is None and no_people.nearest_person is None
 
 
 def test_a_policy_that_limits_jerk_needs_accelerations() -> None:
     one = decider(action=ActionSettings(degree=3))
     with pytest.raises(InvalidInput, match=r"robot\.qdd"):
-        one.decide(question())
+        one.decide(query())
     qdd = np.full(6, 0.4)
-    decision = one.decide(question(qdd=qdd))
+    decision = one.decide(query(qdd=qdd))
     np.testing.assert_array_equal(decision.segment.c, 0.5 * qdd)
     assert decision.segment.d.any()
 
@@ -283,19 +281,19 @@ def test_what_cannot_be_answered_is_refused_by_name(
     changes: dict[str, Any], match: str
 ) -> None:
     with pytest.raises(InvalidInput, match=match):
-        decider().decide(question(**changes))
+        decider().decide(query(**changes))
 
 
 def test_a_policy_of_a_box_cannot_be_asked_to_interpolate() -> None:
     with pytest.raises(InvalidInput, match="training targets"):
-        decider("box").decide(question(inference_mode="interpolated"))
+        decider("box").decide(query(inference_mode="interpolated"))
 
 
 def test_a_policy_that_cannot_look_ahead_says_so() -> None:
     with pytest.raises(InvalidInput, match="option features") as refused:
-        decider().decide(question(rollout=True))
+        decider().decide(query(rollout=True))
     assert refused.value.field == "rollout"
-    assert decider().decide(question()).rollout is False
+    assert decider().decide(query()).rollout is False
 
 
 def test_rollouts_answer_any_valid_query() -> None:
@@ -303,7 +301,7 @@ def test_rollouts_answer_any_valid_query() -> None:
     one = MotionDecider(ReachPolicy(pretrained.load("reach")), CELL)
     began = 0
     for _ in range(100):
-        asked = random_question(rng)
+        asked = random_query(rng)
         decision = one.decide(asked)
         assert decision.rollout and keeps_limits(decision, asked)
         began += decision.candidate is not None
@@ -313,7 +311,7 @@ def test_rollouts_answer_any_valid_query() -> None:
 def test_an_answer_does_not_hang_on_what_was_asked_before() -> None:
     batch, actor = driven(12, ("walker",)), ReachPolicy(pretrained.load("reach"))
     rng = np.random.default_rng(6)
-    questions = [random_question(rng) for _ in range(40)]
+    questions = [random_query(rng) for _ in range(40)]
     questions += [
         with_history(batch, e) for e in np.flatnonzero(batch.state.outcome == 0).tolist()
     ]
@@ -329,7 +327,7 @@ def test_after_a_long_time_further_candidates_are_simulated() -> None:
     one = MotionDecider(ReachPolicy(pretrained.load("reach")), CELL)
     tried = 0
     for _ in range(60):
-        asked = random_question(rng)
+        asked = random_query(rng)
         if one.decide(asked).candidate is None:
             tried += one.decide(replace(asked, elapsed_s=2.0)).candidate is not None
     assert tried > 0
@@ -337,7 +335,7 @@ def test_after_a_long_time_further_candidates_are_simulated() -> None:
 
 def test_the_observed_remaining_time_is_at_most_that_of_training() -> None:
     one = MotionDecider(ReachPolicy(pretrained.load("reach")), CELL)
-    acts = [one.decide(question(time_left_s=left)).act for left in (2.0, 5.0, 25.0)]
+    acts = [one.decide(query(time_left_s=left)).act for left in (2.0, 5.0, 25.0)]
     assert np.array_equal(acts[1], acts[2])
     assert not np.array_equal(acts[0], acts[1])
 
@@ -347,7 +345,7 @@ def test_a_policy_of_another_cell_is_refused() -> None:
         MotionDecider(RandomActor(), load_cell("pick-and-place"))
 
 
-def random_question(rng: np.random.Generator) -> MotionQuestion:
+def random_query(rng: np.random.Generator) -> MotionQuery:
     """Anything that the border lets through, plausible or not."""
     mount, people = CELL.robot, []
     for _ in range(rng.integers(0, 5)):
@@ -359,7 +357,7 @@ def random_question(rng: np.random.Generator) -> MotionQuestion:
         else:
             q = rng.uniform(human.Q_MIN, human.Q_MAX)
             people.append(Person(q=q, qd=rng.normal(0.0, 1.0, 18)))
-    return MotionQuestion(
+    return MotionQuery(
         q=rng.uniform(mount.q_min, mount.q_max),
         qd=rng.uniform(-1, 1, 6) * mount.qd_max,
         goal=rng.uniform([-0.5, 0.6, 0.1], [0.5, 1.0, 0.5]),
@@ -369,7 +367,7 @@ def random_question(rng: np.random.Generator) -> MotionQuestion:
     )
 
 
-def keeps_limits(decision: MotionDecision, asked: MotionQuestion) -> bool:
+def keeps_limits(decision: MotionDecision, asked: MotionQuery) -> bool:
     safe, mount = decision.safe, CELL.robot
     assert safe is not None
     numbers = np.concatenate([safe.q, safe.qd, safe.qdd, decision.act, [safe.override]])
@@ -386,7 +384,7 @@ def test_any_valid_state_gives_a_finite_answer_within_limits() -> None:
     rng, one = np.random.default_rng(4), decider()
     stopped = 0
     for _ in range(150):
-        asked = random_question(rng)
+        asked = random_query(rng)
         decision = one.decide(asked)
         assert keeps_limits(decision, asked)
         if decision.clearance[0] <= 0.0:

@@ -23,7 +23,7 @@ from app.sim.people.kernels.pedestrian import GAIT, STILL, VX, VY, X, Y
 from app.sim.perception.observed_people import person_from_cylinder
 from app.sim.reach.batch import ReachBatch, ReachSettings
 from app.sim.reach.crossings import crossings
-from app.sim.reach.motion_types import MotionQuestion
+from app.sim.reach.motion_types import MotionQuery
 from app.sim.reach.rollout.kernels import rollout
 from app.sim.reach.rollout.kernels.prediction import N_LONG_MOMENTS, N_MOMENTS, predict_people
 from app.sim.robot.kernels.arm import new_robot_pose, place_robot
@@ -126,7 +126,7 @@ def test_constraint_reduces_stops_and_contacts_beside_crossing_people() -> None:
 def test_decisions_consider_the_layer_that_monitors_them() -> None:
     """A person approaches who would stop the robot without touching it."""
     decider = MotionDecider(ACTOR, CELL)
-    question = MotionQuestion(
+    query = MotionQuery(
         q=decider.arm.home.copy(),
         qd=np.zeros(6),
         goal=np.array([0.0, 0.9, 0.3]),
@@ -134,7 +134,7 @@ def test_decisions_consider_the_layer_that_monitors_them() -> None:
         safety=MEASURED,
     )
     began = [
-        decider.decide(replace(question, safety=safety)).candidate
+        decider.decide(replace(query, safety=safety)).candidate
         for safety in (SafetySettings(), MEASURED)
     ]
     assert began[0] is None and began[1] is not None

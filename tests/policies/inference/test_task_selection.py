@@ -121,13 +121,13 @@ def test_of_several_people_the_nearest_is_seen_in_any_order(chooser):
     ):
         decision = chooser.decide(HOME, np.zeros(6), people, offered)
         assert decision.values == values
-        assert people[decision.seen] is near
+        assert people[decision.nearest_person] is near
 
 
 def test_fields_outside_training_name_the_person_who_is_seen(chooser):
     people = [person(4.5, 4.5), person(0.0, 2.5)]
     decision = chooser.decide(HOME, np.zeros(6), people, cubes("cube0"))
-    assert decision.seen == 1
+    assert decision.nearest_person == 1
     named = {entry.field for entry in decision.outside}
     assert "people[1].q.pelvis_y" in named
     assert not any(field.startswith("people[0]") for field in named)
@@ -146,7 +146,10 @@ def test_the_size_of_the_person_counts(chooser):
 
 def test_an_empty_cell_is_answered(chooser):
     decision = chooser.decide(HOME, np.zeros(6), [], cubes("cube0"))
-    assert (decision.seen, decision.outside) == (None, ())  # It was trained beside nobody too.
+    assert (decision.nearest_person, decision.outside) == (
+        None,
+        (),
+    )  # It was trained beside nobody too.
 
 
 def test_an_empty_cell_is_flagged_if_training_had_none():

@@ -46,7 +46,7 @@ async def plan_move(request: PlanRequest, services: ServicesDep) -> PlanAnswer:
             decision = people.in_request(found.decision)
             services.metrics.count_outside(router.prefix, decision.outside)
             found = replace(found, decision=decision)
-        uses = people.uses(None if found.decision is None else found.decision.seen)
+        uses = people.uses(None if found.decision is None else found.decision.nearest_person)
         return PlanAnswer.from_domain(found, query, request, names, uses)
 
     long = takes_time(names.shape) or take_time(request.people)

@@ -49,8 +49,8 @@ async def map_risk(request: RiskMapRequest, services: ServicesDep) -> RiskMapAns
             found = policy.risk_map(
                 q, qd, people.people, candidates, moved, terms=request.terms
             )
-        seen = people.in_request(policy.decide(q, qd, people.people, candidates)).seen
-        uses = people.uses(seen)
+        decision = people.in_request(policy.decide(q, qd, people.people, candidates))
+        uses = people.uses(decision.nearest_person)
         return RiskMapAnswer.from_domain(found, reached, request, uses, policy.checkpoint)
 
     n_rows = request.grid.nx * request.grid.ny * len(candidates)

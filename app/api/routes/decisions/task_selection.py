@@ -54,7 +54,7 @@ async def select_task(request: TaskSelectionRequest, services: ServicesDep) -> D
         services.metrics.count_outside(
             router.prefix, decision.outside, *decision.outside_candidates
         )
-        uses = people.uses(decision.seen)
+        uses = people.uses(decision.nearest_person)
         return TaskSelection.data_of(decision, candidates, uses, request.stamp)
 
     long = len(candidates) > MAX_INLINE_CANDIDATES or take_time(request.people)
