@@ -174,7 +174,7 @@ class BadRecording(_Faulty):
     """Faults of a file of human motion, each with its line or column."""
 
 
-class Beyond(Protocol):
+class OutOfRangeCoordinate(Protocol):
     """One coordinate outside its range, such as an ``OutsideField`` of ``app.sim.core``."""
 
     @property
@@ -196,7 +196,9 @@ class GoalOutside(InvalidInput):
         beyond: Its coordinates outside the range, at least one.
     """
 
-    def __init__(self, field: str, value: Sequence[float], beyond: Sequence[Beyond]) -> None:
+    def __init__(
+        self, field: str, value: Sequence[float], beyond: Sequence[OutOfRangeCoordinate]
+    ) -> None:
         self.beyond = tuple(
             {
                 "axis": one.field.rpartition(".")[2],

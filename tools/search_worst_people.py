@@ -77,7 +77,7 @@ def success_beside(
     )
     settings, n = beside(usual, cell, motions), per_motion * len(motions)
     evaluator = Evaluator(ValueNetworks(checkpoint), cell, n, seed, settings)
-    won = evaluator.run(selection_rules.critic(HYSTERESIS)).won
+    won = evaluator.run(selection_rules.critic(HYSTERESIS)).succeeded
     track = evaluator.batch.state.people.track[:, 0]
     hits = np.bincount(track, weights=won, minlength=len(motions))
     return np.asarray((hits + 1.0) / (np.bincount(track, minlength=len(motions)) + 2.0))

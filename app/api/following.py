@@ -24,7 +24,7 @@ from app.store.records import JobRecord
 logger = logging.getLogger(__name__)
 
 PERIOD_S = 1.0
-"""Period of the look for a newer checkpoint [s]."""
+"""Period of the check for a newer checkpoint [s]."""
 
 
 def start(world_id: str, job: JobRecord, services: Services) -> FollowPublic:
@@ -58,7 +58,7 @@ def start(world_id: str, job: JobRecord, services: Services) -> FollowPublic:
     return now
 
 
-def look(services: Services) -> bool:
+def deploy_newest(services: Services) -> bool:
     """Let newer checkpoints act; return whether a world still follows a training.
 
     It follows no longer where another policy was chosen, by whatever submits commands.
@@ -73,7 +73,7 @@ def look(services: Services) -> bool:
             elif world.handle.choices != choices:
                 now = _ended(follow, "another policy was chosen")
             else:
-                now = _looked(follow, world, services)
+                now = _refreshed(follow, world, services)
             choices += now.checkpoint != follow.checkpoint
             follows.by_world[world_id] = now, world, choices
         active = any(one[0].active for one in follows.by_world.values())
@@ -84,14 +84,14 @@ def look(services: Services) -> bool:
 def _run(services: Services) -> None:
     while not services.stopping.wait(PERIOD_S):
         try:
-            if not look(services):
+            if not deploy_newest(services):
                 return
         except Exception:
-            logger.exception("a followed training could not be looked at")
+            logger.exception("a followed training could not be checked")
 
 
-def _looked(follow: FollowPublic, world: LiveWorld, services: Services) -> FollowPublic:
-    """Return a follow after a look; it has ended where its job has."""
+def _refreshed(follow: FollowPublic, world: LiveWorld, services: Services) -> FollowPublic:
+    """Return a follow after a check; it has ended where its job has."""
     job = find_job(services.store, follow.job)
     if job is None:
         return _ended(follow, f"job {follow.number} was deleted")

@@ -188,7 +188,7 @@ def renumbered(
     )
 
 
-def take_time(entries: Sequence[PersonInput]) -> bool:
+def is_slow_conversion(entries: Sequence[PersonInput]) -> bool:
     """Whether the conversion of people takes milliseconds."""
     return any(isinstance(entry, KeypointsPerson | TrackedPerson) for entry in entries)
 

@@ -16,7 +16,7 @@ from dataclasses import dataclass, field, replace
 
 from app.errors import Conflict, NotFound
 from app.sim.core.arrays import Vec
-from app.sim.perception.multi_person_tracker import MultiPersonTracker, Unfollowed
+from app.sim.perception.multi_person_tracker import MultiPersonTracker, UnassignedDetection
 from app.sim.perception.person_estimator import Flag, PersonEstimate
 from app.sim.perception.stamp_timeline import StampTimeline
 
@@ -50,7 +50,7 @@ class TrackedPeople:
     """Estimate of each track at the last frame with its person; None without such a frame."""
     observed_age_s: tuple[float, ...]
     """Age of each observation [s]; without one, ``since_frame_s``."""
-    unfollowed: tuple[Unfollowed, ...]
+    unfollowed: tuple[UnassignedDetection, ...]
     """People of the newest frame without a track, nearest first."""
 
 

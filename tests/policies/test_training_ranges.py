@@ -11,7 +11,7 @@ def test_people_who_are_not_there_widen_no_range() -> None:
     ranges, work = Ranges(), HumanMotionConfig(absent=0.5)
     batch = PickBatch(load_cell(), 64, 1, PickSettings(work=work))
     batch.reset()
-    ranges.look(visited_states(batch))
+    ranges.extend(visited_states(batch))
     known = ranges.as_json()
     assert known["human_q"]["high"][1] < 2.5 < batch.state.people.q[:, 0, 1].max()
     assert set(known) == {"q", "qd", "goal", "human_q", "human_qd"}
@@ -21,5 +21,5 @@ def test_a_cell_without_people_has_no_range_of_people() -> None:
     ranges, work = Ranges(), HumanMotionConfig(absent=1.0)
     batch = PickBatch(load_cell(), 8, 1, PickSettings(work=work))
     batch.reset()
-    ranges.look(visited_states(batch))
+    ranges.extend(visited_states(batch))
     assert set(ranges.as_json()) == {"q", "qd", "goal"}

@@ -5,7 +5,7 @@ Source: docs/method.md 2.
 
 from starlette.concurrency import run_in_threadpool
 
-from app.api.known_people import known_people, nearest_places, renumbered, take_time
+from app.api.known_people import is_slow_conversion, known_people, nearest_places, renumbered
 from app.api.schemas.motion import MotionAnswer, MotionRequest
 from app.api.schemas.numbers import Data
 from app.api.services import Services
@@ -35,7 +35,9 @@ async def answer(request: MotionRequest, services: Services) -> Data:
             return decide(request, cell, decider, services.trackers)
 
     # A decision takes less time than a change of thread usually does, on the event loop.
-    found = await run_in_threadpool(decided) if take_time(request.people) else decided()
+    found = (
+        await run_in_threadpool(decided) if is_slow_conversion(request.people) else decided()
+    )
     services.metrics.count_outside(PATH, found["outside"], found["state_outside"])
     return found
 

@@ -53,7 +53,7 @@ Which = Literal["newest", "each"]
 
 
 @dataclass(frozen=True, slots=True)
-class Waiting:
+class PendingMessage:
     """A message that waits for its answer."""
 
     text: str | None
@@ -78,7 +78,7 @@ class MotionSocket:
         self._client, self._services, self._deadline_s = client, services, deadline_s
         self._which, self._superseded = which, 0
         self._load, self._rate = services.motion_load, SocketRate()
-        self._waiting: deque[Waiting] = deque()
+        self._waiting: deque[PendingMessage] = deque()
         self._arrived, self._taken = asyncio.Event(), asyncio.Event()
         self._last_s = time.monotonic()
         self._close: tuple[int, str] | None = None
@@ -116,7 +116,7 @@ class MotionSocket:
             if self._which == "newest" and self._waiting:
                 self._waiting.clear()
                 self._superseded += 1
-            self._waiting.append(Waiting(message.get("text"), time.perf_counter()))
+            self._waiting.append(PendingMessage(message.get("text"), time.perf_counter()))
             self._arrived.set()
             while len(self._waiting) >= MAX_WAITING:
                 self._taken.clear()
@@ -147,7 +147,7 @@ class MotionSocket:
                 self._load.note(self._rate, time.perf_counter() - begin, whole=whole)
             await self._client.send_text(text)
 
-    async def _reply(self, request: Waiting, begin: float) -> str:
+    async def _reply(self, request: PendingMessage, begin: float) -> str:
         """Return the answer to a message as JSON: a :class:`MotionAnswer` or a problem."""
         waited_s, superseded = begin - request.at, self._superseded
         self._superseded = 0

@@ -87,7 +87,7 @@ async def command_world(
         body = body.with_loaded(await run_in_threadpool(load_for, body, cell, services))
     choices, number = world.handle.choices, world.handle.submit(body)
     if world.handle.choices != choices:
-        await run_in_threadpool(following.look, services)
+        await run_in_threadpool(following.deploy_newest, services)
     return CommandAccepted(tag=body.tag, number=number, tick=tick)
 
 

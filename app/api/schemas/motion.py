@@ -11,7 +11,7 @@ from app.api.schemas.numbers import Answer, Body, Data, Vector3, Vector6
 from app.api.schemas.people import PersonInput, PersonUse
 from app.api.schemas.robot_state import ROS_NAMES, RobotState
 from app.api.schemas.separation import Override, SafetyInput
-from app.api.schemas.task_selection import FRAME_TEXT, FrameName, Outside, Stamp
+from app.api.schemas.task_selection import FRAME_TEXT, FrameName, OutOfRangeInput, Stamp
 from app.sim.core.arrays import Vec
 from app.sim.human.person import Person
 from app.sim.perception.multi_person_tracker import MAX_SKELETONS
@@ -190,7 +190,7 @@ class Distances(Answer):
     robot: float = Field(description="between its own links")
 
 
-class PersonMet(PersonUse):
+class WeightedPerson(PersonUse):
     """Use of one person, with distance and weight."""
 
     separation: float | None = Field(
@@ -239,7 +239,7 @@ class MotionAnswer(Answer):
     )
     targets: list[Target] = Field(description="interpolated targets; empty for `direct`")
     safety: Override | None = Field(description="null where monitoring is disabled")
-    people: list[PersonMet] = Field(description="use of each person")
+    people: list[WeightedPerson] = Field(description="use of each person")
     clearance: Distances
     distance: float = Field(description="tool to goal [m]")
     beyond_reach: float = Field(
@@ -249,11 +249,11 @@ class MotionAnswer(Answer):
         description="whether a joint cannot keep its limits from this state; it then brakes, "
         "or returns to them"
     )
-    state_outside: list[Outside] = Field(
+    state_outside: list[OutOfRangeInput] = Field(
         description="measured joints outside their limits, clamped for the policy; `segment` "
         "and monitoring use the measured positions and speeds"
     )
-    outside: list[Outside] = Field(description="inputs outside the training range")
+    outside: list[OutOfRangeInput] = Field(description="inputs outside the training range")
     checkpoint: str = Field(description="SHA-256 of the checkpoint")
     elapsed_ms: float = Field(description="time of the decision [ms]")
     stamp: Stamp = None

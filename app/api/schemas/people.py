@@ -140,7 +140,7 @@ class PersonState(Body):
         return Person(q=np.array(self.q), qd=np.array(self.qd), size=size)
 
 
-class KeypointsSeen(Body):
+class KeypointDetection(Body):
     """A person in one frame of a key-point tracker."""
 
     keypoints: OfKeypoints = Field(
@@ -157,7 +157,7 @@ class KeypointsSeen(Body):
         return rows[:, :3], np.where(given, rows[:, 3], 1.0)
 
 
-class KeypointsPerson(KeypointsSeen):
+class KeypointsPerson(KeypointDetection):
     """A person as the key-points of a single frame."""
 
     velocities: OfKeypoints | None = Field(

@@ -11,7 +11,13 @@ from app.api.schemas.numbers import Answer, Data, Vector3
 from app.api.schemas.people import PersonInput, PersonUse
 from app.api.schemas.robot_state import RobotState
 from app.api.schemas.sorting import SortingFields, SortingMove, Word, move_of
-from app.api.schemas.task_selection import FRAME_TEXT, FrameName, Outcome, Outside, Stamp
+from app.api.schemas.task_selection import (
+    FRAME_TEXT,
+    FrameName,
+    Outcome,
+    OutOfRangeInput,
+    Stamp,
+)
 from app.errors import InvalidInput
 from app.policies.inference.sorting_plan import (
     MotionEstimate,
@@ -124,7 +130,7 @@ class PlannedMotion(Answer):
     outcome: Outcome | None = Field(
         description="probabilities and time; null where the checkpoint predicts none"
     )
-    outside: list[Outside] = Field(description="coordinates outside the training range")
+    outside: list[OutOfRangeInput] = Field(description="coordinates outside the training range")
 
     @classmethod
     def from_domain(cls, estimate: MotionEstimate) -> Self:
@@ -184,7 +190,7 @@ class PlanAnswer(Answer):
         description="the exact planner's expected attempts to the goal, with failed picks"
     )
     people: list[PersonUse] = Field(description="use of each person")
-    state_outside: list[Outside] = Field(
+    state_outside: list[OutOfRangeInput] = Field(
         description="measured joints outside their limits, clamped for the policy, and state "
         "fields outside the training range"
     )
@@ -239,7 +245,7 @@ class PlanAnswer(Answer):
             people=[PersonUse(**one) for one in people],
             state_outside=[]
             if decision is None
-            else [Outside.model_validate(one) for one in decision.outside],
+            else [OutOfRangeInput.model_validate(one) for one in decision.outside],
             checkpoint=plan.checkpoint,
             elapsed_ms=plan.elapsed_ms,
             stamp=request.stamp,

@@ -29,7 +29,7 @@ class ErrorPublic(Answer):
     fixed_body: SpreadPublic = Field(description="wrists of the median person's body [mm]")
 
 
-class BeyondPublic(Answer):
+class JointBeyondLimits(Answer):
     """A joint outside the model's limits; its recorded angles are kept."""
 
     share: float = Field(description="share of the clean frames, 0 to 1")
@@ -96,7 +96,7 @@ class RecordingItem(Answer):
         description="lengths of the recorded person [m]; the median's for files of angles"
     )
     error_mm: ErrorPublic = Field(description="error of the import [mm]")
-    beyond_limits: dict[str, BeyondPublic] = Field(
+    beyond_limits: dict[str, JointBeyondLimits] = Field(
         description="joints outside the model's limits, by name"
     )
 

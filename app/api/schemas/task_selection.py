@@ -111,7 +111,7 @@ class TaskSelectionRequest(Body):
             seen.add(candidate.id)
 
 
-class Outside(Answer):
+class OutOfRangeInput(Answer):
     """An input outside the training range, or a joint outside its limits: ``OutsideField``."""
 
     model_config = ConfigDict(frozen=True, from_attributes=True)
@@ -168,7 +168,7 @@ class CandidateValue(Answer):
     )
     reachable: bool = Field(description="whether a configuration with vertical tool exists")
     action: Action
-    outside: list[Outside] = Field(description="coordinates outside the training range")
+    outside: list[OutOfRangeInput] = Field(description="coordinates outside the training range")
 
 
 class TaskSelection(Answer):
@@ -177,7 +177,7 @@ class TaskSelection(Answer):
     chosen: str = Field(description="id of the chosen candidate")
     candidates: list[CandidateValue]
     people: list[PersonUse] = Field(description="use of each person")
-    state_outside: list[Outside] = Field(
+    state_outside: list[OutOfRangeInput] = Field(
         description="measured joints outside their limits, clamped for the policy, and state "
         "fields outside the training range"
     )

@@ -7,7 +7,7 @@ from pydantic import Field
 
 from app.api.schemas.examples import FRAME, TRACKER, shows
 from app.api.schemas.numbers import Answer, Body, Listed, Time
-from app.api.schemas.people import IMPLAUSIBLE, UNUSABLE, BodyPercentiles, KeypointsSeen
+from app.api.schemas.people import IMPLAUSIBLE, UNUSABLE, BodyPercentiles, KeypointDetection
 from app.api.tracker_sessions import TrackedPeople
 from app.sim.perception.multi_person_tracker import MAX_SKELETONS
 from app.sim.perception.person_estimator import PersonEstimate
@@ -50,7 +50,7 @@ class FrameCreate(Body):
     model_config = shows(FRAME)
 
     t: Time = Field(description="time of the frame, on the tracker's clock [s]")
-    people: list[KeypointsSeen] = Field(
+    people: list[KeypointDetection] = Field(
         max_length=MAX_SKELETONS,
         description="people in the frame, may be empty; of more people than tracks, the "
         "nearest to the robot's base are followed",
@@ -107,7 +107,7 @@ class EstimatePublic(Answer):
         )
 
 
-class UnfollowedPublic(Answer):
+class UnassignedDetectionPublic(Answer):
     """A person of the newest frame without a track."""
 
     index: int = Field(description="index in the frame's `people`")
@@ -131,7 +131,7 @@ class EstimatesPublic(Answer):
         "frame"
     )
     people: list[EstimatePublic]
-    unfollowed: list[UnfollowedPublic] = Field(
+    unfollowed: list[UnassignedDetectionPublic] = Field(
         description="people of the newest frame without a track, nearest first"
     )
 

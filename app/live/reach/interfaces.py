@@ -5,14 +5,14 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from app.sim.reach.reach_actor import ReachKnown
+from app.sim.reach.reach_actor import ReachPolicyInfo
 
 if TYPE_CHECKING:  # the batch needs the ports first
     from app.sim.reach.batch import ReachBatch
     from app.sim.safety.layer import SafetySettings
 
 
-class LiveReachPolicy(ReachKnown, Protocol):
+class LiveReachPolicy(ReachPolicyInfo, Protocol):
     """A reach policy with its inference modes; used by one thread at a time."""
 
     @property

@@ -52,7 +52,7 @@ class SortingTable:
         """Number of changes by people."""
         self._origin = 0
         self._next = 1
-        self._wanted: tuple[str, ...] = ()
+        self._goal_ids: tuple[str, ...] = ()
 
     # State.
 
@@ -65,9 +65,9 @@ class SortingTable:
         return tuple(sorted(found, key=lambda one: int(one.id.removeprefix("block"))))
 
     @property
-    def wanted(self) -> frozenset[str]:
+    def goal_ids(self) -> frozenset[str]:
         """Ids of the blocks assigned to the goal."""
-        return frozenset(self._wanted)
+        return frozenset(self._goal_ids)
 
     @property
     def held_position(self) -> int:
@@ -215,7 +215,7 @@ class SortingTable:
                 field = f"towers.{name}[{level}]"
                 goal[c, level] = self.shape.code(c, _index(field, size, self.names.sizes))
         self._require_matches(goal)
-        self.goal, self._wanted = goal, ()
+        self.goal, self._goal_ids = goal, ()
         self._changed()
 
     def toggle_goal(self, id: str) -> None:
@@ -228,7 +228,7 @@ class SortingTable:
         there = [one.id for one in self.blocks if one.code == code]
         if not there:
             raise InvalidInput("id", id, "is a kind of which there is no block")
-        marked = [one for one in self._wanted if one in there]
+        marked = [one for one in self._goal_ids if one in there]
         if id in there:
             now = [one for one in marked if one != id] + ([id] if id not in marked else [])
         else:
@@ -237,7 +237,7 @@ class SortingTable:
         others = [int(one) for one in self.goal.ravel() if one not in (NULL, code)]
         own_towers_only = sorted_goal([*others, *[code] * len(now)], self.shape)
         self.goal = own_towers_only
-        self._wanted = tuple(one for one in self._wanted if one not in there) + tuple(now)
+        self._goal_ids = tuple(one for one in self._goal_ids if one not in there) + tuple(now)
         self._changed()
 
     def begin(self, state: SortingState) -> None:
@@ -382,11 +382,11 @@ class SortingTable:
         ]
         codes = {one.id: one.code for one in self.blocks}
         wanted: list[str] = []
-        for id in (*in_place, *self._wanted, *codes):
+        for id in (*in_place, *self._goal_ids, *codes):
             if id in codes and id not in wanted and counts[codes[id]] > 0:
                 counts[codes[id]] -= 1
                 wanted.append(id)
-        self._wanted = tuple(wanted)
+        self._goal_ids = tuple(wanted)
 
 
 def _index(field: str, word: str, words: tuple[str, ...]) -> int:

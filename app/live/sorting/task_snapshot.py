@@ -110,7 +110,7 @@ def _block(inputs: SnapshotInputs, block: Block) -> BlockSnapshot:
         position=frozen(above(top, -float(half[2]))),
         half_size=frozen(half),
         held=held,
-        in_goal=block.id in table.wanted,
+        in_goal=block.id in table.goal_ids,
     )
 
 

@@ -49,7 +49,7 @@ class BatchVecEnv(VecEnv, Stateful):
         """Step all environments; return observations, rewards, ends and infos."""
         result = self.batch.step(self._actions)
         self.ended = result.ended.copy()
-        infos, truncated = self._infos.copy(), self._task.cut(self.ended)
+        infos, truncated = self._infos.copy(), self._task.truncates(self.ended)
         for env in np.flatnonzero(self.ended):
             infos[env] = {
                 "terminal_observation": result.last_obs[env].copy(),

@@ -25,9 +25,9 @@ class Ranges:
         self._low = {name: one[0].copy() for name, one in state.items()}
         self._high = {name: one[1].copy() for name, one in state.items()}
 
-    def look(self, met: Mapping[str, Vec]) -> None:
+    def extend(self, visited: Mapping[str, Vec]) -> None:
         """Extend the ranges by visited states: rows of each variable, shape (n, size)."""
-        for name, rows in met.items():
+        for name, rows in visited.items():
             low, high = rows.min(axis=0), rows.max(axis=0)
             self._low[name] = np.minimum(self._low.get(name, low), low)
             self._high[name] = np.maximum(self._high.get(name, high), high)

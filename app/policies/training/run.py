@@ -54,7 +54,7 @@ class StatePart(Protocol):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Parts:
+class CheckpointParts:
     """What a checkpoint is made of."""
 
     policy: dict[str, torch.nn.Module]
@@ -89,7 +89,7 @@ class TrainingRun:
         cell: Cell,
         model: Algorithm,
         env: BatchVecEnv,
-        parts: Parts,
+        parts: CheckpointParts,
     ) -> None:
         self.preset, self.seed, self.cell = preset, seed, cell
         self.model, self._env, self._parts = model, env, parts

@@ -17,7 +17,7 @@ from app.policies.configs.sorting import SortingPreset
 from app.policies.networks.sorting_q import layout_of
 from app.policies.training.curve import CURVE_SEED, outcome_rates, play
 from app.policies.training.reporter import Callbacks, Reporter
-from app.policies.training.run import Parts, TrainingRun
+from app.policies.training.run import CheckpointParts, TrainingRun
 from app.sim.cells.cell import Cell
 from app.sim.envs.sorting import SortingTask
 from app.sim.sorting.batch import OUTCOMES, SortingSettings, batch_in
@@ -44,7 +44,7 @@ def start(preset: SortingPreset, seed: int, cell: Cell) -> tuple[TrainingRun, So
     env = BatchVecEnv(SortingTask(cell, batch))
     expert = expert_of(batch.shape) if preset.expert.share else None
     model = SortingDQN(preset, env, batch, seed, expert)
-    parts = Parts(
+    parts = CheckpointParts(
         policy={"q": model.q_net.q_net},
         targets={"q_target": model.q_net_target.q_net},
         optimizers={"adam": model.policy.optimizer},

@@ -12,7 +12,7 @@ from app.policies.algorithms.vecenv import BatchVecEnv
 from app.policies.checkpoints.training_range import Ranges
 from app.policies.configs.pick import PickPreset
 from app.policies.configs.reach import ReachPreset
-from app.policies.training.run import Parts, TrainingRun
+from app.policies.training.run import CheckpointParts, TrainingRun
 from app.sim.cells.cell import Cell
 from app.sim.core.arrays import Vec
 from app.sim.envs.tasks import ArmTask
@@ -57,7 +57,7 @@ class TrainingMonitor:
     def update_ranges(self, num_timesteps: int) -> None:
         """Extend the training range by the present states, every RANGE_EVERY-th step."""
         if (num_timesteps // self.env.num_envs) % RANGE_EVERY == 0:
-            self.ranges.look(self.visited_states())
+            self.ranges.extend(self.visited_states())
 
 
 def start_td3(
@@ -83,7 +83,7 @@ def start_td3(
     if model.ema_actor is not None:
         targets["actor_learned"] = model.actor.mu
     ranges = Ranges()
-    parts = Parts(
+    parts = CheckpointParts(
         policy={"actor": model.evaluated_actor, "critic": critics_of(model.critic)},
         targets=targets,
         optimizers={

@@ -14,7 +14,7 @@ import numpy as np
 
 from app.errors import Fault, digits, interval
 from app.sim.cell_validation.places import FaultlessParts, places
-from app.sim.cell_validation.reachability import Reach, Touching
+from app.sim.cell_validation.reachability import ContactPair, Reach
 from app.sim.cell_validation.units import numbers, shown
 from app.sim.cells.cell import LIMITS, MAX_TARGETS, Cell
 from app.sim.cells.parts import GoalRegion, RobotMount, Station
@@ -205,7 +205,7 @@ def station_distance(a: Station, b: Station) -> float:
 
 def _reach(parts: FaultlessParts) -> Iterator[Fault]:
     cell = parts.cell.model_copy(update={"obstacles": parts.obstacles})
-    found = list(Reach(cell).touching(np.array(cell.robot.home_q)))
+    found = list(Reach(cell).contacts(np.array(cell.robot.home_q)))
     yield from _home_contacts(cell, found)
     # Obstacles that touch the robot at home would be reported again for every station.
     touching = {one.other for one in found if one.kind == "obstacle"}
@@ -217,7 +217,7 @@ def _reach(parts: FaultlessParts) -> Iterator[Fault]:
         yield from _region_reach(reach, parts.goal_region)
 
 
-def _home_contacts(cell: Cell, found: list[Touching]) -> Iterator[Fault]:
+def _home_contacts(cell: Cell, found: list[ContactPair]) -> Iterator[Fault]:
     for box in cell.obstacles:
         touching = [one.text for one in found if (one.kind, one.other) == ("obstacle", box.id)]
         if touching:

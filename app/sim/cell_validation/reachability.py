@@ -31,7 +31,7 @@ DAMPING, LONGEST_STEP = 0.05, 0.4
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Touching:
+class ContactPair:
     """Two things that touch."""
 
     link: str
@@ -52,7 +52,7 @@ class Touching:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Reached:
+class ReachResult:
     """Result of an attempt to reach a point."""
 
     q: Vec | None
@@ -80,7 +80,7 @@ class Reach:
         self._home = np.array(mount.home_q)
         self._longest = LONGEST_REACH + max(mount.tool_length - 0.12, 0.0)
 
-    def touching(self, q: Vec) -> Iterator[Touching]:
+    def contacts(self, q: Vec) -> Iterator[ContactPair]:
         """Yield the contacts of the robot at joint positions ``q`` [rad], shape (6,)."""
         shapes, names = self._capsules, self._capsules.name
         poses = self._robot.link_poses(np.asarray(q, dtype=np.float64))
@@ -90,23 +90,23 @@ class Reach:
             place_capsule(body, p0, p1)
             low = min(p0[2], p1[2]) - shapes.radius[k]
             if shapes.link[k] > SHOULDER_LINK and low <= 0.0:
-                yield Touching(link=names[k], kind="table", other="table")
+                yield ContactPair(link=names[k], kind="table", other="table")
         for a, b in self._pairs:
             if touch(self._bodies[a], self._bodies[b]):
-                yield Touching(link=names[b], kind="self", other=names[a])
+                yield ContactPair(link=names[b], kind="self", other=names[a])
         for name, box in self._boxes.items():
             for k, body in enumerate(self._bodies):
                 if touch(body, box):
-                    yield Touching(link=names[k], kind="obstacle", other=name)
+                    yield ContactPair(link=names[k], kind="obstacle", other=name)
 
-    def tool_down(self, point: Vec) -> Reached:
+    def tool_down(self, point: Vec) -> ReachResult:
         """Find the configuration with the tool pointing down at ``point`` [m], shape (3,)."""
         q = self._robot.ik_vertical(point, self._q_min, self._q_max)
         if q is None:
-            return Reached(q=None, reason=self._why_not(point))
-        for found in self.touching(q):
-            return Reached(q=None, reason=f"there {found.text}")
-        return Reached(q=q)
+            return ReachResult(q=None, reason=self._why_not(point))
+        for found in self.contacts(q):
+            return ReachResult(q=None, reason=f"there {found.text}")
+        return ReachResult(q=q)
 
     def _why_not(self, point: Vec) -> str:
         far = float(np.hypot(point[0], point[1]))
@@ -116,10 +116,10 @@ class Reach:
         side = "too far from" if far > 0.6 else "too near to"
         return f"it lies {far:.2f} m from the robot's base, {side} it at that height"
 
-    def any_posture(self, point: Vec) -> Reached:
+    def any_posture(self, point: Vec) -> ReachResult:
         """Find any configuration with the tcp at ``point`` [m], shape (3,)."""
         if np.linalg.norm(point - SHOULDER) > self._longest:
-            return Reached(q=None, reason="it is farther than the arm is long")
+            return ReachResult(q=None, reason="it is farther than the arm is long")
         down = self.tool_down(point)
         if down.q is not None:
             return down
@@ -130,11 +130,11 @@ class Reach:
             q = self._solve(point, start)
             if q is None:
                 continue
-            found = next(self.touching(q), None)
+            found = next(self.contacts(q), None)
             if found is None:
-                return Reached(q=q)
+                return ReachResult(q=q)
             reason = f"in every posture found it touches something: {found.text}"
-        return Reached(q=None, reason=reason)
+        return ReachResult(q=None, reason=reason)
 
     def _solve(self, point: Vec, start: Vec) -> Vec | None:
         """Return the result of damped least squares from ``start``; None if it fails."""

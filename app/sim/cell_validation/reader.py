@@ -66,9 +66,9 @@ _RULES = {
 
 
 class _Object(dict[str, Any]):
-    """A JSON object that remembers which keys it was given twice."""
+    """A JSON object that remembers its repeated keys."""
 
-    twice: tuple[str, ...] = ()
+    repeated_keys: tuple[str, ...] = ()
 
 
 def read_cell(content: bytes) -> Cell:
@@ -141,7 +141,7 @@ def _pairs(pairs: list[tuple[str, Any]]) -> _Object:
     made = _Object(pairs)
     if len(made) < len(pairs):
         counts = Counter(name for name, _ in pairs)
-        made.twice = tuple(name for name, count in counts.items() if count > 1)
+        made.repeated_keys = tuple(name for name, count in counts.items() if count > 1)
     return made
 
 
@@ -150,7 +150,7 @@ def _tree_faults(node: object, place: str) -> Iterator[Fault]:
     if isinstance(node, str) and not _is_text(node):
         yield Fault(place=place, value=ascii(node)[:MAX_SHOWN], rule="must be text")
     if isinstance(node, _Object):
-        for name in node.twice:
+        for name in node.repeated_keys:
             path = f"{place}.{name}".lstrip(".")
             hint = "only the last one would count"
             yield Fault(place=path, value="", rule="is given twice in one object", hint=hint)

@@ -66,7 +66,7 @@ class SingleEnv(gymnasium.Env[NDArray[Any], Any]):
             raise ResetNeeded("the episode has ended: call reset() before the next step()")
         task = self._task
         result = task.batch.step(task.actions(action), auto_reset=False)
-        over, truncated = bool(result.ended[0]), bool(task.cut(result.ended)[0])
+        over, truncated = bool(result.ended[0]), bool(task.truncates(result.ended)[0])
         self._running = not over
         obs, rew = task.batch.obs[0].copy(), float(result.rew[0])
         return obs, rew, over and not truncated, truncated, self._info()

@@ -46,7 +46,7 @@ class SortingTask:
             raise InvalidInput("act", act.tolist(), "must be whole numbers, the moves")
         return act
 
-    def cut(self, ended: Rows) -> Mask:
+    def truncates(self, ended: Rows) -> Mask:
         """Return whether outcomes truncate an episode, shape (n_envs,)."""
         late: Mask = ended == TIMEOUT
         return late

@@ -79,7 +79,7 @@ class SteppedTask(Protocol):
     def actions(self, given: Any) -> NDArray[Any]:
         """Return actions as the batch takes them."""
 
-    def cut(self, ended: Rows) -> Mask:
+    def truncates(self, ended: Rows) -> Mask:
         """Return whether outcomes truncate an episode, shape (n_envs,)."""
 
 
@@ -126,7 +126,7 @@ class ArmTask:
         act = np.asarray(given, dtype=np.float32)
         return act[None] if act.ndim == 1 and self.batch.n_envs == 1 else act
 
-    def cut(self, ended: Rows) -> Mask:
+    def truncates(self, ended: Rows) -> Mask:
         """Return whether outcomes truncate an episode, shape (n_envs,)."""
         late: Mask = (ended == TIMEOUT) & (not self._sees_time)
         return late

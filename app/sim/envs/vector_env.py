@@ -135,7 +135,7 @@ class BatchVectorEnv(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
         result = task.batch.step(task.actions(actions), auto_reset=False)
         rew = np.where(waiting, 0.0, result.rew.astype(np.float64))
         ended = np.where(waiting, 0, result.ended)
-        late = task.cut(ended)
+        late = task.truncates(ended)
         terminated = (ended > 0) & ~late
         self._steps += 1
         if waiting.any():

@@ -106,9 +106,9 @@ class CylinderSensorModel:
         self._time[rows] = since
         self._state[0, rows], self._state[1, rows] = self._true[rows], velocity
         for t in np.linspace(since, 0.0, int(np.ceil(-since / self._period)) + 1)[1:]:
-            self.look(rows, np.full(len(rows), t), people + t * velocity)
+            self.observe(rows, np.full(len(rows), t), people + t * velocity)
 
-    def look(self, rows: NDArray[np.int64], t: Vec, people: Vec) -> None:
+    def observe(self, rows: NDArray[np.int64], t: Vec, people: Vec) -> None:
         """Advance the time of some environments, by at most one frame.
 
         Args:

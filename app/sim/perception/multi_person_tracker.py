@@ -8,9 +8,9 @@ Remaining detections start free tracks: that of a lost person who can have walke
 If a frame shows more people than tracks, the nearest are tracked: a detection present in the
 previous frame and nearer to the robot's base than the farthest tracked person by more than
 ``NEARER_M`` takes over that track (``replaced``). The margin exceeds the noise of a tracker, so
-that two people at equal distance do not alternate. All others are listed (:class:`Unfollowed`,
-``people-dropped``). A skeleton that cannot stand in the cell's frame is assigned to no track;
-tracks not seen in that frame are flagged ``foreign-frame``.
+that two people at equal distance do not alternate. All others are listed
+(:class:`UnassignedDetection`, ``people-dropped``). A skeleton that cannot stand in the cell's
+frame is assigned to no track; tracks not seen in that frame are flagged ``foreign-frame``.
 """
 
 import math
@@ -40,7 +40,7 @@ NEARER_M = 0.1
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Unfollowed:
+class UnassignedDetection:
     """A detection assigned to no track."""
 
     index: int
@@ -111,7 +111,7 @@ class MultiPersonTracker:
         """Estimate of each track at the last frame that showed its person; None: never."""
         self._waiting: list[Vec] = []
         self._waiting_since = 0.0
-        self.unfollowed: tuple[Unfollowed, ...] = ()
+        self.unfollowed: tuple[UnassignedDetection, ...] = ()
         """Detections of the newest frame assigned to no track, nearest first."""
 
     def update(
@@ -233,7 +233,7 @@ class MultiPersonTracker:
             if j is not None and "jump" in track.frame_flags
         }
         unfollowed = [
-            Unfollowed(
+            UnassignedDetection(
                 index=j,
                 reason="foreign-frame"
                 if frame.implausible

@@ -63,7 +63,7 @@ class PathFollower:
         self.place = float(times[k])
         self.error_rad = float(np.abs(q - self.timed.at(self.place)[0]).max())
 
-    def wanted(self, q: Vec, qd: Vec, brake: bool = False) -> Vec:
+    def target_speeds(self, q: Vec, qd: Vec, brake: bool = False) -> Vec:
         """Return the target joint speeds after this period [rad/s], shape (6,).
 
         Args:

@@ -200,7 +200,7 @@ class ReplanningExecutor:
             report.state = "braking" if self.blocked else "following"
         if report.state == "braking":
             report.blocked_s += self.arm.dt
-        return path_follower.wanted(q, qd, brake=report.state == "braking")
+        return path_follower.target_speeds(q, qd, brake=report.state == "braking")
 
 
 def _once(follower: ReplanningExecutor, q: Vec, qd: Vec, people: Shapes, t: float) -> None:
@@ -249,7 +249,7 @@ def _after_period(follower: ReplanningExecutor, q: Vec, qd: Vec) -> tuple[Vec, V
     if path_follower is None:
         wanted = straight_stop(qd, follower.limits)
     else:
-        wanted = path_follower.wanted(q, qd, brake=follower.blocked)
+        wanted = path_follower.target_speeds(q, qd, brake=follower.blocked)
     end = JointState(np.empty(6), np.empty(6), np.empty(6))
     start = JointState(as_kernel_array(q), as_kernel_array(qd), np.zeros(6))
     polynomial.advance_to_speeds(arm.limits, arm.dt, start, wanted, np.empty(6), end)

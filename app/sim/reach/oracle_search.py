@@ -170,7 +170,7 @@ class OracleSearch:
 
             self._simulate(rows, policy, first, until, None)
 
-    def undisturbed(self, acts: Acts) -> None:
+    def simulate_policy(self, acts: Acts) -> None:
         """Simulate every episode once with a policy alone."""
         for rows in self._parts(np.arange(self.n), 1):
             none = np.zeros(len(rows))

@@ -12,7 +12,7 @@ from app.sim.reach.batch import GoalRule, ViewName
 from app.sim.robot.actions import ActionSettings
 
 
-class ReachKnown(PolicyIdentity, Protocol):
+class ReachPolicyInfo(PolicyIdentity, Protocol):
     """Reach policy, as seen by the live world and planners."""
 
     @property
@@ -32,7 +32,7 @@ class ReachKnown(PolicyIdentity, Protocol):
         """Training goals [m], shape (n, 3); None for a whole box."""
 
 
-class ReachActor(ReachKnown, Protocol):
+class ReachActor(ReachPolicyInfo, Protocol):
     """Reach policy; safe to call from several threads."""
 
     @property

@@ -166,7 +166,7 @@ def attempts_by_action(
     return attempts if written else None
 
 
-def takes_time(shape: SortingShape) -> bool:
+def is_slow_decision(shape: SortingShape) -> bool:
     """Return whether a decision may take more than a moment."""
     return most_states(shape.n_cells, shape.n_colours) > MAX_AT_ONCE
 

@@ -55,21 +55,21 @@ def test_goal_loses_what_no_block_is_left_for(table: SortingTable) -> None:
     table.set_goal({"red": ("large", "large", "small")})
     table.remove("block1")
     assert goal(table) == ["large red", "small red"]
-    assert table.wanted == {"block2", "block3"}
+    assert table.goal_ids == {"block2", "block3"}
 
 
 def test_duplicate_stands_in_for_a_block_that_is_removed(table: SortingTable) -> None:
     table.set_goal({"red": ("large",)})
     table.remove("block1")
     assert goal(table) == ["large red"]
-    assert table.wanted == {"block2"}
+    assert table.goal_ids == {"block2"}
 
 
 def test_blocks_are_toggled_in_and_out_of_the_goal_largest_lowest(table: SortingTable) -> None:
     for id in ("block3", "block2"):
         table.toggle_goal(id)
     assert goal(table) == ["large red", "small red"]
-    assert table.wanted == {"block2", "block3"}
+    assert table.goal_ids == {"block2", "block3"}
     table.toggle_goal("block2")
     assert goal(table) == ["small red"]
 
@@ -88,7 +88,7 @@ def test_block_in_its_place_stands_for_the_goal_rather_than_its_duplicate(
     table.toggle_goal("block1")
     table.lift(1)
     table.drop(RED)
-    assert table.wanted == {"block2"}
+    assert table.goal_ids == {"block2"}
 
 
 def test_adopted_state_keeps_the_blocks_that_stay(table: SortingTable) -> None:

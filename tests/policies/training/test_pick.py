@@ -99,7 +99,7 @@ def test_a_training_of_the_recipe_updates_once_per_step_and_moves_its_starts():
     preset = preset_of("pick-td3-thesis", TINY_RECIPE)
     run, monitor = start(preset, 1, CELL)
     assert isinstance(monitor.env.batch, CurriculumPickBatch)
-    assert monitor.env._task.cut(np.array([TIMEOUT])).tolist() == [False]
+    assert monitor.env._task.truncates(np.array([TIMEOUT])).tolist() == [False]
     recorder = Recorder()
     result = recorder.run(preset)
     assert [one.step for one in recorder.progress] == [400, 800, 1200]

@@ -138,7 +138,7 @@ def test_the_recipes_of_the_thesis_and_of_its_authors(name, alpha, steps, walk):
 def test_a_time_out_ends_an_episode_of_the_recipe_for_good():
     preset = preset_of("reach-ddpg-authors", {**TINY, "networks.layers": 2})
     _, monitor = start(preset, 1, load_cell("shared-workspace"))
-    assert not monitor.env._task.cut(np.array([3])).any()
+    assert not monitor.env._task.truncates(np.array([3])).any()
 
 
 def test_a_recipe_resumes_with_its_normalisation(tmp_path):

@@ -23,7 +23,7 @@ def test_contact_of_the_meshes_is_contact_of_the_capsules(cell: Cell) -> None:
     rng, kinds = np.random.default_rng(3), set()
     for q in rng.uniform(cell.robot.q_min, cell.robot.q_max, (400, 6)):
         found = {one.kind for one in meshes.contacts(q)}
-        own = {one.kind for one in reach.touching(q)}
+        own = {one.kind for one in reach.contacts(q)}
         kinds |= own
         assert "self" not in found or own
         assert "cell" not in found or own & {"table", "obstacle"}
@@ -38,7 +38,7 @@ def test_posture_found_reaches_its_point_inside_the_limits(cell: Cell) -> None:
         assert q is not None
         np.testing.assert_allclose(robot.tcp_pose(q)[:3, 3], point, atol=1e-3)
         assert (q >= cell.robot.q_min).all() and (q <= cell.robot.q_max).all()
-        assert list(reach.touching(q)) == []
+        assert list(reach.contacts(q)) == []
 
 
 def test_tilted_posture_is_found_where_no_vertical_one_exists(cell: Cell) -> None:
@@ -77,5 +77,5 @@ def test_point_inside_an_obstacle_is_out_of_reach(cell: Cell) -> None:
 
 def test_obstacle_on_the_base_is_found_at_home(cell: Cell) -> None:
     pillar = cell.model_copy(update={"obstacles": (box((0.0, 0.0, 0.1)),)})
-    found = list(Reach(pillar).touching(np.array(cell.robot.home_q)))
+    found = list(Reach(pillar).contacts(np.array(cell.robot.home_q)))
     assert ("base", "obstacle", "box") in [(one.link, one.kind, one.other) for one in found]

@@ -37,7 +37,7 @@ class CountedName(str):
 
 def test_effort_to_find_repeated_keys_grows_with_their_number_only() -> None:
     names = [CountedName(k) for k in (*range(2000), 7, 7)]
-    assert reader._pairs([(name, 0) for name in names]).twice == ("7",)
+    assert reader._pairs([(name, 0) for name in names]).repeated_keys == ("7",)
     assert CountedName.comparisons < 10 * len(names)
 
 

@@ -22,7 +22,7 @@ def follow(
     seen, change, true = [tracker.seen(rows)[0]], [tracker.seen(rows)[1]], [start]
     for k in range(1, round(seconds / DT) + 1):
         true.append(start + k * DT * velocity)
-        tracker.look(rows, np.full(n, k * DT), true[-1])
+        tracker.observe(rows, np.full(n, k * DT), true[-1])
         position, speed = tracker.seen(rows, predicted=predicted)
         seen.append(position)
         change.append(speed)
@@ -69,7 +69,7 @@ def test_a_turn_is_noticed_after_the_latency() -> None:
     tracker.start(rows, there, walk)
     speeds = []
     for k in range(1, 26):  # stands still from the start on
-        tracker.look(rows, np.full(1, k * DT), there)
+        tracker.observe(rows, np.full(1, k * DT), there)
         speeds.append(tracker.seen(rows)[1][0, 0, 0])
     assert speeds[3] == pytest.approx(1.0)
     assert abs(speeds[-1]) < 0.05
@@ -80,7 +80,7 @@ def test_other_cells_go_on_while_one_is_reset() -> None:
     tracker, rows = CylinderSensorModel(settings, 3, 2, 7), np.arange(3)
     there = np.random.default_rng(4).uniform(-1, 1, (3, 2, 3))
     tracker.start(rows, there, np.zeros_like(there))
-    tracker.look(rows, np.full(3, DT), there)
+    tracker.observe(rows, np.full(3, DT), there)
     before = tracker.seen(rows)[0]
     tracker.start(np.array([1]), there[1:2] + 5.0, np.zeros((1, 2, 3)))
     after = tracker.seen(rows)[0]

@@ -40,7 +40,7 @@ def follow(
         errors.append(path_follower.error_rad)
         if path_follower.remaining <= 0.0 and np.abs(qd).max() < 1e-4:
             break
-        c, q, qd = move(q, qd, scale(k) * path_follower.wanted(q, qd))
+        c, q, qd = move(q, qd, scale(k) * path_follower.target_speeds(q, qd))
         assert np.all(np.abs(qd) <= ARM.limits.qd_max + 1e-9)
         assert np.all(np.abs(2.0 * c) <= ARM.limits.qdd_max + 1e-9)
     return path_follower, errors, q
@@ -82,7 +82,7 @@ def test_braking_rests_on_the_path_and_goes_on_from_there() -> None:
             path_follower.locate(q)
             if 30 <= k < 60 and k >= 38:
                 assert np.abs(qd).max() < 1e-2
-            _, q, qd = move(q, qd, path_follower.wanted(q, qd, brake=30 <= k < 60))
+            _, q, qd = move(q, qd, path_follower.target_speeds(q, qd, brake=30 <= k < 60))
             assert path_follower.error_rad < 5e-3
         np.testing.assert_allclose(q, some_path(seed)[-1], atol=1e-3)
 

@@ -47,7 +47,7 @@ def test_copied_episode_equals_the_original():
 def test_resimulated_policy_ends_as_without_the_search():
     batch, controller = batch_of(40), Straight()
     search = OracleSearch(batch, 1, SMALL)
-    search.undisturbed(controller.acts)
+    search.simulate_policy(controller.acts)
     while (batch.state.outcome == RUNNING).any():
         batch.step(controller.acts(batch), auto_reset=False)
     solved = batch.state.outcome == SUCCESS
@@ -60,7 +60,7 @@ def test_resimulated_policy_ends_as_without_the_search():
 
 def test_resimulations_solve_what_straight_moves_do_not():
     search = OracleSearch(batch_of(40), 1, SMALL)
-    search.undisturbed(Straight().acts)
+    search.simulate_policy(Straight().acts)
     before = search.unsolved()
     search.scripted(before, 24)
     after = search.unsolved()

@@ -9,13 +9,13 @@ from fastapi import APIRouter
 from starlette.concurrency import run_in_threadpool
 
 from app.api.description import MISMATCH
-from app.api.known_people import people_for_policy, take_time
+from app.api.known_people import is_slow_conversion, people_for_policy
 from app.api.schemas.plan import PlanAnswer, PlanRequest
 from app.api.services import ServicesDep
 from app.api.world_policies import require_task_policy
 from app.policies.inference.sorting_plan import SortingPlanner
 from app.sim.sorting.batch import fail_of
-from app.sim.sorting.decision import takes_time
+from app.sim.sorting.decision import is_slow_decision
 from app.sim.sorting.names import names_of
 
 router = APIRouter(prefix="/v1/plan", tags=["deciding"])
@@ -49,5 +49,5 @@ async def plan_move(request: PlanRequest, services: ServicesDep) -> PlanAnswer:
         uses = people.uses(None if found.decision is None else found.decision.nearest_person)
         return PlanAnswer.from_domain(found, query, request, names, uses)
 
-    long = takes_time(names.shape) or take_time(request.people)
+    long = is_slow_decision(names.shape) or is_slow_conversion(request.people)
     return await run_in_threadpool(answer) if long else answer()

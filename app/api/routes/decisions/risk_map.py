@@ -7,7 +7,7 @@ from fastapi import APIRouter
 from starlette.concurrency import run_in_threadpool
 
 from app.api.description import MISMATCH
-from app.api.known_people import people_for_policy, take_time
+from app.api.known_people import is_slow_conversion, people_for_policy
 from app.api.schemas.risk_map import RiskMapAnswer, RiskMapRequest
 from app.api.services import ServicesDep
 from app.api.world_policies import require_task_policy
@@ -54,5 +54,5 @@ async def map_risk(request: RiskMapRequest, services: ServicesDep) -> RiskMapAns
         return RiskMapAnswer.from_domain(found, reached, request, uses, policy.checkpoint)
 
     n_rows = request.grid.nx * request.grid.ny * len(candidates)
-    long = n_rows > MAX_INLINE_ROWS or take_time(request.people)
+    long = n_rows > MAX_INLINE_ROWS or is_slow_conversion(request.people)
     return await run_in_threadpool(answer) if long else answer()

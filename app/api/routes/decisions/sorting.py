@@ -16,7 +16,7 @@ from app.api.services import Services, ServicesDep
 from app.errors import InvalidInput
 from app.sim.core.arrays import Vec
 from app.sim.sorting.batch import fail_of
-from app.sim.sorting.decision import decide, takes_time
+from app.sim.sorting.decision import decide, is_slow_decision
 from app.sim.sorting.names import SortingNames, names_of, plain_names
 from app.sim.sorting.sorting_values import SortingValues
 
@@ -43,7 +43,7 @@ async def choose_sorting_move(request: SortingRequest, services: ServicesDep) ->
         None if request.monitor is None else request.monitor.to_domain(),
         ask_planner=request.decider == "planner",
     )
-    long = takes_time(names.shape)
+    long = is_slow_decision(names.shape)
     decision = await run_in_threadpool(choose) if long else choose()
     outside = outside_of(decision, state, names, policy, own)
     services.metrics.count_outside(router.prefix, outside)

@@ -9,7 +9,7 @@ from fastapi import APIRouter
 from starlette.concurrency import run_in_threadpool
 
 from app.api.description import MISMATCH
-from app.api.known_people import people_for_policy, take_time
+from app.api.known_people import is_slow_conversion, people_for_policy
 from app.api.schemas.numbers import Data
 from app.api.schemas.task_selection import TaskSelection, TaskSelectionRequest
 from app.api.services import ServicesDep
@@ -57,5 +57,5 @@ async def select_task(request: TaskSelectionRequest, services: ServicesDep) -> D
         uses = people.uses(decision.nearest_person)
         return TaskSelection.data_of(decision, candidates, uses, request.stamp)
 
-    long = len(candidates) > MAX_INLINE_CANDIDATES or take_time(request.people)
+    long = len(candidates) > MAX_INLINE_CANDIDATES or is_slow_conversion(request.people)
     return await run_in_threadpool(answer) if long else answer()

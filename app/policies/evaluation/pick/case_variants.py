@@ -76,7 +76,7 @@ def shares_of(found: CaseEpisodes) -> Shares:
     flags = {
         **{end: run.outcome == OUTCOMES.index(end) for end in ENDS},
         **found.clauses,
-        "nearest": found.nearest.won,
+        "nearest": found.nearest.succeeded,
         "nearest_as_expected": found.nearest_clauses["as_expected"],
         "expected_goal_alone": alone,
         "other_goal_alone": found.alone[other],

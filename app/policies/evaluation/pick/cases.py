@@ -136,7 +136,7 @@ class CaseBench:
                     clauses=_clauses(case, run, critic, rows),
                     nearest=near.part(rows),
                     nearest_clauses=_clauses(case, near, nearest, rows),
-                    alone={goal: one.won[rows] for goal, one in pairs},
+                    alone={goal: one.succeeded[rows] for goal, one in pairs},
                 )
             )
         return found, critic
@@ -216,7 +216,7 @@ def _row(found: CaseEpisodes) -> dict[str, Any]:
     """Return the row of a case: each clause and the verdict, with 95 % intervals."""
     case, n = found.case, len(found.run.outcome)
     rates = {name: wilson(int(held.sum()), n) for name, held in found.clauses.items()}
-    beside = {"nearest": found.nearest.won}
+    beside = {"nearest": found.nearest.succeeded}
     beside |= {f"{goal} alone": won for goal, won in found.alone.items()}
     expected = {"first": case.first, "switches": list(case.switches), "end": case.expected}
     return {

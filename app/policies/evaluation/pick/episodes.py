@@ -113,7 +113,7 @@ class Episodes:
     """Robot and each worker of the recorded episodes."""
 
     @property
-    def won(self) -> NDArray[np.bool_]:
+    def succeeded(self) -> NDArray[np.bool_]:
         """Whether each episode succeeded, shape (n,)."""
         success: NDArray[np.bool_] = self.outcome == kernel.SUCCESS
         return success
@@ -129,11 +129,13 @@ class Episodes:
 
     def row(self, name: str) -> dict[str, object]:
         """Return the result row of these episodes, rates with 95 % intervals."""
-        won = self.won
+        succeeded = self.succeeded
         return {
             "name": name,
             **outcome_intervals(self.outcome),
-            "time_to_success_s": float(self.duration_s[won].mean()) if won.any() else None,
+            "time_to_success_s": float(self.duration_s[succeeded].mean())
+            if succeeded.any()
+            else None,
             "switches_per_episode": float(self.switches.mean()),
         }
 

@@ -137,13 +137,15 @@ class ChoiceRun:
 
     def paired(self) -> list[dict[str, object]]:
         """Return the critic's choice against each other rule on the same episodes."""
-        gain = self._runs[ORACLE].won.mean() - self._runs["nearest"].won.mean()
+        gain = self._runs[ORACLE].succeeded.mean() - self._runs["nearest"].succeeded.mean()
         others = [name for name in self._runs if name != CRITIC]
         return [
             {
                 "name": f"{self._prefix}{CRITIC} - {name}",
-                "difference": float(self.critic.won.mean() - self._runs[name].won.mean()),
-                **mcnemar(self.critic.won, self._runs[name].won),
+                "difference": float(
+                    self.critic.succeeded.mean() - self._runs[name].succeeded.mean()
+                ),
+                **mcnemar(self.critic.succeeded, self._runs[name].succeeded),
             }
             | ({"oracle_gain": float(gain)} if name == "nearest" else {})
             for name in others

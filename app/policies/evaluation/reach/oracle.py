@@ -115,7 +115,7 @@ class StagedSearch:
     def run(self, controller: Controller) -> None:
         """Run all stages."""
         search = self.search
-        self.stage("policy", lambda: search.undisturbed(controller.acts))
+        self.stage("policy", lambda: search.simulate_policy(controller.acts))
         for n_each in SCRIPTED:
             self.stage(f"scripted-{n_each}", partial(self._scripted, n_each))
         self.stage(

@@ -89,7 +89,7 @@ class CylinderObserver:
         fresh = np.flatnonzero(t == 0.0)
         self._tracker.start(fresh, true[fresh], rows[fresh][:, :, [VX, VY, GROWTH]])
         later, every = np.flatnonzero(t > 0.0), np.arange(batch.n_envs)
-        self._tracker.look(later, t[later], true[later])
+        self._tracker.observe(later, t[later], true[later])
         seen, change = self._tracker.seen(every, predicted=self._row.predicted)
         seen[:, :, 2] = np.maximum(seen[:, :, 2], MIN_RADIUS)
         self.errors.append(np.linalg.norm(seen[:, :, :2] - true[:, :, :2], axis=2).ravel())

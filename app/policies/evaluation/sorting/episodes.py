@@ -52,7 +52,7 @@ class Script(Protocol):
         """Change environment ``e``, whose episode continues."""
 
 
-class Undisturbed:
+class NoInterferences:
     """Script without interferences."""
 
     def due(self, which: Index, moves: Index, solved: Flags) -> Flags:
@@ -266,13 +266,13 @@ def run_episodes(
     """
     if only is not None:
         batch.rows.outcome[~only] = TIMEOUT
-    return _Run(batch, choose, script or Undisturbed(), fallback).run()
+    return _Run(batch, choose, script or NoInterferences(), fallback).run()
 
 
 def run_with_fallback(
     started: Callable[[], SortingBatch],
     choose: Chooser,
-    script: Callable[[], Script] = Undisturbed,
+    script: Callable[[], Script] = NoInterferences,
 ) -> tuple[SortingEpisodes, SortingEpisodes]:
     """Return the same episodes without and with planner fallback.
 

@@ -27,7 +27,7 @@ RULES = ReachSettings()
 def test_the_first_states_are_those_of_the_episodes():
     goals = target_goals(TARGETS, 530)
     search = OracleSearch(started(CELL, RULES, goals, 6), 1, 600)
-    search.undisturbed(Straight().acts)
+    search.simulate_policy(Straight().acts)
     found = run_episodes(CELL, RULES, Straight(), goals, 6)
     np.testing.assert_array_equal(search.resimulations.reached > 0, found.outcome == SUCCESS)
 
