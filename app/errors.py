@@ -175,7 +175,7 @@ class BadRecording(_Faulty):
 
 
 class OutOfRangeCoordinate(Protocol):
-    """One coordinate outside its range, such as an ``OutsideField`` of ``app.sim.core``."""
+    """One coordinate outside its range, such as an ``OutOfRangeValue`` of ``app.sim.core``."""
 
     @property
     def field(self) -> str: ...  # noqa: D102

@@ -27,7 +27,7 @@ from app.api.tracker_sessions import IDLE_S, TrackerSessions
 from app.errors import InvalidInput, NotFound
 from app.sim.cells.cell import Cell
 from app.sim.core.arrays import Vec
-from app.sim.core.out_of_range import OutsideField
+from app.sim.core.out_of_range import OutOfRangeValue
 from app.sim.human import model as human
 from app.sim.human.person import Person
 from app.sim.people.kernels.people import MAX_PEOPLE
@@ -170,8 +170,8 @@ def nearest_places(people: Mapping[int, Person], cell: Cell, q: Vec) -> list[int
 
 
 def renumbered(
-    outside: Sequence[OutsideField], places: Sequence[int]
-) -> tuple[OutsideField, ...]:
+    outside: Sequence[OutOfRangeValue], places: Sequence[int]
+) -> tuple[OutOfRangeValue, ...]:
     """Return fields of a decision with the request's indices of people.
 
     Args:

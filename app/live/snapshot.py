@@ -15,7 +15,7 @@ from app.live.reach.snapshot import ReachSnapshot
 from app.live.read_model import Internal, Numbers, ReadModel, frozen
 from app.live.safety.snapshot import SafetySnapshot
 from app.live.sorting.snapshot import SortingSnapshot
-from app.sim.core.out_of_range import OutsideField
+from app.sim.core.out_of_range import OutOfRangeValue
 from app.sim.pick.case_verdict import Verdict
 from app.sim.pick.task_policy import Candidate, Decision
 
@@ -62,7 +62,7 @@ class CandidateSnapshot(ReadModel):
     """whether the robot moves there"""
     reachable: bool | None
     """whether a configuration with vertical tool exists; null without a decision"""
-    outside: tuple[OutsideField, ...]
+    outside: tuple[OutOfRangeValue, ...]
     """inputs of the candidate outside the training range"""
 
 
@@ -262,7 +262,7 @@ class WorldSnapshot(ReadModel):
     """stations that the robot can choose, in the order of the cell"""
     chosen: str | None
     """id of the chosen candidate"""
-    outside: tuple[OutsideField, ...]
+    outside: tuple[OutOfRangeValue, ...]
     """inputs of the state outside the training range"""
     decided_s: float | None = None
     """time of the last decision, as `t_s` [s]; null without one"""

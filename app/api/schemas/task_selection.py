@@ -112,7 +112,7 @@ class TaskSelectionRequest(Body):
 
 
 class OutOfRangeInput(Answer):
-    """An input outside the training range, or a joint outside its limits: ``OutsideField``."""
+    """An input outside the training range, or a joint outside its limits."""
 
     model_config = ConfigDict(frozen=True, from_attributes=True)
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from app.sim.core.arrays import Vec
 from app.sim.core.kernels.bounds import are_inside
-from app.sim.core.out_of_range import OutsideField
+from app.sim.core.out_of_range import OutOfRangeValue
 from app.sim.human.person import Person
 
 SLACK = 0.02
@@ -49,7 +49,7 @@ class TrainedValues:
 
     def outside(
         self, state: Vec, seen: Iterable[PersonValues], order: Sequence[int]
-    ) -> tuple[OutsideField, ...]:
+    ) -> tuple[OutOfRangeValue, ...]:
         """Return the inputs outside the training range, each field once.
 
         Args:
@@ -62,7 +62,7 @@ class TrainedValues:
 
     def _of(
         self, state: Vec, who: int | None, seen: Vec, order: Sequence[int]
-    ) -> list[OutsideField]:
+    ) -> list[OutOfRangeValue]:
         """Return the variables of the state and of one person outside the range."""
         values = np.concatenate((state, seen))
         if are_inside(values, self._least, self._most):
@@ -73,7 +73,7 @@ class TrainedValues:
             names += tuple(f"people[{order[who]}].{name}" for name in HUMAN)
         wrong = np.flatnonzero(~inside).tolist()
         found = [
-            OutsideField(
+            OutOfRangeValue(
                 field=names[i],
                 value=float(values[i]),
                 low=float(self._low[i]),
@@ -83,7 +83,7 @@ class TrainedValues:
             if i < len(names)
         ]
         if len(found) < len(wrong):
-            found.append(OutsideField(field="people", value=0.0, low=1.0, high=4.0))
+            found.append(OutOfRangeValue(field="people", value=0.0, low=1.0, high=4.0))
         return found
 
 

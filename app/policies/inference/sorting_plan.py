@@ -21,7 +21,7 @@ from app.errors import InvalidInput
 from app.policies.inference.task_selection import HYSTERESIS, LEAST_SUCCESS
 from app.sim.cells.cell import Cell
 from app.sim.core.arrays import Vec
-from app.sim.core.out_of_range import OutsideField
+from app.sim.core.out_of_range import OutOfRangeValue
 from app.sim.human.person import Person
 from app.sim.pick.batch import step_robot, target_configurations
 from app.sim.pick.kernels.grasp import LIFT
@@ -81,7 +81,7 @@ class MotionEstimate:
     """Value ``Q(s, pi(s))``."""
     outcome: OutcomeEstimate | None
     """Predicted outcome; None where the checkpoint predicts none."""
-    outside: tuple[OutsideField, ...]
+    outside: tuple[OutOfRangeValue, ...]
     """Coordinates of the target outside the training range."""
 
 

@@ -9,7 +9,7 @@ from app.policies.inference.value_networks import pick_preset_of
 from app.policies.networks.pick import STATE_SIZES
 from app.sim.core.arrays import Vec
 from app.sim.core.kernels.bounds import are_inside
-from app.sim.core.out_of_range import OutsideField
+from app.sim.core.out_of_range import OutOfRangeValue
 from app.sim.human import model as human
 from app.sim.human.person import Person
 from app.sim.robot import ur10 as robot
@@ -43,7 +43,7 @@ class TrainedRanges:
 
     def of_state(
         self, q: Vec, qd: Vec, person: Person, index: int | None
-    ) -> tuple[OutsideField, ...]:
+    ) -> tuple[OutOfRangeValue, ...]:
         """Return the fields of robot and observed person outside the range.
 
         Args:
@@ -67,19 +67,19 @@ class TrainedRanges:
             *self._outside("human_qd", person.qd, f"{path}.qd", human.JOINT_NAMES),
         )
 
-    def of_goals(self, goals: Vec) -> tuple[tuple[OutsideField, ...], ...]:
+    def of_goals(self, goals: Vec) -> tuple[tuple[OutOfRangeValue, ...], ...]:
         """Return the coordinates of each target outside the range, shape (n, 3) [m]."""
         low, high = self._goal
         if are_inside(goals.ravel(), low, high):
             return ((),) * len(goals)
-        found: list[tuple[OutsideField, ...]] = [()] * len(goals)
+        found: list[tuple[OutOfRangeValue, ...]] = [()] * len(goals)
         for i in np.flatnonzero(((goals < low) | (goals > high)).any(axis=1)).tolist():
             found[i] = self._outside("goal", goals[i], "position", ("x", "y", "z"))
         return tuple(found)
 
     def _outside(
         self, key: str, values: Vec, path: str, names: Sequence[str]
-    ) -> tuple[OutsideField, ...]:
+    ) -> tuple[OutOfRangeValue, ...]:
         if key not in self._low or len(self._low[key]) != len(values):
             return ()
         low, high = self._low[key], self._high[key]
@@ -87,7 +87,7 @@ class TrainedRanges:
             values > self._bound(key, len(values), False)
         )
         return tuple(
-            OutsideField(
+            OutOfRangeValue(
                 field=f"{path}.{names[i]}",
                 value=float(values[i]),
                 low=float(low[i]),

@@ -64,9 +64,9 @@ class QuantileCritics(Critics):
         shares = torch.full((len(obs),), 1.0 / len(obs))
         if weights is not None:
             shares = shares * weights.squeeze(1)
-        said = [quantiles.float() for quantiles in self.forward(obs, act)]
-        loss = torch.stack([quantile_loss(one, target, shares) for one in said]).sum()
-        means = torch.stack([one.detach().mean(dim=1) for one in said]).mean(dim=0)
+        predicted = [quantiles.float() for quantiles in self.forward(obs, act)]
+        loss = torch.stack([quantile_loss(one, target, shares) for one in predicted]).sum()
+        means = torch.stack([one.detach().mean(dim=1) for one in predicted]).mean(dim=0)
         return loss, (means - target.mean(dim=1)).abs()
 
 
@@ -88,9 +88,9 @@ class _QuantileLoss(torch.autograd.Function):
     @staticmethod
     def forward(ctx: Any, quantiles: Tensor, target: Tensor, shares: Tensor) -> Tensor:
         gradient = np.zeros(quantiles.shape, dtype=np.float32)
-        said = np.ascontiguousarray(quantiles.detach().numpy())
-        wanted = np.ascontiguousarray(target.numpy())
-        loss = _tilted_huber(said, wanted, shares.numpy(), gradient)
+        predicted = np.ascontiguousarray(quantiles.detach().numpy())
+        target_values = np.ascontiguousarray(target.numpy())
+        loss = _tilted_huber(predicted, target_values, shares.numpy(), gradient)
         ctx.save_for_backward(torch.from_numpy(gradient))
         return torch.tensor(loss, dtype=torch.float32)
 
@@ -101,21 +101,21 @@ class _QuantileLoss(torch.autograd.Function):
 
 @kernel(error_model="numpy", fastmath=FAST | {"reassoc"})
 def _tilted_huber(
-    said: NDArray[np.float32],
-    wanted: NDArray[np.float32],
+    predicted: NDArray[np.float32],
+    target_values: NDArray[np.float32],
     shares: NDArray[np.float32],
     gradient: NDArray[np.float32],
 ) -> float:
-    """Return the loss and write its gradient by ``said``, shape (B, n)."""
-    n, k_all = said.shape[1], wanted.shape[1]
+    """Return the loss and write its gradient by ``predicted``, shape (B, n)."""
+    n, k_all = predicted.shape[1], target_values.shape[1]
     total = 0.0
-    for row in range(said.shape[0]):
+    for row in range(predicted.shape[0]):
         share = shares[row] / np.float32(n * k_all)
         for i in range(n):
-            level, value = np.float32((i + 0.5) / n), said[row, i]
+            level, value = np.float32((i + 0.5) / n), predicted[row, i]
             loss, slope = np.float32(0.0), np.float32(0.0)
             for k in range(k_all):
-                error = wanted[row, k] - value
+                error = target_values[row, k] - value
                 tilt = level if error >= 0.0 else np.float32(1.0) - level
                 cut = min(np.float32(1.0), max(np.float32(-1.0), error))
                 loss += tilt * cut * (error - np.float32(0.5) * cut)

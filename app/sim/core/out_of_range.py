@@ -5,7 +5,7 @@ from typing import Literal
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class OutsideField:
+class OutOfRangeValue:
     """One input outside what the checkpoint was trained on, or a joint outside its limits."""
 
     field: str

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.sim.core.arrays import Vec
-from app.sim.core.out_of_range import OutsideField
+from app.sim.core.out_of_range import OutOfRangeValue
 from app.sim.core.policy_identity import PolicyIdentity
 from app.sim.human.person import Person
 from app.sim.pick.kernels.grasp import APPROACH, GraspRules
@@ -64,9 +64,9 @@ class Decision:
     """Joint speeds of these actions [rad/s], shape (n, 6)."""
     reachable: tuple[bool, ...]
     """Whether a configuration with vertical tool exists for each candidate."""
-    outside: tuple[OutsideField, ...]
+    outside: tuple[OutOfRangeValue, ...]
     """Fields of the state outside the joint limits or the training range."""
-    outside_candidates: tuple[tuple[OutsideField, ...], ...]
+    outside_candidates: tuple[tuple[OutOfRangeValue, ...], ...]
     """The same for each candidate's position."""
     checkpoint: str
     """SHA-256 of the checkpoint."""

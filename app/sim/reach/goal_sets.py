@@ -26,7 +26,7 @@ from app.sim.cells.parts import GoalRegion
 from app.sim.core.arrays import Vec
 from app.sim.core.jit import direct
 from app.sim.core.kernels.bounds import are_inside
-from app.sim.core.out_of_range import OutsideField
+from app.sim.core.out_of_range import OutOfRangeValue
 from app.sim.reach.kernels.interpolation_weights import (
     N_BOX,
     N_SIMPLEX,
@@ -121,7 +121,7 @@ def _inside(low: Vec, high: Vec, goals: Vec, field: str) -> Vec:
     return held
 
 
-def outside_of(goal: Vec, low: Vec, high: Vec, field: str) -> tuple[OutsideField, ...]:
+def outside_of(goal: Vec, low: Vec, high: Vec, field: str) -> tuple[OutOfRangeValue, ...]:
     """Return the axes along which a goal lies outside a box.
 
     Args:
@@ -131,7 +131,7 @@ def outside_of(goal: Vec, low: Vec, high: Vec, field: str) -> tuple[OutsideField
         field: Name of the goal in error messages.
     """
     return tuple(
-        OutsideField(
+        OutOfRangeValue(
             field=f"{field}.{axis}",
             value=float(goal[i]),
             low=float(low[i]),

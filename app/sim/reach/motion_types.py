@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Literal, NamedTuple, get_args
 
 from app.sim.core.arrays import Vec
-from app.sim.core.out_of_range import OutsideField
+from app.sim.core.out_of_range import OutOfRangeValue
 from app.sim.human.person import Person
 from app.sim.robot.trajectory_segment import TrajectorySegment
 from app.sim.safety.decision import SafetyDecision, SeparationTerms
@@ -104,9 +104,9 @@ class MotionDecision(NamedTuple):
     """tcp to goal [m]."""
     beyond_reach: float
     """Distance of the goal beyond the reach of the arm [m]; 0 within reach."""
-    state_outside: tuple[OutsideField, ...]
+    state_outside: tuple[OutOfRangeValue, ...]
     """Measured joints outside their limits; the policy observes them clipped."""
-    outside: tuple[OutsideField, ...]
+    outside: tuple[OutOfRangeValue, ...]
     """Inputs outside the training range."""
     checkpoint: str
     """SHA-256 of the checkpoint."""

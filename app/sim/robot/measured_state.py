@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 from app.errors import InvalidInput, interval
 from app.sim.core.arrays import Vec, as_kernel_array
 from app.sim.core.kernels.bounds import are_inside
-from app.sim.core.out_of_range import OutsideField
+from app.sim.core.out_of_range import OutOfRangeValue
 from app.sim.robot.kernels.arm import Arm
 from app.sim.robot.kernels.joints import JointLimits
 from app.sim.robot.kernels.override import stop_time
@@ -64,7 +64,7 @@ class MeasuredState(NamedTuple):
     """As given."""
     clamped: Joints
     """Inside the limits: what policies see; the same object where nothing is outside."""
-    outside: tuple[OutsideField, ...]
+    outside: tuple[OutOfRangeValue, ...]
     """Joints outside, with their limits."""
 
 
@@ -116,7 +116,7 @@ class StateLimits:
         inside = (self._low - SLACK <= state) & (state <= self._high + SLACK)
         self._require_near(state)
         outside = tuple(
-            OutsideField(
+            OutOfRangeValue(
                 field=f"robot.{PARTS[part][0]}.{JOINT_NAMES[joint]}",
                 value=float(state[part, joint]),
                 low=float(self._low[part, joint]),

@@ -53,15 +53,15 @@ def test_weights_scale_the_loss_of_their_rows():
 
 def test_loss_and_gradient_are_those_of_the_printed_formula():
     torch.manual_seed(3)
-    said = (3.0 * torch.randn(40, 7)).requires_grad_()
+    predicted = (3.0 * torch.randn(40, 7)).requires_grad_()
     target, shares = 3.0 * torch.randn(40, 11), torch.rand(40)
     levels = (torch.arange(7) + 0.5) / 7
-    error = target[:, None, :] - said[:, :, None]
+    error = target[:, None, :] - predicted[:, :, None]
     huber = torch.where(error.abs() > 1.0, error.abs() - 0.5, 0.5 * error**2)
     tilted = (levels[None, :, None] - (error < 0.0).float()).abs() * huber
     printed = (shares * tilted.mean(dim=(1, 2))).sum()
-    expected = torch.autograd.grad(printed, said)[0]
-    loss = quantile_loss(said, target, shares)
-    found = torch.autograd.grad(loss, said)[0]
+    expected = torch.autograd.grad(printed, predicted)[0]
+    loss = quantile_loss(predicted, target, shares)
+    found = torch.autograd.grad(loss, predicted)[0]
     assert loss.item() == pytest.approx(printed.item(), rel=1e-5)
     torch.testing.assert_close(found, expected, rtol=1e-4, atol=1e-6)
