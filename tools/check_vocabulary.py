@@ -13,6 +13,7 @@ import subprocess
 import sys
 import tokenize
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 ROOT = (
@@ -74,14 +75,16 @@ TOKEN = re.compile(r"[A-Za-z_$][\w$]*(?:-[A-Za-z]\w*)*")
 PART = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+")
 
 
-def parts(token: str) -> list[str]:
+@cache
+def parts(token: str) -> tuple[str, ...]:
     """Return the words an identifier is made of, in lower case."""
-    return [part.lower() for part in PART.findall(token)]
+    return tuple(part.lower() for part in PART.findall(token))
 
 
-def in_name(token: str) -> list[str]:
+@cache
+def in_name(token: str) -> tuple[str, ...]:
     """Return the banned words in an identifier."""
-    return [part for part in parts(token) if WORDS.fullmatch(part) or NAMES.fullmatch(part)]
+    return tuple(one for one in parts(token) if WORDS.fullmatch(one) or NAMES.fullmatch(one))
 
 
 def in_text(text: str) -> Iterator[str]:

@@ -109,9 +109,9 @@ def test_longer_predictions_agree_with_shorter_ones() -> None:
 
 
 def test_constraint_reduces_stops_and_contacts_beside_crossing_people() -> None:
-    """Twelve crossings that are not evaluated elsewhere."""
+    """Six crossings that are not evaluated elsewhere."""
     settings = ReachSettings(action=ACTOR.action, observation=ACTOR.view)
-    comparison = Comparison(CELL, crossings(CELL, 12, seed=77), settings, MEASURED, seed=11)
+    comparison = Comparison(CELL, crossings(CELL, 6, seed=77), settings, MEASURED, seed=11)
     direct = controller_of(ACTOR, "direct")
     agnostic, aware = (
         comparison.policy(RolloutController(direct, ACTOR, layer)).episodes

@@ -47,7 +47,7 @@ def trained(preset, stop_at: int | None = None) -> Recorder:
 
 @pytest.mark.parametrize("name", ["sorting-e0-thesis", "sorting-e1-thesis"])
 def test_sorting_recipe_gains_over_moving_nothing(name: str) -> None:
-    preset = short(name, 2_400, {"learning.progress_episodes": 60})
+    preset = short(name, 1_600, {"learning.progress_episodes": 60})
     assert trained(preset).progress[-1].reward > moving_nothing(preset)
 
 
