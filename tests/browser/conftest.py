@@ -43,15 +43,14 @@ FEW_PICTURES = """if (location.pathname.includes("/viewer/")) {
     const draw = context[name];
     context[name] = function (...all) { return skips ? undefined : draw.apply(this, all); };
   }
-  window.requestAnimationFrame = (act) => setTimeout(() => frame.call(window, (now) => {
+  window.requestAnimationFrame = (act) => frame.call(window, (now) => {
     if (now - last >= 2000) last = now;
     skips = now !== last;
     act(now);
-  }), 250);
+  });
 }"""
-"""Lets Chromium draw the scene's pictures every 2 s, and compose the page with them at most four
-times a second. The viewer still makes all its calls, but software needs 0.3 s of a core for each
-picture and half a core for composing, and does both without a pause."""
+"""Lets Chromium draw the scene's pictures every 2 s. The viewer still makes all its calls, but
+software needs 0.3 s of a core for each picture and draws without a pause."""
 
 OpenPage = Callable[..., Page]
 
