@@ -96,8 +96,9 @@ function recalibration(record) {
   return { "Recalibrated by": `${n} outcomes, from ${format.short(record.from)}` };
 }
 
+/** Names and values; those that are unknown are left out. */
 function Facts({ entries }) {
-  return html`<dl class="facts">${entries.map(([name, text]) => html`<div key=${name}>
+  return html`<dl class="facts">${entries.filter(([, text]) => text !== "–").map(([name, text]) => html`<div key=${name}>
     <dt>${name}</dt><dd>${text}</dd></div>`)}</dl>`;
 }
 

@@ -282,9 +282,14 @@ function Speed({ job, row }) {
         : `${format.duration(job.run_s)} of ${format.duration(job.time_budget_s)}`],
     ].filter(([, text]) => text !== "–").map(([name, text]) => html`<div key=${name}>
       <dt>${name}</dt><dd>${text}</dd></div>`)}
-    ${changed.map(([name, v]) => html`<div key=${name}><dt>${name}</dt>
+    ${changed.map(([name, v]) => html`<div key=${name}><dt>${breakable(name)}</dt>
       <dd>${typeof v === "number" ? format.number(v, 6) : JSON.stringify(v)}</dd></div>`)}
   </dl>`;
+}
+
+/** A field's name that a line may break after a dot or an underscore. */
+function breakable(name) {
+  return name.split(/(?<=[._])/).map((part) => html`${part}<wbr />`);
 }
 
 /** The curve of one job: what is stored, then what its event stream adds. */
