@@ -17,7 +17,7 @@ from jobs.supervisor import Supervisor, Timeouts
 from tests.jobs.counting_worker import CHECKPOINT_EVERY, FACTOR, GRID, MODULUS
 from tests.support import waiting
 
-PATIENCE = Timeouts(tick_s=0.05, cancel_s=1.0, shutdown_s=5.0)
+PATIENCE = Timeouts(tick_s=0.1, cancel_s=1.0, shutdown_s=5.0)
 WAIT_S = 600.0
 """Far above what anything takes, compiling kernels included; only a hang reaches it."""
 wait_until = partial(waiting.wait_until, within_s=WAIT_S)
