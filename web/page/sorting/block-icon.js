@@ -29,5 +29,5 @@ export function capital(text) {
 }
 
 export function plural(n, one, many = `${one}s`) {
-  return `${n} ${n === 1 ? one : many}`;
+  return `${n} ${Number(n) === 1 ? one : many}`;
 }

@@ -32,7 +32,7 @@ function progress(sorting, wanted) {
   const done = sorting.goal.filter((one) => one.done).length;
   const { moves_to_go: moves, attempts_to_go: attempts } = sorting;
   const rest = Number.isFinite(moves) && moves > 0
-    ? ` ${capital(plural(moves, "move"))} to go, about ${format.number(attempts, 2)} grasps.` : "";
+    ? ` ${capital(plural(moves, "move"))} to go, about ${plural(format.number(attempts, 2), "grasp")}.` : "";
   return `${done} of ${plural(wanted, "block")} in place.${rest}`;
 }
 
