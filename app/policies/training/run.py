@@ -93,7 +93,7 @@ class TrainingRun:
     ) -> None:
         self.preset, self.seed, self.cell = preset, seed, cell
         self.model, self._env, self._parts = model, env, parts
-        # The default one, though it writes nothing here, leaves a folder per training in /tmp.
+        # Stable-Baselines3's own makes a folder in /tmp, even where it writes nothing.
         model.set_logger(Logger(None, []))
         self._cpu_before, self._cpu_start = 0.0, time.process_time()
         self._untimed = 0.0

@@ -10,16 +10,16 @@ pytestmark = pytest.mark.xdist_group("trials-of-the-safety-layer")
 
 @pytest.fixture(scope="module")
 def result():
-    return evaluate("safety-ssm", None, episodes=100, seed=3)
+    return evaluate("safety-ssm", None, episodes=160, seed=3)
 
 
 def test_only_rows_outside_the_assumptions_have_moving_contacts(result):
     rows = {row["name"]: row for row in result["results"]}
-    assert rows["inside"]["contacts"] > 25
+    assert rows["inside"]["contacts"] > 40
     assert rows["inside"]["contacts_moving"] == rows["touch-limited"]["contacts_moving"] == 0
     assert rows["no-ssm"]["contacts_moving"] > 0
     assert rows["late-tracker"]["contacts_moving"] > 0
-    assert rows["inside"]["n"] == result["episodes"] == 100
+    assert rows["inside"]["n"] == result["episodes"] == 160
 
 
 def test_every_row_states_what_it_assumes_and_what_is_true(result):
