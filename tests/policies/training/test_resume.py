@@ -231,7 +231,9 @@ def test_a_training_leaves_no_temporary_files(
     temporary.mkdir()
     monkeypatch.setattr(tempfile, "tempdir", str(temporary))
     Training(small("DQN"), tmp_path / "states").run()
-    assert not list(temporary.iterdir())
+    # PyTorch makes one for each user, when its optimisers are used first in a process.
+    made = {one.name for one in temporary.iterdir()}
+    assert not {name for name in made if not name.startswith("torchinductor_")}
 
 
 COUNTED_BY_CALLBACK = {
