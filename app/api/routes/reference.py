@@ -21,7 +21,7 @@ MAX_DEPTH = 4
 STYLE = """
 :root { color-scheme: light dark; --faint: light-dark(#5a6472, #9aa5b4);
   --line: light-dark(#dde3ea, #2c3440); --tint: light-dark(#f4f7fa, #171d25);
-  --accent: light-dark(#1f5fbf, #7db2ff); }
+  --accent: light-dark(#0a726b, #35c4b5); }
 body { font: 15px/1.5 system-ui, sans-serif; max-width: 62rem; margin: 2rem auto;
   padding: 0 1.2rem; background: light-dark(#fff, #10151c);
   color: light-dark(#1b222c, #e3e9f1) }
@@ -30,7 +30,7 @@ h1 { font-size: 1.5rem; margin: 0 } h2 { font-size: 1.05rem; margin: 2.2rem 0 .5
 details { border: 1px solid var(--line); border-radius: 8px; margin: .4rem 0 }
 summary { padding: .5rem .8rem; cursor: pointer } details > div { padding: .2rem .8rem .8rem;
   border-top: 1px solid var(--line) } code { font: 13px ui-monospace, monospace }
-.method { display: inline-block; width: 3.6rem; font-weight: 600; color: var(--accent) }
+.method { display: inline-block; min-width: 4.6rem; font-weight: 600; color: var(--accent) }
 table { border-collapse: collapse; width: 100%; margin: .3rem 0 }
 td { padding: .2rem .6rem .2rem 0; vertical-align: top; border-bottom: 1px solid var(--line) }
 td:first-child { white-space: nowrap } h3 { font-size: .85rem; margin: .8rem 0 0;
