@@ -102,6 +102,18 @@ def test_numbers_are_written_with_interval_deviation_or_unit():
     assert said == "30.0 % after 4.00 M steps, 2 seeds"
     one = curve_end({"curves": curves[:1]}, "p", "reward", "points")
     assert one == "-2.00 after 4.00 M steps, 1 seed"
+
+    def curve(*points):
+        played = [{"step": n, "success": share, "reward": r} for n, share, r in points]
+        return {"name": "p", "played": played}
+
+    learns = curve((500_000, 0.1, -5.0), (4_000_000, 0.4, -2.0))
+    frozen = curve((500_000, 0.0, -9.0), (1_000_000, 0.0, -9.0))
+    said = curve_end({"curves": [learns, frozen]}, "p", "success")
+    assert said == "20.0 % after 4.00 M steps, 2 seeds"
+    stopped = curve((500_000, 0.0, -9.0), (1_000_000, 0.0, -9.5))
+    said = curve_end({"curves": [learns, stopped]}, "p", "success")
+    assert said == "5.0 % after 1.00 M steps, 2 seeds"
     still = {"curves": [{"name": "p", "played": [], "standing_still": -3.0}]}
     assert curve_end(still, "p", "standing_still") == "-3.00"
     assert curve_end(still, "p", "success") is None

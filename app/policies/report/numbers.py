@@ -39,7 +39,8 @@ def stored_value(found: Json, row: str, key: str, unit: str = "") -> str | None:
 def curve_end(found: Json, preset: str, key: str, unit: str = "", task: str = "") -> str | None:
     """Return the last point of learning curves, as the mean over seeds; None without one.
 
-    Curves of different lengths are compared at the end of the shortest.
+    Curves of different lengths are compared at the end of the shortest. A training that was
+    stopped because its policy had ceased to change counts as if it had gone on.
 
     Args:
         found: Content of the result file.
@@ -59,11 +60,22 @@ def curve_end(found: Json, preset: str, key: str, unit: str = "", task: str = ""
     points = [point for point in points if point and point[-1].get(key) is not None]
     if not points:
         return None
-    steps, seeds = min(point[-1]["step"] for point in points), len(points)
+    seeds, lengths = len(points), [point[-1]["step"] for point in points]
+    learning = [n for n, point in zip(lengths, points, strict=True) if not _has_ceased(point)]
+    steps = min(learning or lengths)
     ends = [[one for one in point if one["step"] <= steps][-1] for point in points]
     mean = sum(end[key] for end in ends) / seeds
     text = f"{mean:.2f}" if unit else f"{100.0 * mean:.1f} %"
     return f"{text} after {steps / 1e6:.2f} M steps, {seeds} seed{'s'[: seeds > 1]}"
+
+
+def _has_ceased(points: list[Json]) -> bool:
+    """Return whether the last two points of a curve have the same episodes to all digits."""
+    if len(points) < 2 or "reward" not in points[-1]:
+        return False
+    keys = "success", "collision", "timeout", "reward"
+    before, last = ([point.get(key) for key in keys] for point in points[-2:])
+    return before == last
 
 
 def preset_value(preset: str, path: str, factor: str = "1") -> str:
