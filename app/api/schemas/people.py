@@ -51,7 +51,7 @@ UNUSABLE = (
 )
 IMPLAUSIBLE = (
     "reason why the key-points are impossible in this frame (`foreign-frame`): another frame "
-    "or unit; null where they are possible"
+    "or unit, or none usable; null where they are possible"
 )
 
 

@@ -6,7 +6,8 @@ points; only a wrong number of points is an error.
 :func:`why_implausible` detects skeletons in another frame (of a camera; with the floor as
 origin) or unit by bone lengths, heights of body parts over the floor, and pose. It accepts
 people who stand, bend, kneel, sit, lie on the floor or on a table, reach up, or stand on a step
-of half a metre. An implausible skeleton counts as unseen. Bounds are ours.
+of half a metre. An implausible skeleton counts as unseen, and so does one without a usable
+key-point. Bounds are ours.
 """
 
 from dataclasses import dataclass
@@ -14,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from app.errors import InvalidInput
+from app.errors import InvalidInput, digits
 from app.sim.core.arrays import Vec
 from app.sim.human.kernels.kinematics import MEDIAN_TRUNK
 from app.sim.perception.keypoints import BODY_25, FARTHEST_M, N_KEYPOINTS, K
@@ -84,8 +85,8 @@ class Keypoints:
     unusable: tuple[str, ...] = ()
     """Names of key-points dropped because of unusable values."""
     implausible: str | None = None
-    """Reason why the key-points cannot be in the cell's frame, in which case all are missing;
-    None if they can."""
+    """Reason why the key-points cannot be in the cell's frame, or none is usable, in which
+    case all are missing; None otherwise."""
 
     @property
     def seen(self) -> NDArray[np.bool_]:
@@ -127,7 +128,7 @@ def check_keypoints(
     missing = np.isnan(points).all(axis=1) | np.isnan(trust)
     for placeholder in _PLACEHOLDERS:
         missing |= (points == placeholder).all(axis=1)
-    beyond = (trust < -_TRUST_SLACK) | (trust > 1.0 + _TRUST_SLACK)
+    given, beyond = trust, (trust < -_TRUST_SLACK) | (trust > 1.0 + _TRUST_SLACK)
     unusable = beyond | ~np.isfinite(points).all(axis=1)
     trust = np.clip(np.nan_to_num(trust, nan=0.0), 0.0, 1.0)
     points = np.clip(points, -_HUGE, _HUGE)
@@ -137,6 +138,8 @@ def check_keypoints(
     missing |= unusable
     points[missing], trust[missing] = np.nan, 0.0
     implausible = why_implausible(points, floor_z)
+    if missing.all() and unusable.any():
+        implausible = _why_unusable(given[unusable & beyond], int(unusable.sum()))
     outliers = _outliers(points, ~missing) if implausible is None else np.arange(N_KEYPOINTS)
     points[outliers], trust[outliers] = np.nan, 0.0
     return Keypoints(
@@ -146,6 +149,20 @@ def check_keypoints(
         unusable=_names(np.flatnonzero(unusable)),
         implausible=implausible,
     )
+
+
+def _why_unusable(confidences: Vec, n_unusable: int) -> str:
+    """Return the reason why no key-point is usable.
+
+    Args:
+        confidences: Those outside [0, 1].
+        n_unusable: Number of unusable key-points; the others are missing.
+    """
+    if len(confidences) < n_unusable:
+        return f"no key-point has three finite coordinates within {FARTHEST_M:g} m"
+    low, high = (digits(float(one)) for one in (confidences.min(), confidences.max()))
+    percent = " (are these percent?)" if 2.0 <= confidences.max() <= 100.0 else ""
+    return f"all confidences are outside [0, 1]: {low} to {high}{percent}"
 
 
 def _names(indices: NDArray[np.intp]) -> tuple[str, ...]:

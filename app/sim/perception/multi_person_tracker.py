@@ -10,7 +10,8 @@ previous frame and nearer to the robot's base than the farthest tracked person b
 ``NEARER_M`` takes over that track (``replaced``). The margin exceeds the noise of a tracker, so
 that two people at equal distance do not alternate. All others are listed
 (:class:`UnassignedDetection`, ``people-dropped``). A skeleton that cannot stand in the cell's
-frame is assigned to no track; tracks not seen in that frame are flagged ``foreign-frame``.
+frame, or has no usable key-point, is assigned to no track; tracks not seen in that frame are
+flagged ``foreign-frame``.
 """
 
 import math

@@ -88,11 +88,12 @@ class Scene:
             turned = points @ np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0]]).T + [0.0, 0.0, 2.0]
             points = 1000.0 * points if self.rng.uniform() < 0.5 else turned
         people = [] if event == "empty" else [points]
+        trust = np.full(25, 90.0 if event == "percent" else 1.0)
         try:
-            self.session.take(stamp, self.now, people, [np.ones(25)] * len(people))
+            self.session.take(stamp, self.now, people, [trust] * len(people))
         except ClockJump:
             return
-        if people and event != "foreign":
+        if people and event not in ("foreign", "percent"):
             self.shown = self.posture(), self.now
 
     def watch(self, n_frames: int) -> None:
@@ -211,13 +212,16 @@ def test_a_camera_that_died_stops_the_robot(silence: float) -> None:
         assert answer.safety.override == 0.0
 
 
+@pytest.mark.parametrize("event", ["foreign", "percent"])
 @pytest.mark.parametrize("seen_before", [False, True])
-def test_a_tracker_of_another_frame_stops_the_robot(seen_before: bool) -> None:
+def test_a_tracker_of_another_frame_or_confidence_stops_the_robot(
+    seen_before: bool, event: str
+) -> None:
     scene = Scene(np.random.default_rng(5))
     scene.place = np.array([0.0, 2.6])
     for k in range(60):
         scene.now += DT
-        scene.frame(scene.now, "frame" if seen_before and k < 30 else "foreign")
+        scene.frame(scene.now, "frame" if seen_before and k < 30 else event)
     (person,) = (answer := decide_beside(scene)).people
     assert {"foreign-frame", "stale"} <= set(person.flags) and person.implausible
     assert answer.safety is not None and answer.safety.override == 0.0

@@ -87,6 +87,26 @@ def test_most_points_unusable_leave_the_others() -> None:
     assert frame.implausible is None and frame.seen.sum() == K["mid_hip"]
 
 
+@pytest.mark.parametrize(
+    ("point", "trust", "text"),
+    [
+        ([0.1, 1.0, 0.2], 87.0, "all confidences are outside [0, 1]: 87 to 87 (are these perc"),
+        ([0.1, 1.0, 0.2], -1.0, "all confidences are outside [0, 1]: -1 to -1"),
+        ([320.0, 240.0, NAN], 1.0, "no key-point has three finite coordinates within 100 m"),
+        ([INF] * 3, 87.0, "all confidences are outside [0, 1]"),
+    ],
+)
+@pytest.mark.parametrize("n_missing", [0, 20])
+def test_a_person_without_a_usable_point_is_not_taken_for_an_absent_one(
+    point: list[float], trust: float, text: str, n_missing: int
+) -> None:
+    points, confidences = np.tile(point, (25, 1)), np.full(25, trust)
+    points[:n_missing], confidences[:n_missing] = NAN, 1.0
+    frame = check_keypoints(points, confidences, floor_z=FLOOR)
+    assert not frame.seen.any() and frame.unusable == BODY_25[n_missing:]
+    assert frame.outliers == () and text in str(frame.implausible)
+
+
 def test_all_missing_is_a_frame_without_anybody() -> None:
     for points in (np.full((25, 3), NAN), np.zeros((25, 3)), np.full((25, 3), -1.0)):
         frame = check_keypoints(points, floor_z=FLOOR)
