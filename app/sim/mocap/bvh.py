@@ -33,6 +33,8 @@ MIN_DT, MAX_DT = 1e-3, 0.1
 
 _CHANNELS = ("Xposition", "Yposition", "Zposition", "Xrotation", "Yrotation", "Zrotation")
 _WORDS = ("HIERARCHY", "ROOT", "JOINT", "End", "OFFSET", "CHANNELS", "{", "}")
+_KEYWORDS = {word.lower(): word for word in (*_WORDS, *_CHANNELS, "MOTION")}
+"""Keywords by their lower case: other programs write and read them in any case."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -77,7 +79,7 @@ def read_bvh(text: str) -> Bvh:
         BadRecording: The text is not a valid BVH file; the faults name lines.
     """
     lines = lines_of(text)
-    start = next((k for k, line in enumerate(lines) if line.split()[:1] == ["MOTION"]), None)
+    start = next((k for k, line in enumerate(lines) if _first_word(line) == "MOTION"), None)
     if start is None:
         rule = "has no line MOTION, which precedes the frames"
         raise bad(len(lines), "", rule, "the file is cut off or not a BVH file")
@@ -255,10 +257,10 @@ def _frame_lines(head: list[tuple[int, str]], n_lines: int) -> tuple[int, float]
     texts = [*head, (n_lines, ""), (n_lines, "")][:2]
     found = []
     for (line, text), name in zip(texts, ("Frames:", "Frame Time:"), strict=True):
-        rest = text.strip()
-        if not rest.startswith(name):
-            raise bad(line, shown(rest), f'must be "{name}" with a number')
-        word = rest[len(name) :].strip()
+        start, colon, rest = text.partition(":")
+        if not colon or start.lower().split() != name[:-1].lower().split():
+            raise bad(line, shown(text.strip()), f'must be "{name}" with a number')
+        word = rest.strip()
         rule = _number_rule(word)
         if rule:
             raise bad(line, shown(word), rule, _comma_hint(word))
@@ -266,6 +268,16 @@ def _frame_lines(head: list[tuple[int, str]], n_lines: int) -> tuple[int, float]
     if found[0] < 0.0 or found[0] != int(found[0]):
         raise bad(texts[0][0], f"{found[0]:g}", "must be a whole number of frames")
     return int(found[0]), check_dt(found[1], f"line {texts[1][0]}, Frame Time")
+
+
+def _first_word(line: str) -> str:
+    """Return the first word of a line, a keyword as in ``_WORDS``."""
+    return next((_keyword(word) for word in line.split()[:1]), "")
+
+
+def _keyword(word: str) -> str:
+    """Return a word, or the keyword that it is in any case."""
+    return _KEYWORDS.get(word.lower(), word)
 
 
 def _words(lines: list[str]) -> Iterator[tuple[int, str]]:
@@ -285,11 +297,11 @@ class _Tree:
 
     def read(self) -> tuple[BvhJoint, ...]:
         """Return all joints, the root first."""
-        if self._next("HIERARCHY") != "HIERARCHY":
+        if _keyword(self._next("HIERARCHY")) != "HIERARCHY":
             raise bad(self._line, "", "must be HIERARCHY", "the file is not a BVH file")
-        self._open_joint(self._next("ROOT"))
+        self._open_joint(_keyword(self._next("ROOT")))
         while self._open:
-            self._part(self._next("} or JOINT"))
+            self._part(_keyword(self._next("} or JOINT")))
         if self._ahead is not None:
             rule = "must be MOTION: a file must hold one skeleton"
             raise bad(self._ahead[0], shown(self._ahead[1]), rule)
@@ -341,7 +353,7 @@ class _Tree:
         count = self._number()
         if count not in range(7):
             raise bad(self._line, f"{count:g}", "must be 0 to 6 channels")
-        names = tuple(self._next("a channel") for _ in range(int(count)))
+        names = tuple(_keyword(self._next("a channel")) for _ in range(int(count)))
         for name in names:
             if name not in _CHANNELS or names.count(name) > 1:
                 rule = f"must be one of {', '.join(_CHANNELS)}, each once"
@@ -357,7 +369,7 @@ class _Tree:
 
     def _expect(self, word: str) -> None:
         found = self._next(word)
-        if found != word:
+        if _keyword(found) != word:
             raise bad(self._line, shown(found), f"must be {word}")
 
     def _next(self, wanted: str) -> str:

@@ -32,6 +32,11 @@ MAX_RADIANS = 8.0
 """Largest joint angle of a table in radians [rad]; larger ones indicate degrees."""
 MIN_DEGREES = 3.2
 """Least maximum of a table in degrees [deg]; a lower one indicates radians."""
+MAX_RISE = 0.5
+"""Largest median rise of the pelvis above its standing height [m]; a larger one indicates a
+height over the floor."""
+SAME_RATE = 0.05
+"""Relative difference of the declared rate and that of the times that counts as none."""
 MAX_PLACE = 100.0
 """Largest distance of the pelvis from the origin [m]."""
 
@@ -82,9 +87,11 @@ def read_csv(text: str, names: Mapping[str, str] | None = None) -> AngleTrack:
     require_places({name: sound[name] for name in ("pelvis_x", "pelvis_y")})
     pelvis_z = sound.get("pelvis_z", np.zeros(len(q)))
     require_places({"pelvis_z": pelvis_z}, most=2.0)
+    _require_rise(pelvis_z)
     times: Vec
     if "time" in sound:
         times = check_times(sound["time"], file.table, good)
+        _require_rate(times, file.declared)
     else:
         times = np.asarray(_dt(file.declared.get("rate_hz")) * np.flatnonzero(good))
     return AngleTrack(
@@ -137,11 +144,31 @@ def _check_units(file: CsvText, columns: Mapping[str, int], degrees: bool) -> No
             raise bad(f"column {name}", shown(unit), rule)
 
 
+def _require_rise(pelvis_z: Vec) -> None:
+    """Check that the pelvis's height is relative to standing."""
+    rise = float(np.median(pelvis_z))
+    if rise > MAX_RISE:
+        rule = f"is the median rise above standing; must be at most {MAX_RISE:g} m"
+        hint = "looks like the height over the floor: subtract that of standing"
+        raise bad("column pelvis_z", f"{rise:.4g}", rule, hint)
+
+
+def _require_rate(times: Vec, declared: Mapping[str, str]) -> None:
+    """Check that the times have the declared rate, if one is declared."""
+    if "rate_hz" not in declared:
+        return
+    dt, found = _dt(declared["rate_hz"]), float(np.median(np.diff(times)))
+    if abs(found - dt) > SAME_RATE * dt:
+        rule = f"must be the rate of the column time, {1.0 / found:.4g} Hz"
+        raise bad("rate_hz", shown(declared["rate_hz"]), rule, "delete the wrong one")
+
+
 def in_radians(angles: Mapping[str, Vec], degrees: bool) -> Vec:
-    """Return joint angles [rad], shape (n, number of columns).
+    """Return continuous joint angles [rad], shape (n, number of columns).
 
     Args:
-        angles: Columns by name, in the declared unit; the yaw is not bounded.
+        angles: Columns by name, in the declared unit; the yaw is not bounded. Angles may be
+            wrapped to one turn.
         degrees: Whether the declared unit is degrees.
 
     Raises:
@@ -165,7 +192,14 @@ def in_radians(angles: Mapping[str, Vec], degrees: bool) -> Vec:
         rule = "must be at most 720 degrees"
         raise bad(f"column {name}", f"{most:.4g}", rule)
     columns = np.stack(list(angles.values()), axis=1)
-    return np.radians(columns) if degrees else columns
+    return _continuous(np.radians(columns) if degrees else columns)
+
+
+def _continuous(angles: Vec) -> Vec:
+    """Return angles [rad] without jumps of a full turn; most keep their value, shape (n, k)."""
+    path = np.unwrap(angles, axis=0)
+    turns = np.median(path - angles, axis=0) / (2.0 * np.pi)
+    return np.asarray(path - 2.0 * np.pi * np.round(turns))
 
 
 def require_places(places: Mapping[str, Vec], most: float = MAX_PLACE) -> None:

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from app.sim.mocap.bvh import lines_of
-from app.sim.mocap.faults import bad
+from app.sim.mocap.faults import bad, shown
 from app.sim.mocap.tables import MAX_COLUMNS, MISSING, PADDING, TextTable, named_columns, plain
 
 SEPARATORS = (",", ";", "\t", "|")
@@ -21,6 +21,9 @@ INDEX_NAMES = frozenset(("index", "idx", "frame", "frameno", "framenumber", "row
 
 _ERRORS = tuple(word for word in MISSING if word.startswith("#"))
 """Error values of spreadsheets, which begin like a comment."""
+
+DECLARED = ("angles", "rate_hz")
+"""Declarations that are read."""
 
 Split = Callable[[str, int], list[str]]
 """Function of a line and a largest number of splits that returns the cells."""
@@ -64,14 +67,14 @@ def read_csv_text(text: str, known: Sequence[str]) -> CsvText:
     if rows and (below := _units_row(split(rows[0][1], len(names)))):
         units, rows = {**units, **below}, rows[1:]
     return CsvText(
-        declared=dict(_declaration(line) for _, line in comments),
+        declared=_declared(comments),
         table=TextTable(
             names=names,
             labels=tuple("" if _is_index(name) else name for name in names),
             line=head[0],
             rows=rows,
             split=split,
-            decimal=_decimal(split(line, len(names)) for _, line in rows[:50]),
+            decimal=_decimal(split(line, len(names)) for _, line in rows),
         ),
         units=units,
     )
@@ -125,6 +128,21 @@ def _split_at(separator: str | None) -> Split:
     return split
 
 
+def _declared(comments: Lines) -> dict[str, str]:
+    """Return the declarations in comments.
+
+    Raises:
+        BadRecording: Two comments declare different angles or rates.
+    """
+    found: dict[str, str] = {}
+    for number, line in comments:
+        key, value = _declaration(line)
+        if found.setdefault(key, value) != value and key in DECLARED:
+            rule = f"must be {found[key][:40]}, as {key} is declared before"
+            raise bad(f"line {number}, {key}", shown(value), rule)
+    return found
+
+
 def _declaration(line: str) -> tuple[str, str]:
     key, _, value = line.replace(":", "=").strip(PADDING).lstrip("# ").partition("=")
     return key.strip(PADDING).lower(), value.strip(PADDING).lower()
@@ -152,6 +170,7 @@ def _decimal(rows: Iterable[Sequence[str]]) -> str:
     """Return the decimal sign of a table: the last sign of its first non-integer number."""
     for cells in rows:
         for cell in cells:
-            if re.fullmatch(r"\s*[+-]?[\d.,'\s]*\d\s*", cell[:60]) and re.search("[.,]", cell):
+            is_whole = "." not in cell and "," not in cell
+            if not is_whole and re.fullmatch(r"\s*[+-]?[\d.,'\s]*\d\s*", cell[:60]):
                 return max(".,", key=cell.rfind)
     return "."

@@ -49,6 +49,8 @@ MAX_DEGREES_IN_RADIANS = 6.2832
 """Largest angle of a file in radians, or of one without motion."""
 MAX_FAR = 100.0
 """Largest distance of the pelvis from the file's origin [m]."""
+MIN_HIPS = 0.02
+"""Distance of the hips below which they have no direction [m]."""
 MAX_BACKWARD = 0.3
 """Mean backward bend of the elbows, from -1 to 1, above which sides are swapped."""
 
@@ -66,7 +68,7 @@ def body_track(bvh: Bvh, options: ReadOptions = NOTHING_STATED) -> tuple[BodyTra
     bvh, repeated = without_repeats(bvh)
     names = [joint.name for joint in bvh.joints]
     joints = find_joints(names, [joint.parent for joint in bvh.joints], options.names)
-    _require_degrees(bvh)
+    _require_degrees(bvh, joints)
     centres, rest = _centres(bvh, joints), _centres(_resting(bvh), joints)
     stature, found = _measured(centres, options)
     standing, moving = _directions(rest), _directions(centres)
@@ -86,7 +88,7 @@ def body_track(bvh: Bvh, options: ReadOptions = NOTHING_STATED) -> tuple[BodyTra
         times=np.asarray(bvh.dt * np.arange(len(points))),
         points=points,
         upright=_upright(rest, rest_axis(standing)),
-        hips=placed["hip_l"] - placed["hip_r"] if {"hip_r", "hip_l"} <= placed.keys() else None,
+        hips=_hips(placed),
     )
     reading = Reading(
         unit=found,
@@ -142,12 +144,18 @@ def _resting(bvh: Bvh) -> Bvh:
     return replace(bvh, values=np.array([row]))
 
 
-def _with_root_scaled(bvh: Bvh, joints: Joints, factor: float) -> Bvh:
-    """Return a file with the path of the pelvis scaled."""
+def _root_path(bvh: Bvh, joints: Joints) -> set[int]:
+    """Return the pelvis and its ancestors."""
     path, k = set(), joints["pelvis"][0]
     while k >= 0:
         path.add(k)
         k = bvh.joints[k].parent
+    return path
+
+
+def _with_root_scaled(bvh: Bvh, joints: Joints, factor: float) -> Bvh:
+    """Return a file with the path of the pelvis scaled."""
+    path = _root_path(bvh, joints)
     moving = [joint in path and name.endswith("position") for joint, name in bvh.channels]
     return replace(bvh, values=np.where(moving, factor * bvh.values, bvh.values))
 
@@ -171,8 +179,35 @@ def _directions(centres: Centres) -> BodyDirections:
     )
 
 
-def _require_degrees(bvh: Bvh) -> None:
-    turns = [k for k, (_, name) in enumerate(bvh.channels) if name.endswith("rotation")]
+def _hips(placed: Centres) -> Vec | None:
+    """Return the vectors from the right to the left hip [m], shape (n, 3); None if unknown.
+
+    Raises:
+        BadRecording: Legs and arms have opposite sides.
+    """
+    if not {"hip_r", "hip_l"} <= placed.keys():
+        return None
+    hips = placed["hip_l"] - placed["hip_r"]
+    if float(np.median(np.linalg.norm(hips, axis=1))) < MIN_HIPS:
+        return None
+    shoulders = placed["shoulder_l"] - placed["shoulder_r"]
+    along = float(np.median(np.einsum("ni,ni->n", unit(hips), unit(shoulders))))
+    if along < 0.0:
+        value = f"{np.degrees(np.arccos(along)):.0f} degrees apart"
+        rule = "must point to the same side, right to left, in most frames"
+        hint = "left and right of the legs, or of the arms, are mixed up"
+        raise bad("hips and shoulders", value, rule, hint)
+    return hips
+
+
+def _require_degrees(bvh: Bvh, joints: Joints) -> None:
+    """Check that angles are in degrees; those of the root may exceed a full turn in radians."""
+    root = _root_path(bvh, joints)
+    turns = [
+        k
+        for k, (joint, name) in enumerate(bvh.channels)
+        if name.endswith("rotation") and joint not in root
+    ]
     largest = float(np.abs(bvh.values[:, turns]).max()) if turns else 0.0
     if largest > MAX_DEGREES_IN_RADIANS:
         return

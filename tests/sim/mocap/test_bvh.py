@@ -1,4 +1,5 @@
 import re
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -60,6 +61,17 @@ def test_braces_and_line_ends_may_stand_as_they_like() -> None:
     crammed = ARM.replace("body\n{", "body {").replace("\n", "\r\n").replace("  ", "\t")
     expected, found = (forward(read_bvh(text), range(3)) for text in (ARM, crammed))
     np.testing.assert_array_equal(found, expected)
+
+
+@pytest.mark.parametrize("write", [str.lower, str.upper, str.title])
+def test_keywords_may_have_any_case_and_joints_their_names(write: Callable[[str], str]) -> None:
+    named = ARM.replace("body", "Root").replace("upper_arm", "joint_End")
+    words = "HIERARCHY ROOT JOINT End Site OFFSET CHANNELS MOTION Frames: Xposition Zrotation"
+    text = named.replace("Frame Time: 0.01", f"{write('frame')}\t{write('time')} : 0.01")
+    for word in words.split():
+        text = re.sub(rf"(?m)(^|\s){word}(?=\s)", lambda found: write(found[0]), text)
+    bvh = read_bvh(text.replace(write("ROOT") + " " + write("ROOT"), "ROOT Root"))
+    assert bvh.dt == 0.01 and bvh.joints == read_bvh(named).joints
 
 
 @pytest.mark.parametrize(

@@ -60,6 +60,28 @@ def test_table_in_radians_that_says_degrees_is_refused() -> None:
     assert "looks like radians" in message
 
 
+@pytest.mark.parametrize("degrees", [True, False])
+def test_wrapped_angles_are_continuous(degrees: bool) -> None:
+    q = working(300)
+    q[:, 2], q[:, 10] = np.linspace(1.0, 12.0, 300), 3.0 + 0.4 * np.sin(np.arange(300) / 20)
+    wrapped = (q + np.pi) % (2.0 * np.pi) - np.pi
+    wrapped[:, :2] = q[:, :2]
+    found = read_csv(csv_text(wrapped, degrees=degrees)).q
+    assert np.abs(np.diff(found, axis=0)).max() < 0.1
+    turns = (found - q) / (2.0 * np.pi)
+    turns[:, 2] -= np.round(turns[0, 2])
+    np.testing.assert_allclose(turns, 0.0, atol=1e-8)
+
+
+def test_pelvis_height_over_the_floor_is_refused() -> None:
+    q = working(30)
+    lines = csv_text(q).splitlines()
+    lines[1:] = [f"{lines[1]},pelvis_z", *(f"{line},0.93" for line in lines[2:])]
+    message = fault("\n".join(lines))
+    assert "column pelvis_z = 0.93 is the median rise" in message
+    assert "looks like the height over the floor" in message
+
+
 def test_pelvis_in_millimetres_is_refused() -> None:
     q = Q.copy()
     q[:, :2] *= 1000.0

@@ -78,6 +78,30 @@ def test_table_is_read_however_it_is_written(text: str) -> None:
     assert track.missing == () and track.n_frames == 30
 
 
+def test_decimal_sign_is_found_behind_rows_at_rest() -> None:
+    rest = "# rate_hz = 50\n" + ";".join(JOINT_NAMES) + 60 * ("\n" + ";".join(18 * "0"))
+    rows = [";".join(f"{one:.4f}".replace(".", ",") for one in row) for row in Q]
+    track = read_csv("\n".join(["# angles = radians", rest, *rows]))
+    np.testing.assert_allclose(track.q[60:], Q, atol=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("more", "text"),
+    [
+        ("# angles = radians", "line 2, angles = 'radians' must be degrees, as angles is decl"),
+        ("# rate_hz = 100", "rate_hz = '100' must be the rate of the column time, 50 Hz"),
+        ("# rate_hz = 50\n# rate_hz = 60", "line 3, rate_hz = '60' must be 50"),
+    ],
+)
+def test_declarations_that_contradict_are_refused(more: str, text: str) -> None:
+    assert text in fault(TEXT.replace("degrees\n", f"degrees\n{more}\n"))
+
+
+def test_declared_rate_beside_times_may_be_rounded_and_repeated() -> None:
+    more = "degrees\n# rate_hz = 49.95\n# rate_hz = 49.95\n# by = a\n# by = b\n"
+    np.testing.assert_allclose(read_csv(TEXT.replace("degrees\n", more)).q, Q, atol=1e-8)
+
+
 def test_declared_rate_may_be_padded_and_have_a_decimal_comma() -> None:
     rows = [line.partition(",")[2] for line in TEXT.splitlines()[1:]]
     text = "\n".join(["# angles = degrees;;;", "# rate_hz = 12,5;;;", *rows])

@@ -4,11 +4,12 @@ import pytest
 from app.errors import BadRecording
 from app.sim.human.anthropometry import BodySize
 from app.sim.mocap.bvh import read_bvh
+from app.sim.mocap.inverse_kinematics import body_angles
 from app.sim.mocap.joint_centres import model_points
 from app.sim.mocap.joint_names import find_joints
 from app.sim.mocap.read_options import UNITS
 from app.sim.mocap.skeletons import body_track
-from tests.sim.recorded_person import SKELETONS, TUM, bvh_text, working
+from tests.sim.recorded_person import CMU, SKELETONS, TUM, bvh_text, working
 from tests.sim.recorded_skeleton import Person, skeleton
 
 NECK = "OFFSET 0.0 440.0 0.0"
@@ -57,12 +58,14 @@ def test_missing_joint_is_named_beside_those_the_file_has() -> None:
     assert "left_tentacle" in message
 
 
-def test_angles_in_radians_are_refused() -> None:
+@pytest.mark.parametrize("n_turns", [0.0, 2.0])
+def test_angles_in_radians_are_refused(n_turns: float) -> None:
     lines = bvh_text(working(10)).splitlines()
     start = lines.index("Frame Time: 0.02") + 1
     for k in range(start, len(lines)):
         row = np.array([float(word) for word in lines[k].split()])
         row[3:] = np.radians(row[3:])
+        row[5] += 2.0 * np.pi * n_turns * (k - start) / 10.0  # the person turns round
         lines[k] = " ".join(f"{one:.6f}" for one in row)
     message = fault("\n".join(lines))
     assert message.startswith(f"frames from line {start + 1}")
@@ -88,6 +91,27 @@ def test_body_with_an_arm_of_no_length_is_refused() -> None:
 def test_person_whose_sides_are_mixed_up_is_refused() -> None:
     text = bvh_text(working(10)).replace("left_", "x_").replace("right_", "left_")
     assert "left and right are mixed up" in fault(text.replace("x_", "right_"))
+
+
+def test_legs_of_the_other_side_are_refused() -> None:
+    text = bvh_text(working(10), names=CMU)
+    for part in ("UpLeg", "Foot"):
+        text = text.replace(f"Left{part}", "x").replace(f"Right{part}", f"Left{part}")
+        text = text.replace("x", f"Right{part}", 1)
+    message = fault(text)
+    assert message.startswith("hips and shoulders = 1") and "degrees apart" in message
+    assert "left and right of the legs, or of the arms, are mixed up" in message
+
+
+def test_hips_at_one_place_leave_the_heading_to_the_shoulders() -> None:
+    text = bvh_text(working(10), names=CMU)
+    apart = ("OFFSET 0.0 -50.0 -90.0", "OFFSET 0.0 -50.0 90.0")
+    assert all(text.count(offset) == 1 for offset in apart)
+    for offset in apart:
+        text = text.replace(offset, "OFFSET 0.0 -50.0 0.0")
+    track, _ = body_track(read_bvh(text))
+    found, _ = body_angles(track, BodySize())
+    np.testing.assert_allclose(found[:, 2], working(10)[:, 2], atol=0.5)
 
 
 def test_frozen_file_is_refused() -> None:
