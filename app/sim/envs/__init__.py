@@ -1,5 +1,6 @@
 """Gymnasium environments; importing this package registers their ids, single and batched.
 
+arguments   Validation of the arguments of environments
 pick        The pick scenario as Gymnasium environments, single and vectorised
 raycast     Shaded images of capsules, cylinders and boxes by ray casting, in numpy
 reach       The reach scenario as Gymnasium environments, single and vectorised

@@ -5,8 +5,9 @@ from collections.abc import Sequence
 from gymnasium.vector import AutoresetMode
 
 from app.sim.cells.cell import Cell
+from app.sim.envs.arguments import cell_of, env_number, settings_with
 from app.sim.envs.single_env import SingleEnv
-from app.sim.envs.tasks import RobotTask, cell_of, settings_with
+from app.sim.envs.tasks import RobotTask
 from app.sim.envs.vector_env import BatchVectorEnv
 from app.sim.pick.batch import WHOLE_PICK, PickBatch, PickSettings
 from app.sim.scene.scene import HumanKind
@@ -125,8 +126,9 @@ class PickEnv(SingleEnv):
         first_env: int = 0,
         render_mode: str | None = None,
     ) -> None:
-        chosen = settings_with(settings or WHOLE_PICK, people)
-        self.batch = PickBatch(cell_of(cell), 1, 0, chosen, first_env)
+        chosen = settings_with(settings, WHOLE_PICK, people)
+        first = env_number("first_env", first_env)
+        self.batch = PickBatch(cell_of(cell), 1, 0, chosen, first)
         super().__init__(RobotTask(self.batch), render_mode)
 
 
@@ -148,7 +150,8 @@ class PickVectorEnv(BatchVectorEnv):
         max_episode_steps: int | None = None,
         render_mode: str | None = None,
     ) -> None:
-        chosen = settings_with(settings or WHOLE_PICK, people)
-        self.batch = PickBatch(cell_of(cell), num_envs, 0, chosen, first_env)
+        chosen = settings_with(settings, WHOLE_PICK, people)
+        first, n = env_number("first_env", first_env), env_number("num_envs", num_envs, 1)
+        self.batch = PickBatch(cell_of(cell), n, 0, chosen, first)
         task = RobotTask(self.batch)
         super().__init__(task, render_mode, autoreset_mode, max_episode_steps)

@@ -7,8 +7,9 @@ import numpy as np
 from gymnasium.error import ResetNeeded
 from numpy.typing import NDArray
 
+from app.sim.envs.arguments import check_render_mode, options_of
 from app.sim.envs.raycast import Image
-from app.sim.envs.tasks import BatchTask, check_render_mode, next_episode
+from app.sim.envs.tasks import BatchTask, next_episode
 
 ROW = np.zeros(1, dtype=np.int64)
 
@@ -44,13 +45,15 @@ class SingleEnv(gymnasium.Env[NDArray[Any], Any]):
             options: ``{"episode": k}`` starts episode ``k`` instead.
 
         Raises:
-            InvalidInput: The seed or the number of the episode is out of range.
+            InvalidInput: The seed or the number of the episode is out of range, or there is no
+                such option.
         """
+        stated = options_of(options, ("episode",))
         super().reset(seed=seed)
         if seed is None and not self._seeded:
             seed = int(self.np_random.integers(2**31))
         batch = self._task.batch
-        next_episode(batch, ROW, seed, (options or {}).get("episode"))
+        next_episode(batch, ROW, seed, stated.get("episode"))
         self._seeded = self._running = True
         return batch.obs[0].copy(), self._info()
 

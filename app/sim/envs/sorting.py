@@ -9,10 +9,11 @@ from numpy.typing import NDArray
 
 from app.errors import InvalidInput
 from app.sim.cells.cell import Cell
+from app.sim.envs.arguments import action_array, cell_of, env_number, settings_of
 from app.sim.envs.raycast import Image
 from app.sim.envs.rendering import block_solids, picture, standing_workers
 from app.sim.envs.single_env import SingleEnv
-from app.sim.envs.tasks import Infos, Mask, Rows, cell_of
+from app.sim.envs.tasks import Infos, Mask, Rows
 from app.sim.envs.vector_env import BatchVectorEnv
 from app.sim.sorting.batch import OUTCOMES, Obs, SortingBatch, SortingSettings, batch_in
 from app.sim.sorting.kernels.task import FAILURE_SCALE, TIMEOUT
@@ -39,7 +40,7 @@ class SortingTask:
         Raises:
             InvalidInput: An action is no whole number.
         """
-        act = np.asarray(given).reshape(-1)
+        act = action_array(given).reshape(-1)
         if act.dtype.kind not in "iu" and not (
             act.dtype.kind == "f" and (act == np.trunc(act)).all()
         ):
@@ -163,8 +164,8 @@ class SortingEnv(SingleEnv):
         first_env: int = 0,
         render_mode: str | None = None,
     ) -> None:
-        chosen = cell_of(cell)
-        self.batch = batch_in(chosen, 1, 0, settings, first_env)
+        chosen, first = cell_of(cell), env_number("first_env", first_env)
+        self.batch = batch_in(chosen, 1, 0, settings_of(settings, SortingSettings()), first)
         super().__init__(SortingTask(chosen, self.batch), render_mode)
 
     def action_masks(self) -> NDArray[np.bool_]:
@@ -192,8 +193,9 @@ class SortingVectorEnv(BatchVectorEnv):
         max_episode_steps: int | None = None,
         render_mode: str | None = None,
     ) -> None:
-        chosen = cell_of(cell)
-        self.batch = batch_in(chosen, num_envs, 0, settings, first_env)
+        chosen, stated = cell_of(cell), settings_of(settings, SortingSettings())
+        first, n = env_number("first_env", first_env), env_number("num_envs", num_envs, 1)
+        self.batch = batch_in(chosen, n, 0, stated, first)
         task = SortingTask(chosen, self.batch)
         super().__init__(task, render_mode, autoreset_mode, max_episode_steps)
 

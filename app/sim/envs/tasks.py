@@ -1,33 +1,28 @@
 """Interface of batches for single and vector environments."""
 
-from collections.abc import Sequence
-from dataclasses import replace
-from typing import Any, Protocol, TypeVar, cast
+from typing import Any, Protocol, cast
 
 import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
 from app.errors import InvalidInput
-from app.sim.cells.cell import Cell, load_cell
+from app.sim.envs.arguments import action_array
 from app.sim.envs.raycast import Image
 from app.sim.envs.rendering import people_solids, picture, target_solids
-from app.sim.pick.batch import OUTCOMES, PickBatch, PickSettings
-from app.sim.reach.batch import ReachBatch, ReachSettings
+from app.sim.pick.batch import OUTCOMES, PickBatch
+from app.sim.reach.batch import ReachBatch
 from app.sim.reach.mixed_batch import ReachEnvironments
 from app.sim.scenario.step_result import StepResult
-from app.sim.scene.scene import HumanKind
 
 Rows = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 Infos = dict[str, NDArray[Any]]
-Settings = TypeVar("Settings", PickSettings, ReachSettings)
 
 MAX_NUMBER = int(np.iinfo(np.int64).max)
 """Greatest seed and number of an episode."""
 OBS_BOUND = 100.0
 """Bound of the observation spaces; nothing observed comes near it."""
-RENDER_MODES = ("rgb_array",)
 NAMES = np.array(OUTCOMES, dtype=object)
 TIMEOUT = OUTCOMES.index("timeout")
 
@@ -122,8 +117,11 @@ class ArmTask:
 
         Those of one environment may lack the first axis. Another shape is kept, and refused by
         the batch: reshaped, it would give joints the actions of others.
+
+        Raises:
+            InvalidInput: They are no real numbers.
         """
-        act = np.asarray(given, dtype=np.float32)
+        act = action_array(given).astype(np.float32, copy=False)
         return act[None] if act.ndim == 1 and self.batch.n_envs == 1 else act
 
     def truncates(self, ended: Rows) -> Mask:
@@ -164,27 +162,6 @@ class RobotTask(ArmTask):
 
 def _box(bound: float, n: int) -> spaces.Space[Any]:
     return cast("spaces.Space[Any]", spaces.Box(-bound, bound, (n,), np.float32))
-
-
-def cell_of(cell: str | Cell) -> Cell:
-    """Return a work cell, given by name or directly."""
-    return load_cell(cell) if isinstance(cell, str) else cell
-
-
-def settings_with(settings: Settings, people: Sequence[HumanKind] | None) -> Settings:
-    """Return settings with other people; unchanged if ``people`` is None."""
-    return settings if people is None else replace(settings, people=tuple(people))
-
-
-def check_render_mode(mode: str | None) -> str | None:
-    """Return a render mode that exists, or None for none.
-
-    Raises:
-        InvalidInput: There is no such mode.
-    """
-    if mode is not None and mode not in RENDER_MODES:
-        raise InvalidInput("render_mode", mode, "must be a render mode or None", RENDER_MODES)
-    return mode
 
 
 def next_episode(batch: Batch, rows: Rows, seed: int | None, episode: object = None) -> None:

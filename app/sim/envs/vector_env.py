@@ -10,8 +10,9 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from app.errors import InvalidInput
+from app.sim.envs.arguments import check_render_mode, options_of
 from app.sim.envs.raycast import Image
-from app.sim.envs.tasks import BatchTask, Mask, check_render_mode, next_episode
+from app.sim.envs.tasks import BatchTask, Mask, next_episode
 
 MODES = tuple(mode.value for mode in AutoresetMode)
 Steps = tuple[NDArray[Any], NDArray[np.float64], Mask, Mask, dict[str, Any]]
@@ -85,15 +86,15 @@ class BatchVectorEnv(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
         Raises:
             InvalidInput: The mask has another shape or type, is false everywhere, or is
                 combined with a seed although it is not true everywhere; the seed or the number
-                of an episode is out of range.
+                of an episode is out of range; there is no such option.
             ResetNeeded: The first reset is partial.
         """
-        options = options or {}
-        chosen = self._chosen(options.get("reset_mask"), seed)
+        stated = options_of(options, ("episode", "reset_mask"))
+        chosen = self._chosen(stated.get("reset_mask"), seed)
         super().reset(seed=seed)
         if seed is None and not self._seeded:
             seed = int(self.np_random.integers(2**31))
-        self._begin(chosen, seed, options.get("episode"))
+        self._begin(chosen, seed, stated.get("episode"))
         self._seeded = True
         return self._task.batch.obs.copy(), _marked(self._task.infos(), chosen)
 
