@@ -50,6 +50,8 @@ class Each:
 
 UR10_QD_MAX = (2.16, 2.16, 3.15, 3.2, 3.2, 3.2)
 """Joint speeds of the UR10, from ur10_robot.urdf [rad/s]."""
+MAX_FAILURE = 0.99
+"""Largest failure probability of a pick; at 1 plans would not end."""
 TURN = 6.2842
 """A full turn, with room for rounded numbers [rad]."""
 
@@ -114,8 +116,8 @@ class Station(CellData):
     position: Place = Field(
         description="point the tcp must reach; a cluster's lowest level [m]"
     )
-    failure_probability: Annotated[float | None, Within(0.0, 0.999, "")] = Field(
-        default=None, description="chance that a pick from this clutter cell fails, below 1"
+    failure_probability: Annotated[float | None, Within(0.0, MAX_FAILURE, "")] = Field(
+        default=None, description="chance that a pick from this clutter cell fails"
     )
     colour: Literal["red", "green", "blue"] | None = Field(
         default=None, description="colour of the blocks of a cluster"

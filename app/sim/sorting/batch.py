@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from app.errors import InvalidInput
 from app.sim.cells.cell import Cell
+from app.sim.cells.parts import MAX_FAILURE
 from app.sim.core.arrays import Vec
 from app.sim.core.jit import direct
 from app.sim.scenario.step_result import StepResult
@@ -22,7 +23,6 @@ from app.sim.sorting.kernels import episode as sorting_episode
 from app.sim.sorting.kernels import task as kernel
 from app.sim.sorting.kernels.reward import SortingWeights
 from app.sim.sorting.state import (
-    MAX_FAILURE,
     NULL,
     Move,
     SortingShape,

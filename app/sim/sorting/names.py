@@ -11,10 +11,10 @@ import numpy as np
 
 from app.errors import InvalidInput
 from app.sim.cells.cell import Cell
+from app.sim.cells.parts import MAX_FAILURE
 from app.sim.core.arrays import Vec
 from app.sim.sorting.batch import shape_of
 from app.sim.sorting.state import (
-    MAX_FAILURE,
     NULL,
     SIZE_NAMES,
     SortingShape,

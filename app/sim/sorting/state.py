@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.errors import InvalidInput
+from app.sim.cells.parts import MAX_FAILURE
 from app.sim.core.arrays import Vec
 
 Codes = NDArray[np.int8]
@@ -44,8 +45,6 @@ SIZE_NAMES = {
     5: ("tiny", "small", "medium", "large", "huge"),
 }
 """Names of sizes by their number, from the smallest."""
-MAX_FAILURE = 0.99
-"""Largest failure probability of a pick; at 1 plans would not end."""
 
 
 @dataclass(frozen=True, slots=True, order=True)

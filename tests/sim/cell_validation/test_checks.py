@@ -4,10 +4,11 @@ from typing import Any
 
 import pytest
 
-from app.errors import Fault
+from app.errors import Fault, InvalidInput
 from app.sim.cell_validation.checks import check_cell, station_distance
 from app.sim.cells.cell import load_cell, parse_definition
 from app.sim.cells.parts import Station
+from app.sim.sorting.batch import batch_in
 
 Edit = Callable[[dict[str, Any]], object]
 
@@ -37,6 +38,24 @@ def person(**changes: Any) -> Edit:
 
 def obstacle(*boxes: dict[str, Any]) -> Edit:
     return lambda cell: cell.update(obstacles=list(boxes))
+
+
+@pytest.mark.parametrize("chance", [0.99, 0.991, 0.999])
+def test_cell_that_passes_can_be_sorted_in(chance: float) -> None:
+    def edit(cell: dict[str, Any]) -> None:
+        for one in cell["stations"]:
+            if one["kind"] == "clutter":
+                one["failure_probability"] = chance
+
+    definition = load_cell("sorting-e0").definition()
+    edit(definition)
+    if chance <= 0.99:
+        assert not faults_of(edit, "sorting-e0")
+        batch_in(parse_definition(definition), 1, 0)
+    else:
+        assert "must lie in [0, 0.99]" in faults_of(edit, "sorting-e0")[0].text
+        with pytest.raises(InvalidInput):
+            batch_in(parse_definition(definition), 1, 0)
 
 
 @pytest.mark.parametrize(
