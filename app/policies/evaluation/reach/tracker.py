@@ -33,6 +33,7 @@ from app.sim.core.arrays import Vec
 from app.sim.people.kernels.pedestrian import AGE, GROWTH, N_PAST, PAST_S, VX, VY, R, X, Y
 from app.sim.perception.cylinder_sensor_model import CylinderSensorModel, CylinderSensorSettings
 from app.sim.reach.batch import ReachBatch
+from app.sim.scenario.kernels.episode import RUNNING
 
 DEFAULT_EPISODES = 5400
 """As in ``reach-targets``."""
@@ -76,7 +77,7 @@ class CylinderObserver:
         self._rng = np.random.default_rng([seed, 1])
         self._past: Vec | None = None
         self.errors: list[Vec] = []
-        """Distance of observed and true axes at each step of each environment [m]."""
+        """Distance of observed and true axes at each step of each running environment [m]."""
 
     def acts(self, batch: ReachBatch) -> NDArray[np.float32]:
         """Return the actions of all environments, shape (n_envs, 6)."""
@@ -92,7 +93,9 @@ class CylinderObserver:
         self._tracker.observe(later, t[later], true[later])
         seen, change = self._tracker.seen(every, predicted=self._row.predicted)
         seen[:, :, 2] = np.maximum(seen[:, :, 2], MIN_RADIUS)
-        self.errors.append(np.linalg.norm(seen[:, :, :2] - true[:, :, :2], axis=2).ravel())
+        running = state.outcome == RUNNING
+        away = seen[running, :, :2] - true[running, :, :2]
+        self.errors.append(np.linalg.norm(away, axis=2).ravel())
         return self._query(batch, fresh, seen, change)
 
     def _query(

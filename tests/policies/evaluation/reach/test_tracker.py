@@ -8,6 +8,7 @@ from app.sim.cells.cell import load_cell
 from app.sim.people.kernels.pedestrian import VX, VY, R, X, Y
 from app.sim.perception.cylinder_sensor_model import CylinderSensorSettings
 from app.sim.reach.batch import ReachBatch, ReachSettings
+from app.sim.scenario.kernels.episode import TIMEOUT
 from tests.policies.straight_controller import Straight
 
 N = 8
@@ -90,3 +91,13 @@ def test_a_controller_without_observation_moves_as_without_tracker() -> None:
 def test_the_first_look_already_knows_the_person(steps: int) -> None:
     watching, true, _ = watched(ROWS["100ms"], steps)
     assert off(watching, true) < 1e-6
+
+
+def test_errors_of_environments_whose_episodes_have_ended_do_not_count() -> None:
+    cell = load_cell("shared-workspace")
+    batch = ReachBatch(cell, N, 5, ReachSettings())
+    batch.reset()
+    batch.state.outcome[: N - 1] = TIMEOUT
+    observer = CylinderObserver(Straight(), ROWS["100ms-noise"], 5)
+    observer.acts(batch)
+    assert [len(errors) for errors in observer.errors] == [1]
