@@ -123,8 +123,7 @@ def calibration(
         episode: Number of the episode of each, shape (n,).
         seed: Seed of the chance level.
     """
-    order = np.argsort(probability, kind="stable")
-    parts = np.array_split(order, BINS)
+    parts = _bins(probability)
     drawn = np.random.default_rng(seed).random((200, episode.max(initial=0) + 1))
     floor = [_ece(probability, one[episode] < probability, parts) for one in drawn]
     rate = happened.mean()
@@ -175,9 +174,13 @@ def _recalibrated(
 
 def _errors(probability: Float, happened: NDArray[np.bool_]) -> dict[str, float]:
     """Return expected calibration error and Brier score."""
-    parts = np.array_split(np.argsort(probability, kind="stable"), BINS)
     brier = float(((probability - happened) ** 2).mean())
-    return {"ece": _ece(probability, happened, parts), "brier": brier}
+    return {"ece": _ece(probability, happened, _bins(probability)), "brier": brier}
+
+
+def _bins(probability: Float) -> list[NDArray[np.int64]]:
+    """Return the predictions of each bin; fewer bins where there are fewer predictions."""
+    return np.array_split(np.argsort(probability, kind="stable"), min(BINS, len(probability)))
 
 
 def _ece(

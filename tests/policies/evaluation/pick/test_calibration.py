@@ -62,6 +62,16 @@ def test_ranks_of_a_perfect_and_of_a_useless_prediction():
     assert useless["brier"] == pytest.approx(useless["brier_constant"])
 
 
+@pytest.mark.parametrize("n", [1, 7])
+def test_fewer_predictions_than_bins_have_a_bin_each(n: int) -> None:
+    probability = np.linspace(0.1, 0.9, n)
+    happened = np.arange(n) % 2 == 0
+    found = calibration(probability, np.zeros(n), happened, np.arange(n), 1)
+    assert [one["n"] for one in found["bins"]] == [1] * n
+    assert found["ece"] == pytest.approx(np.abs(probability - happened).mean())
+    assert np.isfinite(found["ece_floor"])
+
+
 def test_a_checkpoint_without_probabilities_is_refused():
     shipped = pretrained.load("pick")
     arrays = shipped.arrays()
