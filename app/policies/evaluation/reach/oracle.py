@@ -152,7 +152,8 @@ def verdict(search: OracleSearch, never: Any, targets: Vec, goals: Vec) -> Json:
 def run_oracle(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
     """Search for solutions of the episodes of ``reach-targets``."""
     bench = ReachBench(checkpoint, request.seed)
-    goals = bench.target_goals((request.episodes or PER_TARGET) * len(bench.targets))
+    per_target = request.episodes or PER_TARGET
+    goals = bench.target_goals(per_target * len(bench.targets))
     cell, settings = bench.cell, bench.usual
     batch = started(cell, settings, goals, request.seed)
     stages = request.rows(len(SCRIPTED) + 4)
@@ -170,4 +171,4 @@ def run_oracle(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
     variant = replace(bench.variant("oracle", goals), goal_set="training targets in turn")
     bench.add(row, variant)
     result = bench.result(search_seed=request.seed, soonest_tries=SOONEST_TRIES)
-    return {**result, "stages": stages[:-1]}
+    return {"episodes": per_target, **result, "stages": stages[:-1]}

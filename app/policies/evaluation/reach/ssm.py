@@ -185,6 +185,7 @@ def run_ssm(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
         runs = random_episodes(cell, batch, acts, n_random, request.seed)
         rows.append(random_row(name, runs))
     return {
+        "episodes": n_random,
         "settings": stated(assumed, n, [motion.source for motion in request.motions]),
         "results": rows,
         **result,
