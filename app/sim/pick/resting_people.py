@@ -22,8 +22,8 @@ from app.sim.planning.replanning import EXTRA_MARGIN, ReplanningExecutor, Replan
 from app.sim.robot.kernels.arm import CONTROLLED, Arm
 
 REST_S = 3.0
-"""Time at rest after which a planner moves the robot [s]: working people rest less between two
-moves (docs/results/pick.md)."""
+"""Time at rest after which a planner moves the robot [s]; about 3 % of the rests of working
+people at a cube or dock are longer (docs/people.md)."""
 AT_REST = 0.1
 """Greatest joint speed of a person at rest [m/s, rad/s]."""
 MAX_POSES = 3000
