@@ -3,10 +3,14 @@
 import re
 from pathlib import Path
 
+import numpy as np
+import pytest
+
 from app.policies.configs.pick import PICK
 from app.policies.configs.presets import PRESETS
 from app.policies.configs.sorting import SORTING_PRESETS
 from app.policies.inference.task_selection import HYSTERESIS
+from app.sim.sorting.kernels.reward import distance_cost
 from app.sim.sorting.near_optimal_moves import MARGIN
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"
@@ -46,6 +50,15 @@ def test_the_method_states_the_reward_of_sorting() -> None:
             cell = stated[f"$r_{{{term}}}$"][column]
             assert float(cell) == -getattr(presets[name], f"c_{field}")
         assert float(stated["$w_{dist}$"][column]) == presets[name].c_distance
+
+
+def test_the_sorting_page_states_the_cost_of_a_level() -> None:
+    page = (DOCS / "sorting.md").read_text("utf-8")
+    (cost,) = re.findall(r"^\| each level .* \| -([0-9.]+) / `K` \|$", page, re.MULTILINE)
+    towers, goal = np.zeros((2, 2, 10), dtype=np.int8)
+    goal[0, 0] = 1
+    weights = SORTING_PRESETS[0].reward.weights
+    assert distance_cost(towers, goal, 3, weights) == pytest.approx(float(cost) / 10)
 
 
 def test_the_method_states_the_reward_of_picks() -> None:

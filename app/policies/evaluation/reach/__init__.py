@@ -2,7 +2,7 @@
 
 bench          Evaluate one checkpoint of the reach scenario under several rules
 episodes       Run reach episodes to their ends under any controller, and count the outcomes
-oracle         Protocol ``reach-oracle``: upper bound of success by search with a known future
+oracle         Protocol ``reach-oracle``: episodes that a search with a known future solves
 people         Protocols ``reach-people``, ``reach-constant`` and ``reach-speeds``: other people
 random_goals   Protocol ``reach-random``: random goals between the training targets
 smoothness     Protocol ``reach-smoothness``: joint trajectories of whole episodes

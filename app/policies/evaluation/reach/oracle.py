@@ -1,4 +1,4 @@
-"""Protocol ``reach-oracle``: upper bound of success by search with a known future.
+"""Protocol ``reach-oracle``: episodes that a search with a known future solves.
 
 The episodes are those of ``reach-targets`` (54 targets x 100, start clearance 0.05 m, 5 s) with
 the same people. Episodes that the policy does not solve are resimulated with other robot
