@@ -40,7 +40,7 @@ Planners, like policies, arrive when the TCP is within 0.1 m of the goal.
 
 ``random`` are random goals beside pedestrians (docs/method.md 2.1) for at most RANDOM_S with
 the policy under each layer; ``random-still`` is the same with a robot that stays at home. Both
-count contacts with a moving and with a stationary robot.
+count contacts with a moving and with a stationary robot; here either ends the episode.
 """
 
 from collections.abc import Mapping, Sequence
