@@ -237,3 +237,45 @@ def test_head_says_what_is_inside(store: Store, data: Path, tmp_path: Path) -> N
     content = (tmp_path / "b.tar").read_bytes()
     head = json.loads(content[512 : content.index(b"\0", 512)])
     assert set(head["files"]) == {"tandem.db", "files/memory/a/one.bin"}
+
+
+@pytest.fixture
+def named(store: Store, data: Path) -> Store:
+    """A copy of the database under a name that does not end with ``.db``."""
+    database = sqlite3.connect(data / "jobs.sqlite")
+    database.executescript("\n".join(dump(path_of(store))))
+    database.close()
+    return Store(f"sqlite:///{data}/jobs.sqlite")
+
+
+def test_database_of_another_name_is_restored_and_the_present_one_kept(
+    named: Store, claim: Claim, tmp_path: Path
+) -> None:
+    before = dump(path_of(named))
+    assert write_backup(named, tmp_path, tmp_path / "b.tar").n_files == 1
+    record(named, claim, 15)
+    later = dump(path_of(named))
+    named.close()
+    _, kept = restore_backup(named, tmp_path, tmp_path / "b.tar")
+    assert dump(path_of(named)) == before != later
+    assert kept is not None and dump(kept) == later
+    assert write_backup(named, tmp_path, tmp_path / "c.tar").n_files == 1
+
+
+def test_file_of_a_backup_does_not_replace_the_database_before_it_is_kept(
+    store: Store, data: Path, named: Store, claim: Claim, tmp_path: Path
+) -> None:
+    assert write_backup(store, data, tmp_path / "b.tar").n_files > 1  # with ``jobs.sqlite``
+    record(named, claim, 15)
+    later = dump(path_of(named))
+    named.close()
+    _, kept = restore_backup(named, data, tmp_path / "b.tar")
+    assert dump(path_of(named)) == dump(path_of(store)) != later
+    assert kept is not None and dump(kept) == later
+
+
+def test_backups_in_the_data_folder_do_not_contain_earlier_ones(
+    store: Store, data: Path
+) -> None:
+    sizes = [write_backup(store, data, data / f"{n}.tar").size for n in range(3)]
+    assert len(set(sizes)) == 1

@@ -87,12 +87,12 @@ def write_backup(store: Store, data_dir: Path, path: Path) -> BackupSummary:
             _file_errors(path),
             tempfile.TemporaryDirectory(dir=data_dir, prefix=".backup-") as held,
         ):
-            _link_files(data_dir, Path(held))
+            _link_files(data_dir, Path(held), source)
             _copy_database(source, copy, store.shown_url)
             created_at = datetime.now(UTC).isoformat(timespec="seconds")
-            _link_files(data_dir, Path(held))
+            _link_files(data_dir, Path(held), source)
             files = {DATABASE: copy} | {
-                f"files/{name}": file for name, file in _files(Path(held))
+                f"files/{name}": file for name, file in _files(Path(held), source)
             }
             with closing(sqlite3.connect(copy)) as database:
                 rows = _row_counts(database)
@@ -149,7 +149,7 @@ def restore_backup(
             _check_database(part, str(path))
             for name in head["files"]:
                 if name != DATABASE:
-                    _restore_file(archive, head, name, data_dir)
+                    _restore_file(archive, head, name, data_dir, target)
             kept = _keep(target)
             part.replace(target)
             _sync(target.parent)
@@ -181,9 +181,9 @@ def _file_errors(place: Path) -> Iterator[None]:
         raise InvalidInput("FILE", str(place), f"cannot be written: {error}") from error
 
 
-def _link_files(folder: Path, held: Path) -> None:
+def _link_files(folder: Path, held: Path, database: Path) -> None:
     """Hold the files of the data folder, so that a running job cannot remove them."""
-    for name, file in _files(folder):
+    for name, file in _files(folder, database):
         link = held / name
         if link.exists():
             continue
@@ -196,15 +196,33 @@ def _link_files(folder: Path, held: Path) -> None:
             shutil.copyfile(file, link)
 
 
-def _files(folder: Path) -> Iterator[tuple[str, Path]]:
+def _files(folder: Path, database: Path) -> Iterator[tuple[str, Path]]:
     """Yield the files of a folder that a backup contains, each with its relative name."""
     for file in sorted(folder.rglob("*")):
         name = file.relative_to(folder)
         kept = not any(
             PurePosixPath(part).match(one) for part in name.parts for one in NOT_KEPT
         )
-        if kept and file.is_file() and not file.is_symlink():
+        kept = kept and file.is_file() and not file.is_symlink()
+        if kept and not _is_of_database(file, database) and not _is_backup(file):
             yield name.as_posix(), file
+
+
+def _is_of_database(file: Path, database: Path) -> bool:
+    """Return whether a file is the database, its log, or one that was kept beside it."""
+    database = database.resolve()
+    before, name, rest = file.name.partition(database.name)
+    same = file.parent.resolve() == database.parent and bool(name) and not before
+    return same and rest[:1] in "-."
+
+
+def _is_backup(file: Path) -> bool:
+    """Return whether a file is an earlier backup: a tar archive that begins with its head."""
+    try:
+        with file.open("rb") as content:
+            return content.read(len(HEAD) + 1) == f"{HEAD}\0".encode()
+    except FileNotFoundError:
+        return False  # removed since
 
 
 def _copy_database(source: Path, copy: Path, shown: str) -> None:
@@ -331,10 +349,11 @@ def _unpack(archive: tarfile.TarFile, head: Mapping[str, Any], name: str, target
 
 
 def _restore_file(
-    archive: tarfile.TarFile, head: Mapping[str, Any], name: str, data_dir: Path
+    archive: tarfile.TarFile, head: Mapping[str, Any], name: str, data_dir: Path, database: Path
 ) -> None:
     target = data_dir / PurePosixPath(name).relative_to("files")
-    if target.is_file() and _measured(target) == head["files"][name]:
+    is_there = target.is_file() and _measured(target) == head["files"][name]
+    if is_there or _is_of_database(target, database):  # as in backups of earlier versions
         return
     target.parent.mkdir(parents=True, exist_ok=True)
     part = target.with_name(f"{target.name}.part")
