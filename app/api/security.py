@@ -11,10 +11,10 @@ import hmac
 import ipaddress
 from collections.abc import Iterable, Mapping
 from functools import lru_cache
-from http.cookies import CookieError, SimpleCookie
 from importlib import resources
 from urllib.parse import urlsplit
 
+from starlette.requests import cookie_parser
 from starlette.responses import HTMLResponse, Response
 from starlette.types import ASGIApp, Receive, Scope, Send
 
@@ -137,13 +137,9 @@ class AccessMiddleware:
         scheme, _, given = headers.get("authorization", "").partition(" ")
         if scheme.lower() == "bearer":
             return hmac.compare_digest(given.strip().encode(), self.token.encode())
-        try:
-            morsel = SimpleCookie(headers.get("cookie", "")).get(COOKIE)
-        except CookieError:
-            return False
-        if morsel is None:
-            return False
-        return hmac.compare_digest(morsel.value.encode(), session_value(self.token).encode())
+        # Other services of this host set cookies, too, of any form.
+        proof = cookie_parser(headers.get("cookie", "")).get(COOKIE, "")
+        return hmac.compare_digest(proof.encode(), session_value(self.token).encode())
 
 
 def _refusal(

@@ -7,7 +7,7 @@ from fastapi.testclient import TestClient
 from starlette.routing import Mount, Route, WebSocketRoute
 from starlette.websockets import WebSocketDisconnect
 
-from app.api.security import headers_of
+from app.api.security import COOKIE, headers_of, session_value
 from app.errors import InvalidInput
 from app.main import create_app
 from app.settings import Settings
@@ -188,6 +188,17 @@ def test_cookie_of_any_bytes_is_refused(guarded: TestClient, cookie: bytes) -> N
     answer = guarded.get("/v1/jobs", headers={b"Cookie": cookie})
     assert answer.status_code == 401
     assert answer.headers["content-type"] == "application/problem+json"
+
+
+@pytest.mark.parametrize(
+    "other", [b"a[b]=1", b'view={"open":1}', b"flag", b"text=a b", b"text=\xe4", b'text="a']
+)
+def test_cookie_is_read_beside_those_of_other_services(
+    guarded: TestClient, other: bytes
+) -> None:
+    cookie = f"{COOKIE}={session_value(TOKEN)}".encode()
+    for header in (other + b"; " + cookie, cookie + b"; " + other):
+        assert guarded.get("/v1/jobs", headers={b"Cookie": header}).status_code == 200
 
 
 @pytest.mark.parametrize(
