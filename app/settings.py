@@ -95,7 +95,7 @@ def load_settings(**overrides: object) -> Settings:
     known = [PREFIX + name.upper() for name in Settings.model_fields]
     for name in sorted(os.environ):
         if name.startswith(PREFIX) and name not in known:
-            raise InvalidInput(name, os.environ[name], "is not a setting", known)
+            raise InvalidInput(name, "***", "is not a setting", known)  # a misspelt secret
     try:
         return Settings(**{k: v for k, v in overrides.items() if v is not None})  # type: ignore[arg-type]
     except ValidationError as error:

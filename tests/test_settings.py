@@ -63,6 +63,13 @@ def test_bad_variable_is_refused_by_name(
             load_settings()
 
 
+def test_value_of_a_misspelt_secret_is_not_shown(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("TANDEM_TOKN", "a-token-of-this-server")
+    with pytest.raises(InvalidInput, match="TANDEM_TOKN") as refused:
+        load_settings()
+    assert "a-token" not in f"{refused.value} {refused.value.problem()}"
+
+
 @pytest.mark.parametrize("host", ["0.0.0.0", "192.168.1.4", "::", "robot.example"])
 def test_address_that_others_reach_needs_a_token(host: str) -> None:
     with pytest.raises(InvalidInput, match="TANDEM_TOKEN"):
