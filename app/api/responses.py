@@ -1,9 +1,9 @@
 """Outermost ASGI middleware: completes every response.
 
 Adds security headers, the id of the request and the root path of ``Location``, turns an
-unexpected error into a problem, measures the time to the answer, and answers ``HEAD`` with the
-headers of ``GET``, without a body. The log has a line for each request that changes something
-or is refused.
+unexpected error into a problem, and measures the time to the answer. ``HEAD`` is answered with
+the headers of ``GET``, without a body, and a client that has the answer (``ETag``) with 304.
+The log has a line for each request that changes something or is refused.
 """
 
 import logging
@@ -19,7 +19,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from app.api.metrics import UNROUTED, Metrics
 from app.api.problems import problem
-from app.api.security import path_of
+from app.api.security import headers_of, path_of
 from app.logs import REQUEST_ID
 
 logger = logging.getLogger(__name__)
@@ -40,6 +40,8 @@ HEADERS = {  # defaults
 }
 _RAW = tuple((name.lower().encode(), value.encode()) for name, value in HEADERS.items())
 ID_HEADER = b"x-request-id"
+_OF_CONTENT = (b"content-length", b"content-type", b"content-encoding", b"content-disposition")
+"""Headers that an answer without its content does not have."""
 _ID = re.compile(rb"[A-Za-z0-9._:/+=-]{1,128}")
 _RANDOM = Random()
 NOT_READY = 503
@@ -88,14 +90,19 @@ class ResponseMiddleware:
             await self._answer({**scope, "method": "GET"}, receive, send_head)
 
     async def _answer(self, scope: Scope, receive: Receive, send: Send) -> None:
-        started, root_path, begin = False, scope.get("root_path", ""), perf_counter()
+        started = unchanged = False
+        root_path, begin = scope.get("root_path", ""), perf_counter()
 
         async def send_complete(message: Message) -> None:
-            nonlocal started
+            nonlocal started, unchanged
             if message["type"] == "http.response.start":
                 started = True
-                self._count(scope, message["status"], perf_counter() - begin)
                 headers = message["headers"] = list(message["headers"])
+                unchanged = message["status"] == 200 and _is_known(scope, headers)
+                if unchanged:
+                    message["status"] = 304
+                    headers[:] = [pair for pair in headers if pair[0] not in _OF_CONTENT]
+                self._count(scope, message["status"], perf_counter() - begin)
                 if message["status"] == 204:  # FastAPI states the type of its default answer
                     headers[:] = [pair for pair in headers if pair[0] != b"content-type"]
                 given = tuple([name for name, _ in headers])
@@ -103,6 +110,8 @@ class ResponseMiddleware:
                 headers.append((ID_HEADER, (REQUEST_ID.get() or "").encode()))
                 if b"location" in given:
                     _below_root_path(message, root_path)
+            elif unchanged:
+                message = {**message, "body": b""}
             await send(message)
 
         try:
@@ -123,6 +132,16 @@ class ResponseMiddleware:
         if (status >= 400 and status != NOT_READY) or changes:
             fields = {"status": status, "duration_s": round(seconds, 6)}
             logger.info("%s %s", method, path_of(scope), extra=fields)
+
+
+def _is_known(scope: Scope, headers: list[tuple[bytes, bytes]]) -> bool:
+    """Return whether a client has an answer already, as ``If-None-Match`` states."""
+    asked = headers_of(scope).get("if-none-match")
+    if asked is None or scope["method"] != "GET":
+        return False
+    known = [one.strip().removeprefix("W/") for one in asked.split(",")]
+    etags = [value.decode("latin-1") for name, value in headers if name == b"etag"]
+    return any("*" in known or etag.removeprefix("W/") in known for etag in etags)
 
 
 @lru_cache(maxsize=256)

@@ -74,6 +74,19 @@ def test_pages_are_asked_for_again(client: TestClient, path: str) -> None:
     assert (again.status_code, again.content) == (304, b"")
 
 
+@pytest.mark.parametrize("form", ["{}", "W/{}", '"other", {}', "*"])
+def test_answer_that_a_client_has_is_not_sent_again(client: TestClient, form: str) -> None:
+    for path in ("/v1/checkpoints/pick/tensors", "/viewer/main/", "/static/app.js"):
+        etag = client.get(path).headers["etag"]
+        headers = {"If-None-Match": form.format(etag)}
+        for ask in (client.get, client.head):
+            again = ask(path, headers=headers)
+            assert (again.status_code, again.content) == (304, b"")
+            assert again.headers["etag"] == etag
+        other = client.get(path, headers={"If-None-Match": '"other"'})
+        assert other.is_success and other.content
+
+
 def test_events_and_fonts_are_not_packed(client: TestClient) -> None:
     font = client.get("/static/vendor/inter-latin-wght-normal.woff2")
     assert font.is_success

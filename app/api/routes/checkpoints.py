@@ -158,7 +158,8 @@ def get_checkpoint_manifest(reference: str, services: ServicesDep) -> dict[str, 
     summary="Download a checkpoint's tensors",
     response_class=Response,
     responses={
-        200: {"content": {"application/octet-stream": {}}, "description": "safetensors"}
+        200: {"content": {"application/octet-stream": {}}, "description": "safetensors"},
+        304: {"description": "`If-None-Match` has its `ETag`"},
     },
 )
 def get_checkpoint_tensors(reference: str, services: ServicesDep) -> Response:

@@ -66,7 +66,6 @@ async def page(
     world_id: str,
     services: ServicesDep,
     accept_encoding: Annotated[str, Header()] = "",
-    if_none_match: Annotated[str, Header()] = "",
 ) -> Response:
     """Return the viewer's page."""
     services.world(world_id)
@@ -77,8 +76,6 @@ async def page(
         "Cache-Control": "no-cache",
         "Vary": "Accept-Encoding",
     }
-    if etag in if_none_match:
-        return Response(status_code=304, headers=headers)
     if "gzip" in accept_encoding:
         return Response(
             packed, media_type="text/html", headers=headers | {"Content-Encoding": "gzip"}
