@@ -237,6 +237,8 @@ async def on_http_error(request: Request, error: Exception) -> ProblemResponse:
 
 def _methods_at(request: Request) -> list[str]:
     """Return the methods of a path over all routes."""
+    if "app_root_path" in request.scope:  # below a mount, whose files are only read
+        return ["GET", "HEAD"]
     routes = request.app.routes
     return [
         method

@@ -108,6 +108,9 @@ def test_wrong_method_lists_those_that_are_answered(client: TestClient) -> None:
     assert answer.status_code == 405
     assert answer.json()["choices"] == ["GET", "HEAD", "POST"]
     assert answer.headers["allow"] == "GET, HEAD, POST"
+    for path in ("/static/app.js", "/"):
+        answer = client.post(path)
+        assert (answer.status_code, answer.headers["allow"]) == (405, "GET, HEAD")
 
 
 def test_body_over_the_limit_is_refused(client: TestClient) -> None:
