@@ -60,6 +60,8 @@ class Timeouts:
     """Time for the heartbeat of a silent worker once the database takes writes again [s]."""
     retry_s: float = 5.0
     """Time until the next start after a worker that could not start or write [s]."""
+    retain_s: float = 60.0
+    """Time until old jobs are removed after one that ended without a worker [s]."""
     max_failures: int = 3
     """A job fails with this number of crashes."""
 
@@ -102,7 +104,7 @@ class Supervisor:
         max_running: Largest number of running jobs.
         executor: Starts the processes of attempts; workers of this machine by default.
         min_free_bytes: Free space of the disk below which no job starts [bytes].
-        retention: Removes old jobs whenever one has ended.
+        retention: Removes old jobs after one has ended.
         tracer: Makes a span of each attempt.
     """
 
@@ -135,7 +137,7 @@ class Supervisor:
         """Called when the lease was taken: another server may have changed the database."""
         self._workers: dict[Claim, _Worker] = {}
         self._orphans_queued = False
-        self._not_before = -math.inf
+        self._not_before = self._retain_at = -math.inf
         self._waiting: str | None = None
         self._wake = threading.Event()
         self._stopping = threading.Event()
@@ -193,7 +195,6 @@ class Supervisor:
         self._guarded(self._queue_orphans)  # where it fails, the thread repeats it
 
     def _run(self) -> None:
-        self._guarded(lambda: remove_unneeded(self._store, self._data_dir))
         while not self._stopping.is_set():
             if self._holds_lease:
                 self._guarded(self._lease.renew)
@@ -222,6 +223,7 @@ class Supervisor:
         if not self._orphans_queued:
             self._queue_orphans()
         self._reap()
+        self._retain()
         waiting = self._watch() or self._lack_of_room()
         if waiting is None and time.monotonic() >= self._not_before:
             if self._waiting is not None:
@@ -298,9 +300,15 @@ class Supervisor:
                 self._settle(claim, worker.ended)
                 _end(worker.span, worker.ended)
                 del self._workers[claim]
-                if self._retention is not None:
-                    self._retention.apply()
-                remove_unneeded(self._store, self._data_dir)
+                self._retain_at = -math.inf
+
+    def _retain(self) -> None:
+        """Remove old jobs and files after the end of a worker, and once in a while."""
+        if time.monotonic() >= self._retain_at:
+            self._retain_at = time.monotonic() + self._timeouts.retain_s
+            if self._retention is not None:
+                self._retention.apply()
+            remove_unneeded(self._store, self._data_dir)
 
     def _settle(self, claim: Claim, ended: Exit) -> None:
         """Record the end of an attempt, if its worker has not."""

@@ -65,9 +65,9 @@ class CheckpointNames:
             NotFound: There is no such checkpoint.
             InvalidInput: The alias is not a valid name.
         """
-        if self._aliases.get(alias) != sha256:
+        if list_aliases(self.store).get(alias) != sha256:  # another server may have set it
             set_alias(self.store, alias, sha256)
-            self.refresh()
+        self.refresh()
 
     def remove(self, alias: str) -> None:
         """Remove an alias; its checkpoint stays.

@@ -14,6 +14,7 @@ from app.store.database.lease import Lease
 from app.store.database.lock import ServerLock
 from app.store.engine import Store
 from jobs.executor import LocalProcess
+from jobs.retention import Retention
 from jobs.supervisor import Supervisor
 from tests.jobs.machinery import (
     PATIENCE,
@@ -173,6 +174,32 @@ def start_patiently(supervisor: Supervisor) -> None:
     while not supervisor.is_alive:
         with suppress(StorageUnavailable):
             supervisor.start()
+
+
+def test_alias_is_set_although_another_server_has_changed_it(store: Store) -> None:
+    first, second = policy(b"1"), policy(b"2")
+    for one in (first, second):
+        checkpoints.put_checkpoint(store, one)
+    here, there = CheckpointNames(store), CheckpointNames(store)
+    here.point("line-2", first.sha256)
+    there.point("line-2", second.sha256)
+    here.point("line-2", first.sha256)
+    assert checkpoints.list_aliases(store) == here.aliases == {"line-2": first.sha256}
+
+
+def test_jobs_that_end_without_a_worker_are_removed_beyond_those_to_keep(
+    store: Store, tmp_path: Path, executor: LocalProcess
+) -> None:
+    keep = Retention(
+        store=store, logs=tmp_path / "logs", keep_jobs=2, keep_states=1, acting=dict
+    )
+    for _ in range(5):
+        jobs.request_cancel(store, queue(store))
+    times = replace(PATIENCE, retain_s=0.1)
+    with supervised(store, tmp_path, timeouts=times, executor=executor, retention=keep):
+        wait_until(lambda: jobs.count_jobs(store)["cancelled"] == 2)
+        jobs.request_cancel(store, queue(store))
+        wait_until(lambda: [one.number for one in jobs.list_jobs(store).items] == [6, 5])
 
 
 @SQLITE_ONLY
