@@ -178,6 +178,8 @@ def _end(
             data[name] = changes[name]
     values = {"error": None, **changes, "finished_at": now, "heartbeat_at": now}
     values["waiting"] = None
+    if state != "cancelled":  # its end came before the cancel of the pruner
+        values.setdefault("ended_by", None)
     change_state(connection, claim.job_id, state, values, data)
 
 

@@ -95,7 +95,7 @@ def request_cancel(store: Store, job: JobRecord) -> None:
 
 
 def mark_pruned(store: Store, job_id: str) -> None:
-    """State that a training is cancelled by the pruner of its sweep."""
+    """State that a training is cancelled by the pruner of its sweep, unless it has ended."""
     with store.writing() as connection:
-        mine = jobs.c.id == job_id
+        mine = sa.and_(jobs.c.id == job_id, jobs.c.state.in_(("queued", "running")))
         connection.execute(sa.update(jobs).where(mine).values(ended_by="pruned"))

@@ -117,6 +117,26 @@ def test_training_below_the_median_is_pruned(store: Store) -> None:
     assert (trials[4].state, trials[5].state, job.state) == ("pruned", "queued", "running")
 
 
+@pytest.mark.parametrize("state", ["succeeded", "failed"])
+def test_training_that_ends_before_its_pruner_is_not_called_pruned(
+    store: Store, state: str
+) -> None:
+    sweep = post(store, trials=2, parallel=2)
+    for _ in range(2):
+        look(store, sweep)
+    for prunes_first in (True, False):
+        found, _ = claimed(store)
+        if prunes_first:
+            composed_jobs.mark_pruned(store, found.job_id)
+        if state == "succeeded":
+            completion.finish(store, found, result={"checkpoint": "a" * 64})
+        else:
+            completion.fail(store, found, "no cell")
+        composed_jobs.mark_pruned(store, found.job_id)
+        ended = jobs.get_job(store, found.job_id)
+        assert (ended.state, ended.ended_by) == (state, None)
+
+
 def test_cancelled_sweep_ends_with_its_trials_and_goes_on_when_resumed(store: Store) -> None:
     sweep = post(store, trials=2)
     run_trial(store, sweep, 0.5)
