@@ -167,9 +167,11 @@ def _listed(manifest: Mapping[str, Any]) -> list[str]:
     """Return the files that the manifest of a state lists.
 
     Raises:
-        InvalidInput: An entry names no SHA-256.
+        InvalidInput: It is no list, or an entry names no SHA-256.
     """
     entries = manifest.get("memory", [])
+    if not isinstance(entries, list):
+        raise InvalidInput("state.manifest.memory", type(entries).__name__, "must be a list")
     names = [one.get("sha256") if isinstance(one, dict) else None for one in entries]
     for place, name in enumerate(names):
         if not isinstance(name, str) or SHA256.fullmatch(name) is None:

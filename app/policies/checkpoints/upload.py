@@ -74,8 +74,9 @@ def _manifest(line: bytes) -> object:
     try:
         manifest = json.loads(line.decode())
         digest(manifest)
+        json.dumps(manifest, ensure_ascii=False).encode()  # as the database gets it
     except (ValueError, RecursionError) as error:
-        rule = "must be JSON in UTF-8, in one line, with finite numbers"
+        rule = "must be JSON in UTF-8, in one line, with finite numbers and whole characters"
         raise InvalidInput("manifest", str(error), rule) from None
     return manifest
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
+from dataclasses import replace
 from hashlib import sha256
 from http.client import HTTPConnection
 from pathlib import Path
@@ -153,10 +154,12 @@ def test_file_that_is_not_what_it_must_be_is_refused(
         (state(10, "../secret"), {}, "must be 64 hexadecimal digits"),
         (state(20), {}, "resume.step = 20 must equal the checkpoint's 10"),
         (ResumeState(step=10, manifest={}, tensors=b"\x80\x04."), {}, "a safetensors file"),
+        (replace(state(10), manifest={"memory": 5}), {}, "manifest.memory = 'int' must be a"),
+        (replace(state(10), manifest={"a": "\ud800"}), {}, "must be JSON in UTF-8"),
         (state(10), {"seed": 2}, "manifest.seed = 2 must be the job's, 1"),
         (state(10), {"width": "16"}, "manifest.width = '16' must be int"),
     ],
-    ids=["missing", "path", "step", "pickle", "origin", "type"],
+    ids=["missing", "path", "step", "pickle", "list", "text", "origin", "type"],
 )
 def test_checkpoint_that_breaks_a_rule_stores_nothing(
     store: Store,
