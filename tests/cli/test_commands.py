@@ -368,3 +368,5 @@ def test_address_that_is_not_ours_is_refused() -> None:
         listen("192.0.2.1", 0)
     with socket.socket(), pytest.raises(InvalidInput, match="TANDEM_HOST"):
         listen("no-such-host.invalid", 0)
+    with pytest.raises(InvalidInput, match="TANDEM_HOST"):
+        listen(f"{'a' * 64}.example", 0)
