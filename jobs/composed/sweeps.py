@@ -167,11 +167,12 @@ class Sweeps(Composer):
         ended = [one for one in counted if one.state in ENDED]
         best = best_of(spec, trials)
         mean = best.value["mean"] if best is not None and best.value is not None else None
-        composed_jobs.record(store, job.id, len(ended), {"best": mean})
+        done = min(len(ended), spec.trials)
+        composed_jobs.record(store, job.id, done, {"best": mean})
         room = min(spec.trials - len(counted), spec.parallel - len(counted) + len(ended))
         if room > 0:
             _start(store, job, spec, trials)
-        elif len(ended) >= spec.trials:
+        elif len(ended) == len(counted):  # one that was resumed may be beyond the number
             _end(store, job, best, trials)
 
     def _prune(self, store: Store, spec: SweepSpec, trials: Sequence[SweepTrial]) -> None:

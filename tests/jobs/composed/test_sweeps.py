@@ -20,6 +20,7 @@ from app.store.engine import Store
 from app.store.records import JobRecord, NewJob
 from jobs.composed.sweeps import Sweeps, SweepTrial, trials_of
 from jobs.spec import parse_spec
+from tests.store.test_attempts import policy, resume
 from tests.support.databases import SQLITE_ONLY, claimed
 
 SWEEP: dict[str, Any] = {
@@ -115,6 +116,33 @@ def test_training_below_the_median_is_pruned(store: Store) -> None:
     completion.finish(store, found[0], state="cancelled")
     job, trials = look(store, sweep)
     assert (trials[4].state, trials[5].state, job.state) == ("pruned", "queued", "running")
+
+
+def test_sweep_ends_after_a_trial_that_was_resumed_beside_its_replacement(
+    store: Store,
+) -> None:
+    sweep = post(store, trials=2, parallel=2)
+    for _ in range(2):
+        look(store, sweep)
+    first, _ = claimed(store)
+    attempts.record_checkpoint(store, first, 5, policy(b"1"), resume(5))
+    jobs.request_cancel(store, first.job_id)
+    completion.finish(store, first, state="cancelled")
+    look(store, sweep)
+    job_actions.resume_job(store, first.job_id)
+    resumed, _ = claimed(store)
+    assert resumed.job_id == first.job_id
+    for kind in ("train", "evaluate"):
+        assert [run_one(store, 0.2).kind for _ in range(2)] == [kind, kind]
+        look(store, sweep)
+    job, trials = look(store, sweep)
+    assert (job.state, trials[0].state, job.step) == ("running", "running", 2)
+    completion.finish(store, resumed, result={"checkpoint": "a" * 64})
+    look(store, sweep)
+    assert run_one(store, 0.9).kind == "evaluate"
+    job, trials = look(store, sweep)
+    assert [one.state for one in trials] == ["succeeded"] * 3
+    assert (job.state, job.step, job.result and job.result["trial"]) == ("succeeded", 2, 1)
 
 
 @pytest.mark.parametrize("state", ["succeeded", "failed"])
