@@ -110,11 +110,12 @@ class LiveCell:
 
     def stop(self) -> None:
         """Stop thread and viewer; may be called twice."""
+        self.handle.close()
         self._stop.set()
-        self._risk.close()
         if self._thread is not None:
             self._thread.join(timeout=5.0)
             self._thread = None
+        self._risk.close()
         if self._server is not None:
             self._server.stop()
             self._server = None
