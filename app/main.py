@@ -280,7 +280,7 @@ def assemble(
     """
     store = retention.store
     names = CheckpointNames(store)
-    return Services(
+    services = Services(
         store=store,
         response_cache=ResponseCache(store),
         supervisor=supervisor,
@@ -298,18 +298,14 @@ def assemble(
         metrics=metrics,
         tracer=tracer,
     )
+    retention.on_removed = services.forget
+    return services
 
 
 def acting_in(worlds: Mapping[str, LiveWorld]) -> dict[str, str]:
-    """Return the SHA-256 of each checkpoint that acts in a live world, with its place."""
-    found = {}
-    for world in tuple(worlds.values()):
-        snapshot = world.handle.snapshot()
-        sorting = snapshot.sorting.sorting_policy if snapshot.sorting else None
-        for sha256 in (snapshot.checkpoint, sorting):
-            if sha256 is not None:
-                found[sha256] = f"world {snapshot.id}"
-    return found
+    """Return the SHA-256 of each checkpoint that acts, or soon will, with its live world."""
+    handles = [world.handle for world in tuple(worlds.values())]
+    return {sha256: f"world {one.id}" for one in handles for sha256 in one.acting}
 
 
 def start_world(

@@ -1,7 +1,7 @@
 """Removal of checkpoints, and of ended jobs with their files: how many are kept."""
 
 import logging
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -15,7 +15,7 @@ from jobs import resume_files
 logger = logging.getLogger(__name__)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
+@dataclass(slots=True, kw_only=True)
 class Retention:
     """Removes checkpoints, and ended jobs with their output and their files to resume from."""
 
@@ -29,21 +29,22 @@ class Retention:
     """Number of cancelled or failed jobs whose states to resume from are kept."""
     acting: Callable[[], Mapping[str, str]]
     """Returns the SHA-256 of each checkpoint that acts, with its place."""
+    on_removed: Callable[[Collection[str]], None] = lambda _: None
+    """Called with the SHA-256 of the checkpoints that were removed."""
 
-    def delete(self, job_id: str) -> tuple[str, ...]:
-        """Delete an ended job; return the SHA-256 of the checkpoints that went with it.
+    def delete(self, job_id: str) -> None:
+        """Delete an ended job, and the checkpoints that only it has.
 
         Raises:
             NotFound: There is no such job.
             WrongState: It has not ended, or one of its checkpoints is in use.
             StorageFull: No room is left.
         """
-        removed = retention.delete_job(self.store, job_id, self.acting())
+        self.on_removed(retention.delete_job(self.store, job_id, self.acting()))
         self._remove_files(job_id)
-        return removed
 
-    def delete_checkpoint(self, reference: str) -> str:
-        """Delete a checkpoint that was uploaded or recalibrated; return its SHA-256.
+    def delete_checkpoint(self, reference: str) -> None:
+        """Delete a checkpoint that was uploaded or recalibrated.
 
         Args:
             reference: Its SHA-256 or alias.
@@ -58,7 +59,7 @@ class Retention:
         if sha256 in pretrained.SHA256.values():
             raise Conflict(f"the checkpoint {reference!r} is shipped with Tandem and stays")
         retention.delete_checkpoint(self.store, sha256, self.acting())
-        return sha256
+        self.on_removed((sha256,))
 
     def apply(self) -> None:
         """Remove what is beyond the numbers to keep."""
@@ -68,7 +69,8 @@ class Retention:
             keep_states=self.keep_states,
             acting=self.acting(),
         )
-        for job_id in gone:
+        for job_id, removed in gone.items():
+            self.on_removed(removed)
             logger.info("job %s is deleted: the newest %d are kept", job_id, self.keep_jobs)
             self._remove_files(job_id)
 

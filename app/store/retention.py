@@ -87,7 +87,7 @@ def delete_checkpoint(store: Store, sha256: str, acting: Mapping[str, str]) -> N
 
 def prune(
     store: Store, *, keep_jobs: int, keep_states: int, acting: Mapping[str, str]
-) -> tuple[str, ...]:
+) -> dict[str, tuple[str, ...]]:
     """Delete ended jobs beyond the newest, and states to resume from beyond the newest.
 
     A job with a checkpoint in use stays, and so do the parts of a job that has not ended.
@@ -97,7 +97,7 @@ def prune(
         acting: As for :func:`delete_job`.
 
     Returns:
-        Ids of the deleted jobs.
+        SHA-256 of the checkpoints that went with each deleted job, by its id.
 
     Raises:
         StorageFull: No room is left.
@@ -116,19 +116,15 @@ def prune(
             connection.execute(
                 sa.delete(resume_states).where(resume_states.c.job_id.in_(ended))
             )
-    unneeded = [job_id for job_id in old if job_id not in parts]
-    return tuple(job_id for job_id in unneeded if _deleted(store, job_id, acting))
-
-
-def _deleted(store: Store, job_id: str, acting: Mapping[str, str]) -> bool:
-    try:
-        delete_job(store, job_id, acting)
-    except WrongState as error:
-        logger.info("job %s is kept: %s", job_id, error.message)
-        return False
-    except NotFound:
-        return False  # deleted by a request since
-    return True
+    removed = {}
+    for job_id in (one for one in old if one not in parts):
+        try:
+            removed[job_id] = delete_job(store, job_id, acting)
+        except WrongState as error:
+            logger.info("job %s is kept: %s", job_id, error.message)
+        except NotFound:
+            pass  # deleted by a request since
+    return removed
 
 
 def _require_no_part(connection: sa.Connection, job: JobRecord) -> None:

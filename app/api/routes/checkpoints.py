@@ -143,7 +143,7 @@ def delete_checkpoint(reference: str, services: ServicesDep) -> None:
 
     The checkpoints of a job are deleted with the job.
     """
-    services.forget((services.retention.delete_checkpoint(reference),))
+    services.retention.delete_checkpoint(reference)
 
 
 @router.get("/{reference}/manifest", summary="A checkpoint's manifest")

@@ -138,4 +138,4 @@ def update_job(
 @router.delete("", status_code=204, summary="Delete an ended job", responses=DELETED)
 def delete_job(job: JobDep, services: ServicesDep) -> None:
     """Delete a job with its curve, its states and the checkpoints without an alias."""
-    services.forget(services.retention.delete(job.id))
+    services.retention.delete(job.id)
