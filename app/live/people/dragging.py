@@ -40,6 +40,13 @@ class DraggedPerson:
         self.q, self.qd, self._target = np.array(q), np.array(qd), np.array(q)
         self._hands.clear()
 
+    def turn_near(self, yaw: float) -> None:
+        """Shift the yaw by full turns so that its target is nearest to ``yaw`` [rad]."""
+        full = 2.0 * np.pi
+        shift = full * round((yaw - float(self._target[2])) / full)
+        for posture in (self.q, self._target):
+            posture[2] += shift
+
     def aim(self, q: Vec) -> None:
         """Set the target posture [m, rad], shape (18,)."""
         self._target = np.array(q)
@@ -73,9 +80,9 @@ class DraggedPerson:
         area = self._cell.human
         x = float(np.clip(pelvis[0], area.x_min - STEP_ASIDE, area.x_max + STEP_ASIDE))
         y = float(np.clip(pelvis[1], area.y_min, area.y_max + STEP_BACK))
-        turn = pelvis[2] - float(self._target[2])
-        yaw = float(self._target[2]) + (turn + np.pi) % (2.0 * np.pi) - np.pi
-        return x, y, yaw
+        turn = (pelvis[2] - float(self._target[2]) + np.pi) % (2.0 * np.pi) - np.pi
+        self.turn_near(area.home[2] - turn)  # the yaw stays within its joint limits
+        return x, y, float(self._target[2]) + turn
 
     def _carry_hands(self, pelvis: tuple[float, float, float]) -> None:
         """Move the targets of hands rigidly with the pelvis."""

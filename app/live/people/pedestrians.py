@@ -114,6 +114,8 @@ class LivePedestrians:
         """Height of the cylinders [m]."""
         self.speed: float | None = None
         """Common walking speed [m/s]; None: variable (docs/method.md 2.1)."""
+        self.dt = cell.robot.dt
+        """Control period [s]."""
         self._state = pedestrian_state(1, MAX_PEOPLE)
         self._drawn = np.zeros((MAX_PEOPLE, RADIUS - SPEED))
         self._episode = 0
@@ -321,9 +323,9 @@ class LivePedestrian:
 
     def _velocity(self) -> Vec:
         """Return the velocity toward the drag target [m/s], shape (2,)."""
-        offset = self._aim - self.row[[X, Y]]
-        speed = float(np.linalg.norm(offset)) / DRAG_LAG_S
-        return np.asarray(offset / DRAG_LAG_S * min(1.0, DRAG_SPEED / max(speed, 1e-9)))
+        velocity = (self._aim - self.row[[X, Y]]) / max(DRAG_LAG_S, self._among.dt)
+        speed = float(np.linalg.norm(velocity))
+        return np.asarray(velocity * min(1.0, DRAG_SPEED / max(speed, 1e-9)))
 
     def _head_for_aim(self, yaw: float) -> None:
         self.row[VX], self.row[VY] = self._velocity()

@@ -103,6 +103,8 @@ class LiveWorker:
         self._limbs.place(self.q, self._limbs.qd)
         if mode == "auto":
             self._begin_work()
+        if mode != "manual":
+            self._limbs.turn_near(float(self._source_at(self._t)[0][2]))
 
     def leave_case(self) -> None:
         """Return from a case study to the work loop."""

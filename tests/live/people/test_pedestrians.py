@@ -49,6 +49,18 @@ def test_dragged_person_follows_with_bounded_speed_and_arrives(
     assert np.allclose(walkers.cylinders[0, :2], (0.5, 1.5), atol=1e-3)
 
 
+def test_dragged_person_does_not_pass_its_target_in_long_periods() -> None:
+    robot = CELL.robot.model_copy(update={"dt": 0.2})
+    walkers = LivePedestrians(CELL.model_copy(update={"robot": robot}), seed=4)
+    start = walkers.cylinders[0, 0]
+    x, y = start + 0.1, walkers.cylinders[0, 1]
+    walkers[0].drag(commands.MovePerson(pelvis=(x, y, 0.0)))
+    for _ in range(10):
+        walkers.move(0.2)
+        assert start - 1e-9 <= walkers.cylinders[0, 0] <= x + 1e-9
+    assert walkers.cylinders[0, 0] == pytest.approx(x)
+
+
 def test_person_is_not_dragged_out_of_sight(walkers: LivePedestrians) -> None:
     walkers[0].drag(commands.MovePerson(pelvis=(50.0, -50.0, 0.0)))
     for _ in range(500):

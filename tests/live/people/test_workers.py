@@ -308,6 +308,38 @@ def test_person_of_mode_still_goes_home_and_stays(world: LivePickWorld, cell: Ce
     assert np.allclose(run(world, 20).people[0].q, rest.q, atol=0.01)
 
 
+def turn_clockwise(world: LivePickWorld, quarters: int) -> float:
+    """Drag the first person around quarter by quarter; return the direction asked for last."""
+    yaw = float(world.snapshot().people[0].q[2])
+    for _ in range(quarters):
+        yaw = (yaw - 0.5 * np.pi + np.pi) % (2.0 * np.pi) - np.pi
+        world.apply(commands.MovePerson(pelvis=(0.0, 1.6, yaw)))
+        run(world, 40)
+    return yaw
+
+
+@pytest.mark.parametrize("quarters", [3, 5, 9])
+def test_person_is_dragged_around_any_number_of_times(
+    world: LivePickWorld, quarters: int
+) -> None:
+    asked = turn_clockwise(world, quarters)
+    error = float(world.snapshot().people[0].posture[2]) - asked
+    assert np.cos(error) == pytest.approx(1.0, abs=1e-4)
+
+
+@pytest.mark.parametrize("mode", ["still", "auto"])
+def test_person_turns_back_by_half_a_turn_at_most(
+    world: LivePickWorld, mode: commands.PlainMode
+) -> None:
+    turn_clockwise(world, 3)
+    world.apply(commands.SetMode(mode=mode))
+    yaws = [world.snapshot().people[0].posture[2]]
+    while world.snapshot().people[0].joining:
+        world.step()
+        yaws.append(world.snapshot().people[0].posture[2])
+    assert np.abs(np.diff(yaws)).sum() < np.pi + 0.5
+
+
 def test_case_study_keeps_one_person_of_the_cells_size(
     world: LivePickWorld, cell: Cell
 ) -> None:
