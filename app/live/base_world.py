@@ -309,6 +309,8 @@ class BaseWorld(ABC, Generic[P]):
         names = tuple(candidate.id for candidate in offered)
         self.offered = offered
         self.previous = before if before in names else None
+        if self.previous is None:
+            self.progress = NOT_BEGUN
         self.decision = self.planner.act = None
         if self.policy is None or not names:
             return None

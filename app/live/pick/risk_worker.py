@@ -65,12 +65,11 @@ class RiskWorker:
             query: Returns the state; called only if a map is due. None: there is no map.
         """
         if self._running is not None and self._running.done():
+            done, self._running, self.newest = self._running, None, None
             try:
-                self.newest = self._running.result()
+                self.newest = done.result()
             except ServiceError as error:
-                self.newest = None
                 logger.warning("no risk map: %s", error.message)
-            self._running = None
         if self._running is not None or time.monotonic() < self._started + INTERVAL_S:
             return
         self._started = time.monotonic()

@@ -3,8 +3,10 @@
 import threading
 import time
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from app.live import commands
 from app.live.pick.risk_worker import GRID, RiskQuery, RiskWorker
@@ -67,6 +69,18 @@ def test_one_map_is_computed_at_a_time() -> None:
     assert len(finished(worker, query).value) == len(GRID.x) * len(GRID.y)
     worker.close()
     assert began == [name for name in began if name.startswith("risk-map")]
+
+
+def test_failed_map_does_not_hinder_the_next_one() -> None:
+    cell = load_cell()
+    world, worker = LivePickWorld(cell, StraightPolicy(cell), seed=3), RiskWorker()
+    query = world.risk_query()
+    assert query is not None
+    worker.offer(lambda: replace(query, people=()))  # without a person to move
+    with pytest.raises(IndexError):
+        finished(worker, lambda: query)
+    assert finished(worker, lambda: query).value.shape == (len(GRID.x) * len(GRID.y),)
+    worker.close()
 
 
 def test_without_a_policy_or_a_person_there_is_no_map() -> None:

@@ -340,6 +340,7 @@ def test_target_removed_in_its_pick_is_left_at_once(world: LivePickWorld) -> Non
     after = world.snapshot()
     assert after.status == "moving"
     assert after.chosen != chosen
+    assert after.phase == "approach"
 
 
 def test_toggling_adds_and_removes_a_candidate_in_the_cells_order(world: LivePickWorld) -> None:

@@ -71,8 +71,8 @@ class Gait:
         """Return how far a standing foot is from its place, 1 where it steps."""
         foot = self._planted[side]
         away = float(np.linalg.norm(goal[:3, 3] - foot[:3, 3])) / STRIDE
-        turn = math.acos(min(float(goal[:3, 0] @ foot[:3, 0]), 1.0)) / TURN
-        return max(away, turn)
+        cosine = float(np.clip(goal[:3, 0] @ foot[:3, 0], -1.0, 1.0))
+        return max(away, math.acos(cosine) / TURN)
 
     def _advance(self, side: str, goal: Vec, dt: float) -> None:
         share = self._swing[side] = self._swing[side] + dt / SWING_S
