@@ -43,12 +43,12 @@ def test_hidden_page_closes_its_stream_and_is_present_again_when_seen(
 def test_slow_server_is_asked_for_jobs_once_at_a_time(open_page: Callable[..., Page]) -> None:
     page = open_page(scene=False)
     held: list[Route] = []
-    page.route("**/v1/jobs?part_of=none", lambda route: held.append(route))
+    page.route("**/v1/jobs?part_of=none&limit=50", lambda route: held.append(route))
     page.wait_for_timeout(6500)
     assert len(held) == 1
-    page.unroute("**/v1/jobs?part_of=none")
+    page.unroute("**/v1/jobs?part_of=none&limit=50")
     held[0].continue_()
-    with page.expect_response("**/v1/jobs?part_of=none"):
+    with page.expect_response("**/v1/jobs?part_of=none&limit=50"):
         pass
 
 

@@ -16,6 +16,13 @@ export class Problem extends Error {
 /** No answer at all: the server is away or has stopped. */
 export class Unreachable extends Error {}
 
+let aheadMs = 0;
+
+/** The time of the server [ms], from the last answer: the clock of this machine may be wrong. */
+export function serverTime() {
+  return Date.now() - aheadMs;
+}
+
 const ANSWER_MS = 15000;
 const FILE_MS = 180000;
 
@@ -46,6 +53,8 @@ async function send(path, { method = "GET", body, headers, signal, patience = AN
       headers,
       body,
     });
+    const sent = Date.parse(response.headers.get("date"));
+    if (Number.isFinite(sent)) aheadMs = Date.now() - sent;
     json = await response.json().catch((error) => {
       if (error instanceof SyntaxError) return null;
       throw error;

@@ -1,5 +1,7 @@
 // Numbers and names as people read them. SI units come in; cm, percent and minutes go out.
 
+import { serverTime } from "./api.js";
+
 const MINUS = "\u2212";
 const DAY_S = 24 * 3600;
 
@@ -25,7 +27,7 @@ export function gap(metres) {
 /** A count of steps: 950, 12.4 k, 1.25 M. */
 export function steps(n) {
   if (n === null || n === undefined) return "–";
-  if (n >= 1e6) return `${trim((n / 1e6).toFixed(2))} M`;
+  if (n >= 999_950) return `${trim((n / 1e6).toFixed(2))} M`;
   if (n >= 1e4) return `${trim((n / 1e3).toFixed(1))} k`;
   return String(Math.round(n));
 }
@@ -60,8 +62,8 @@ export function duration(seconds) {
   return `${Math.floor(s / 3600)} h ${pad(Math.floor((s % 3600) / 60))} min`;
 }
 
-/** How long ago an ISO time was. */
-export function ago(iso, now = Date.now()) {
+/** How long ago an ISO time of the server was. */
+export function ago(iso, now = serverTime()) {
   if (!iso) return "";
   const seconds = (now - Date.parse(iso)) / 1000;
   if (seconds >= 2 * DAY_S) return `${Math.floor(seconds / DAY_S)} days ago`;

@@ -144,11 +144,12 @@ function Progress({ person, motion }) {
 function Size({ person, send }) {
   const { id, anthropometry: body, mode } = person;
   const [local, setLocal] = useState({});
-  const change = useThrottled((name, value) =>
-    send({ tag: "set-anthropometry", person: id, [name]: value }));
-  useEffect(() => {
-    if (Object.entries(local).every(([name, value]) => body[name] === value)) setLocal({});
-  }, [body.stature, body.arms, body.shoulders]);
+  // What was set holds until its command has ended, also one that failed.
+  const change = useThrottled(async (name, value) => {
+    await send({ tag: "set-anthropometry", person: id, [name]: value });
+    setLocal((now) => Object.fromEntries(
+      Object.entries(now).filter((one) => one[0] !== name || one[1] !== value)));
+  });
   const recorded = body.recorded && Object.keys(local).length === 0;
   return html`<div class="dock-row sizes">
     <span class="dock-label">Size</span>

@@ -21,10 +21,12 @@ export function EvaluateForm({ link, onStarted, onClose }) {
   const { typed } = form;
   const protocol = protocols.items.find(({ name }) => name === typed.protocol) ?? protocols.items[0];
   const chosen = typed.recordings ?? [];
+  const field = protocol.purpose && checkpointField(protocol, checkpoints.items);
+  const checkpoint = field && field.choices.includes(typed.checkpoint) ? typed.checkpoint : "";
   const send = (key) => post("v1/jobs", {
     kind: "evaluate",
     protocol: protocol.name,
-    checkpoint: typed.checkpoint || null,
+    checkpoint: checkpoint || null,
     episodes: typed.episodes?.trim() ? parsed(typed.episodes) : null,
     seed: parsed(typed.seed ?? String(SEED.default)),
     name: typed.name || null,
@@ -34,7 +36,7 @@ export function EvaluateForm({ link, onStarted, onClose }) {
     note="Runs in its own process, beside the cell." onClose=${onClose}>
     ${form.row({ name: "protocol", choices: protocols.items.map(({ name }) => name),
       default: protocol.name, help: protocol.title }, { protocol: protocol.name })}
-    ${protocol.purpose && form.row(checkpointField(protocol, checkpoints.items))}
+    ${field && form.row(field, { checkpoint })}
     ${form.row({ name: "episodes", default: "", minimum: 1, maximum: protocol.max_episodes,
       help: "Empty for the evaluation's own number" })}
     ${[SEED, OWN[1]].map((field) => form.row(field))}

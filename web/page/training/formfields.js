@@ -3,6 +3,8 @@ import { html, useEffect, useRef, useState } from "../vendor/htm-preact-standalo
 import { get, Unreachable } from "../api.js";
 import { Alert, Icon } from "../icons.js";
 
+const AGAIN_MS = 3000; // pause before a request that failed is sent again
+
 /**
  * A form whose fields are `names`; `typed` are their texts at the start. `submit(send)` sends it
  * with the key of this submission, which stays while the server is not reached.
@@ -41,14 +43,25 @@ export function useForm({ typed: first = {}, names, onDone, prefix = "train" }) 
   return { ref, typed, faults, busy, type, submit, row, start };
 }
 
-/** The answer of a route, asked for once the server is there: its items, or the error. */
+/** The items of a route, asked for while the server is there until it answers; or the error. */
 export function useItems(link, path) {
   const [state, setState] = useState({ items: null, error: null });
   useEffect(() => {
-    if (link !== "live" || state.items) return;
-    get(path).then(
+    if (link !== "live" || state.items) return undefined;
+    const stop = new AbortController();
+    let timer = null;
+    const ask = () => get(path, { signal: stop.signal }).then(
       (answer) => setState({ items: answer.items, error: null }),
-      (error) => setState({ items: null, error }));
+      (error) => {
+        if (stop.signal.aborted) return;
+        setState({ items: null, error });
+        timer = setTimeout(ask, AGAIN_MS);
+      });
+    ask();
+    return () => {
+      stop.abort();
+      clearTimeout(timer);
+    };
   }, [link]);
   return state;
 }

@@ -14,6 +14,7 @@ import { SweepDetail } from "./sweep.js";
 import { whileSeen } from "../visibility.js";
 
 const POLL_MS = 2000;
+const PAGE = 50;
 const TONES = { queued: "quiet", running: "accent", cancelling: "warn", succeeded: "good",
   failed: "bad", cancelled: "quiet" };
 const OUTCOMES = [
@@ -33,7 +34,7 @@ export function useJobs(link) {
     let [over, asking, again] = [false, false, false];
     const ask = async () => {
       try {
-        const [own, all] = await Promise.all([get("v1/jobs?part_of=none"), get("v1/jobs")]);
+        const [own, all] = await Promise.all([get(`v1/jobs?part_of=none&limit=${PAGE}`), get("v1/jobs")]);
         const items = [...own.items, ...all.items.filter((one) => one.part_of)];
         if (!over) setState({ jobs: items.sort(byNumber), error: null, waiting: own.waiting });
       } catch (error) {
@@ -95,9 +96,9 @@ export function QueueWaits({ waiting }) {
 }
 
 export function JobList({ jobs, error, onNew, ...rest }) {
-  if (error && !jobs) {
-    return html`<${Alert}>The jobs could not be loaded: ${error.message}</${Alert}>`;
-  }
+  const fault = error
+    && html`<${Alert}>The jobs could not be loaded: ${error.message}</${Alert}>`;
+  if (fault && !jobs) return fault;
   if (!jobs) return html`<div class="skeleton" aria-busy="true" aria-label="Loading jobs"></div>`;
   if (jobs.length === 0) {
     return html`<div class="empty">
@@ -106,10 +107,12 @@ export function JobList({ jobs, error, onNew, ...rest }) {
         <${Icon} name="plus" />Start one</button>`}</div>`;
   }
   const listed = jobs.filter((job) => !job.part_of || job.id === rest.open || rest.chosen);
-  return html`<ul class="jobs">
+  return html`${fault}<ul class="jobs">
     ${listed.map((job) => html`<${Job} key=${job.id} job=${job} jobs=${jobs} ...${rest}
       open=${rest.open === job.id} />`)}
-  </ul>`;
+  </ul>
+  ${jobs.filter((job) => !job.part_of).length >= PAGE && html`<p class="faint">The newest
+    ${` ${PAGE}`} are shown.</p>`}`;
 }
 
 function Job({ job, jobs, open, chosen, onChoose, ...rest }) {

@@ -1,0 +1,101 @@
+"""What a visitor sees when a request fails, a clock is wrong, or a list is long."""
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+from playwright.sync_api import Page, expect
+
+from app.policies.checkpoints import pretrained
+from tests.browser.test_training import open_form
+from tests.support import patient_http
+
+pytestmark = pytest.mark.browser
+
+WRONG_CLOCK = "const now = Date.now; Date.now = () => now() + 30 * 24 * 3600 * 1000;"
+COMMANDS = "**/v1/worlds/main/commands"
+
+
+def test_presets_are_loaded_after_a_failure(open_page: Callable[..., Page]) -> None:
+    page = open_page(scene=False)
+    page.route("**/v1/presets", lambda route: route.fulfill(status=502, body=""), times=1)
+    open_form(page)
+    expect(page.locator("#train-preset")).to_be_visible(timeout=30_000)
+
+
+def test_size_is_that_of_the_world_after_a_failed_command(
+    open_page: Callable[..., Page],
+) -> None:
+    page = open_page(scene=False)
+    page.click('[data-action="size"]')
+    slider = page.locator('[data-size="stature"] input')
+    before = slider.input_value()
+    page.route(COMMANDS, lambda route: route.fulfill(status=500, body=""))
+    slider.fill("95")
+    expect(page.locator(".banner.bad")).to_contain_text("the server answered 500")
+    expect(slider).to_have_value(before, timeout=10_000)
+    page.unroute(COMMANDS)
+    slider.fill("80")
+    expect(slider).to_have_value("80")
+    expect(page.locator('[data-size="stature"]')).to_contain_text("P80")
+
+
+def test_checkpoint_of_another_purpose_is_not_evaluated(
+    open_page: Callable[..., Page],
+) -> None:
+    pick = pretrained.SHA256["pick"]
+    page = open_page(scene=False)
+    sent: list[Any] = []
+
+    def refuse(route: Any) -> None:
+        if route.request.method == "GET":
+            route.fallback()
+            return
+        sent.append(route.request.post_data_json["checkpoint"])
+        route.fulfill(status=422, json={"detail": "refused"})
+
+    page.route("**/v1/jobs", refuse)
+    open_form(page)
+    page.click('[data-kind="evaluate"]')
+    for protocol in ("pick-single", "reach-random"):
+        page.select_option("#evaluate-protocol", protocol)
+        if protocol == "pick-single":
+            page.select_option("#evaluate-checkpoint", pick)
+        page.click("form.train button[type=submit]")
+        expect(page.locator("form.train .notice.bad")).to_contain_text("refused")
+    assert sent == [pick, None]
+
+
+def test_list_of_jobs_says_that_it_is_old_or_not_complete(
+    open_page: Callable[..., Page], server: str
+) -> None:
+    body = {"kind": "evaluate", "protocol": "pick-single", "episodes": 1, "priority": -100}
+    job = patient_http.post(f"{server}/v1/jobs", json=body).json()
+    patient_http.post(f"{server}/v1/jobs/{job['id']}/cancel").raise_for_status()
+    many = [{**job, "id": f"job-{n}", "number": n} for n in range(1, 51)]
+    listed = {"items": many, "next_cursor": "more", "waiting": None}
+    page = open_page(scene=False)
+    page.route("**/v1/jobs?*", lambda route: route.fulfill(json=listed))
+    page.click("#tab-training")
+    expect(page.locator(".training")).to_contain_text("The newest 50 are shown.")
+    page.unroute("**/v1/jobs?*")
+    page.route("**/v1/jobs?*", lambda route: route.fulfill(status=500, body=""))
+    alert = page.locator(".training .notice.bad").first
+    expect(alert).to_have_text("The jobs could not be loaded: the server answered 500")
+    expect(page.locator(".job").first).to_be_visible()
+
+
+def test_ages_are_by_the_clock_of_the_server(open_page: Callable[..., Page]) -> None:
+    page = open_page(scene=False)
+    page.evaluate(WRONG_CLOCK)
+    page.click("#tab-training")
+    shown = page.locator("[data-checkpoint] .job-sub").first
+    expect(shown).to_contain_text("ago")
+    expect(shown).not_to_contain_text("days")
+
+
+def test_a_rounded_million_is_written_as_one(open_page: Callable[..., Page]) -> None:
+    code = "n => import('/static/format.js').then((one) => one.steps(n))"
+    page = open_page(scene=False)
+    texts = {n: page.evaluate(code, n) for n in (9_999, 999_949, 999_950, 1_250_000)}
+    assert list(texts.values()) == ["9999", "999.9 k", "1 M", "1.25 M"]
