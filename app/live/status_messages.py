@@ -26,7 +26,7 @@ _TOUCHED = {
 }
 
 
-def touched(contact: ContactSnapshot, *, final: bool) -> str:
+def contact_message(contact: ContactSnapshot, *, final: bool) -> str:
     """Return the message on a contact; ``final`` if it ends a case study."""
     link = contact.link.replace("_", " ")
     body = _TOUCHED.get(contact.body, contact.body)
@@ -34,7 +34,7 @@ def touched(contact: ContactSnapshot, *, final: bool) -> str:
     return f"Contact: {link} touched {body}. {then}"
 
 
-def resting(status: Status, goal: str | None, label: Label) -> str:
+def standstill_message(status: Status, goal: str | None, label: Label) -> str:
     """Return why the robot does not move.
 
     Args:

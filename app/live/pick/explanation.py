@@ -6,7 +6,7 @@ from app.sim.pick.kernels.grasp import LIFT
 from app.sim.pick.task_policy import Decision, PickProgress
 
 
-def switched(
+def target_switch(
     decision: Decision, names: tuple[str, ...], before: str, t_s: float, label: Label
 ) -> str:
     """Return the message on a target switch: time and both values."""
@@ -18,7 +18,7 @@ def switched(
     )
 
 
-def going(decision: Decision, names: tuple[str, ...], label: Label) -> str:
+def target_choice(decision: Decision, names: tuple[str, ...], label: Label) -> str:
     """Return the target with its value and the next best."""
     text = f"Moving to {label(decision.chosen)} (Q {decision.values[decision.index]:.2f})"
     others = [i for i in range(len(names)) if i != decision.index]
@@ -28,7 +28,7 @@ def going(decision: Decision, names: tuple[str, ...], label: Label) -> str:
     return f"{text}; next: {label(names[second])} ({decision.values[second]:.2f})."
 
 
-def picking(decision: Decision, progress: PickProgress, label: Label) -> str:
+def pick_phase(decision: Decision, progress: PickProgress, label: Label) -> str:
     """Return the station of the pick and its phase."""
     if progress.phase == LIFT:
         return f"At {label(decision.chosen)}: lifting."
@@ -36,7 +36,7 @@ def picking(decision: Decision, progress: PickProgress, label: Label) -> str:
     return f"At {label(decision.chosen)}: {done}."
 
 
-def case_ended(verdict: Verdict, goal: str | None, label: Label) -> str:
+def case_outcome(verdict: Verdict, goal: str | None, label: Label) -> str:
     """Return how a case study ended, and the verdict on the whole run."""
     agrees = "as expected" if verdict.as_expected else "not as expected"
     if goal is None:

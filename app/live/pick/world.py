@@ -221,7 +221,7 @@ class LivePickWorld(BaseWorld[LiveWorkers]):
         if left is not None:
             names = tuple(candidate.id for candidate in self.offered)
             self.set_message(
-                explanation.switched(self.decision, names, left, self.t, self._label)
+                explanation.target_switch(self.decision, names, left, self.t, self._label)
             )
 
     def risk_query(self) -> RiskQuery | None:
@@ -252,23 +252,23 @@ class LivePickWorld(BaseWorld[LiveWorkers]):
 
     def _message(self, status: Status) -> str:
         if status == "contact" and self.contact is not None:
-            return status_messages.touched(self.contact, final=self._case is not None)
+            return status_messages.contact_message(self.contact, final=self._case is not None)
         if self.note is not None and status in ("moving", "picking", "no policy"):
             return self.note
         if status in ("moving", "picking") and (reason := self.slowed()) is not None:
             return reason
         if status == "picking" and self.decision is not None:
-            return explanation.picking(self.decision, self.progress, self._label)
+            return explanation.pick_phase(self.decision, self.progress, self._label)
         if status == "moving" and self.decision is not None:
             names = tuple(candidate.id for candidate in self.offered)
             planned = self.planner.message(self._label(self.decision.chosen))
-            return planned or explanation.going(self.decision, names, self._label)
+            return planned or explanation.target_choice(self.decision, names, self._label)
         if status == "case done" and self._case is not None:
             if self.contact is not None:
-                return status_messages.touched(self.contact, final=True)
+                return status_messages.contact_message(self.contact, final=True)
             verdict = judge(self._case, self._run, self._label)
-            return explanation.case_ended(verdict, self._goal, self._label)
-        return status_messages.resting(status, self._goal, self._label)
+            return explanation.case_outcome(verdict, self._goal, self._label)
+        return status_messages.standstill_message(status, self._goal, self._label)
 
     def _verdict(self) -> Verdict | None:
         return None if self._case is None else judge(self._case, self._run, self._label)

@@ -8,7 +8,7 @@ from app.live.snapshot import Status
 NO_POLICY = "No reach policy is active: moving straight to the goal without avoiding people"
 
 
-def doing(
+def motion(
     status: Status,
     view: ReachSnapshot,
     safety: SafetySnapshot,

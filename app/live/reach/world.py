@@ -167,9 +167,9 @@ class LiveReachWorld(BaseWorld[LivePedestrians]):
 
     def _message(self, view: ReachSnapshot) -> str:
         if self.status == "contact" and self.contact is not None:
-            return status_messages.touched(self.contact, final=False)
+            return status_messages.contact_message(self.contact, final=False)
         has_policy = self._controller.policy is not None
-        return explanation.doing(
+        return explanation.motion(
             self.status,
             view,
             self.safety.snapshot(self.people.ids),

@@ -178,18 +178,18 @@ def _for_held(table: SortingTable, decision: SortingDecision, kept: Move | None)
     block, position = table.held, table.held_position
     assert block is not None
 
-    def going(place: int, *, back: bool = False) -> MoveChoice:
+    def place_at(place: int, *, back: bool = False) -> MoveChoice:
         move = Move(position, place)
         return MoveChoice(move=move, block=block, options=((block, move),), back=back)
 
     own = [one for one in decision.ranked if one.move.pick == position]
     if kept is not None and _is_fewest(own, kept.place):
-        return going(kept.place)
+        return place_at(kept.place)
     best = decision.move
     if best is not None and (best.pick == position or _is_duplicate(table, best, block)):
         if _is_fewest(own, best.place) or best.pick == position:
-            return going(best.place)
-    return going(position, back=True)
+            return place_at(best.place)
+    return place_at(position, back=True)
 
 
 def _is_duplicate(table: SortingTable, move: Move, block: Block) -> bool:

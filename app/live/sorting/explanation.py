@@ -30,7 +30,7 @@ class StatusMessages:
         label = self._labels[position]
         return f"the {label}" if position >= self._table.shape.n_cells else label
 
-    def doing(
+    def motion(
         self,
         phase: Phase,
         choice: MoveChoice,
@@ -53,20 +53,20 @@ class StatusMessages:
         why = _preference(choice, controller.order, decision) or self._risk(choice)
         return f"{text}{why}{self._fallback(controller)}"
 
-    def missed(self, block: Block, risk: float) -> str:
+    def failed_grasp(self, block: Block, risk: float) -> str:
         """Return that a grasp failed."""
         return f"Grasp of {self.block(block)} failed ({risk:.0%} fail here): trying again."
 
-    def late(self, choice: MoveChoice) -> str:
+    def timeout(self, choice: MoveChoice) -> str:
         """Return that a motion reached the time limit."""
         return f"Timed out on the motion to {self.block(choice.block)}: trying again."
 
-    def returned(self, block: Block, position: int) -> str:
+    def returned_block(self, block: Block, position: int) -> str:
         """Return the place of a held block after a contact."""
         text = self.block(block)
         return f"{text[0].upper()}{text[1:]} is back at {self.place(position)}."
 
-    def shrunk(self, block: Block) -> str:
+    def removed_goal_block(self, block: Block) -> str:
         """Return that the goal lost a removed block."""
         text = self.block(block)
         return f"{text[0].upper()}{text[1:]} was removed, also from the goal."

@@ -97,7 +97,7 @@ class LiveSortingWorld(BaseWorld[LiveWorkers]):
         if table.held is not None:
             block, position = table.held, table.held_position
             table.drop(position)
-            self.set_message(self._messages.returned(block, position))
+            self.set_message(self._messages.returned_block(block, position))
 
     # Commands.
 
@@ -123,7 +123,7 @@ class LiveSortingWorld(BaseWorld[LiveWorkers]):
             self.set_message(f"Ignored: {error.message}")
             raise
         if gone is not None:
-            self.set_message(self._messages.shrunk(gone))
+            self.set_message(self._messages.removed_goal_block(gone))
         if self._test is not None:
             self._test.note_visitor()
         self._replan()
@@ -241,7 +241,7 @@ class LiveSortingWorld(BaseWorld[LiveWorkers]):
             return
         if self._table.held is None:
             self._controller.avoid(choice.move.pick)
-        self.set_message(self._messages.late(choice))
+        self.set_message(self._messages.timeout(choice))
         self._begin()
 
     def _begin_vertical(self, name: str) -> None:
@@ -295,7 +295,7 @@ class LiveSortingWorld(BaseWorld[LiveWorkers]):
             return
         self._counts = replace(self._counts, failures=self._counts.failures + 1)
         self._controller.end_attempt()
-        self.set_message(self._messages.missed(choice.block, risk))
+        self.set_message(self._messages.failed_grasp(choice.block, risk))
 
     def _end_vertical(self) -> None:
         same = self._version == self._table.version
@@ -360,18 +360,18 @@ class LiveSortingWorld(BaseWorld[LiveWorkers]):
 
     def _message(self, status: Status) -> str:
         if status == "contact" and self.contact is not None:
-            return status_messages.touched(self.contact, final=False)
+            return status_messages.contact_message(self.contact, final=False)
         if self.note is not None and status != "blocked":
             return self.note
         if status in ("moving", "picking") and (reason := self.slowed()) is not None:
             return reason
         if status in ("moving", "picking") and (chosen := self._chosen()) is not None:
-            return self._messages.doing(self._phase, chosen, self._controller, self.decision)
+            return self._messages.motion(self._phase, chosen, self._controller, self.decision)
         if status == "solved":
             return DONE
         if status == "no candidates":
             return NO_GOAL
-        return status_messages.resting(status, None, str)
+        return status_messages.standstill_message(status, None, str)
 
     def snapshot(self) -> WorldSnapshot:
         """Return the read model of the present state."""

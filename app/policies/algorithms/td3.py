@@ -90,7 +90,7 @@ def critics_of(critic: ContinuousCritic) -> Critics:
     return critic.own
 
 
-class OwnPolicy(TD3Policy):
+class BatchTD3Policy(TD3Policy):
     """Policy with the networks of this project."""
 
     def __init__(self, *args: Any, networks: Networks, **kwargs: Any) -> None:
@@ -135,7 +135,7 @@ class BatchTD3(TD3, Stateful):
                 "replay_buffer_kwargs": {**replay, **own},
             }
         super().__init__(
-            OwnPolicy,
+            BatchTD3Policy,
             env,
             learning_rate=lambda remaining: end * (start / end) ** remaining,
             buffer_size=learning.buffer_size,

@@ -38,7 +38,7 @@ class CrowdShape(NamedTuple):
     """Length of a block; its first number is 1 if the person is present, otherwise 0."""
 
 
-class Fade(NamedTuple):
+class ResidualFading(NamedTuple):
     """Fading of a residual with the distance to people, in units of the observation."""
 
     place: int
@@ -100,7 +100,7 @@ class ResidualActor(nn.Module):
         base: int = BASE_START,
         layers: int = 2,
         crowd: CrowdShape | None = None,
-        fade: Fade | None = None,
+        fade: ResidualFading | None = None,
     ) -> None:
         super().__init__()
         n_seen, before = _seen(crowd, n_obs)

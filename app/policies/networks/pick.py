@@ -6,10 +6,10 @@ from torch import nn
 from app.policies.configs.pick import PickPreset
 from app.policies.networks.actor_critic import (
     Critics,
-    Fade,
     MeanCritics,
     QNetwork,
     ResidualActor,
+    ResidualFading,
     hidden,
     initialise_glorot,
 )
@@ -68,7 +68,7 @@ def actor_of(preset: PickPreset, n_obs: int) -> ResidualActor | NormedActor:
     if sizes.actor == "plain":
         return NormedActor(sizes.width, n_obs, sizes.layers)
     if preset.episode.task == "pick":
-        fade = Fade(
+        fade = ResidualFading(
             CLEARANCE, RESIDUAL_FULL_M / DISTANCE_SCALE, RESIDUAL_ZERO_M / DISTANCE_SCALE
         )
     return ResidualActor(sizes.width, n_obs, layers=sizes.layers, fade=fade)

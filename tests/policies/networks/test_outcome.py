@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import torch
 
-from app.policies.networks.actor_critic import Fade, ResidualActor
+from app.policies.networks.actor_critic import ResidualActor, ResidualFading
 from app.policies.networks.outcome import OutcomeHead
 from app.policies.training.outcome import OutcomeData, fit
 
@@ -40,7 +40,7 @@ def test_the_residual_fades_with_the_distance_to_people(distance: float, share: 
     torch.manual_seed(3)
     free = ResidualActor(16, 12, n_act=2, base=4)
     torch.manual_seed(3)
-    faded = ResidualActor(16, 12, n_act=2, base=4, fade=Fade(7, 0.8, 1.0))
+    faded = ResidualActor(16, 12, n_act=2, base=4, fade=ResidualFading(7, 0.8, 1.0))
     obs = torch.randn(5, 12)
     obs[:, 4:6] = obs[:, 4:6].clamp(-0.9, 0.9)
     obs[:, 7] = distance
