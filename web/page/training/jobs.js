@@ -111,8 +111,8 @@ export function JobList({ jobs, error, onNew, ...rest }) {
     ${listed.map((job) => html`<${Job} key=${job.id} job=${job} jobs=${jobs} ...${rest}
       open=${rest.open === job.id} />`)}
   </ul>
-  ${jobs.filter((job) => !job.part_of).length >= PAGE && html`<p class="faint">The newest
-    ${` ${PAGE}`} are shown.</p>`}`;
+  ${jobs.filter((job) => !job.part_of).length >= PAGE && html`<p class="faint">
+    ${`The newest ${PAGE} are shown.`}</p>`}`;
 }
 
 function Job({ job, jobs, open, chosen, onChoose, ...rest }) {
