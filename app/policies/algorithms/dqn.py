@@ -48,16 +48,22 @@ def network_of(preset: SortingPreset, shape: SortingShape) -> SharedNetwork | Pr
 class _SB3QNetwork(QNetwork):
     """Stable-Baselines3's network with one of ours in place of its own layers."""
 
+    q_net: SharedNetwork | PrintedNetwork  # type: ignore[assignment]
+
     def __init__(
         self, *args: Any, preset: SortingPreset, shape: SortingShape, **kwargs: Any
     ) -> None:
         super().__init__(*args, **{**kwargs, "net_arch": [1]})
-        self.q_net = network_of(preset, shape)  # type: ignore[assignment]
+        self.q_net = network_of(preset, shape)
 
     def forward(self, obs: PyTorchObs) -> Tensor:
         """Return the values of all moves, (B, n_actions)."""
         values: Tensor = self.q_net(obs)
         return values
+
+    def best(self, obs: Tensor) -> Tensor:
+        """Return the moves of greatest value, (B,)."""
+        return self.q_net.best(obs)
 
 
 class SortingDQNPolicy(DQNPolicy):
@@ -85,6 +91,7 @@ class SortingDQN(DQN, Stateful):
     """
 
     STATE = (*COUNTERS, "exploration_rate", "_random")
+    q_net: _SB3QNetwork
 
     def __init__(
         self,
@@ -151,8 +158,8 @@ class SortingDQN(DQN, Stateful):
         if not at_random.all():
             assert self._last_obs is not None
             with torch.no_grad():
-                values = self.q_net(torch.as_tensor(self._last_obs))
-            actions = np.where(at_random, actions, values.argmax(dim=1).numpy())
+                best = self.q_net.best(torch.as_tensor(self._last_obs))
+            actions = np.where(at_random, actions, best.numpy())
         return actions, actions
 
     def train(self, gradient_steps: int, batch_size: int = 100) -> None:
@@ -170,7 +177,7 @@ class SortingDQN(DQN, Stateful):
     def _update(self, batch_size: int, beta: float) -> None:
         drawn = self.memory.draw(batch_size, beta)
         with torch.no_grad():
-            following = self.q_net(drawn.next_observations).argmax(dim=1, keepdim=True)
+            following = self.q_net.best(drawn.next_observations)[:, None]
             there = self.q_net_target(drawn.next_observations).gather(1, following)[:, 0]
             target = drawn.rewards + drawn.discounts * there
         values = self.q_net(drawn.observations)
@@ -184,10 +191,11 @@ class SortingDQN(DQN, Stateful):
                 values[:n], torch.as_tensor(best), self.preset.expert.margin
             )
             loss = loss + self.preset.expert.weight * short
-        self.policy.optimizer.zero_grad()
+        optimizer = self.policy.optimizer
+        optimizer.zero_grad()
         loss.backward()  # type: ignore[no-untyped-call]
-        torch.nn.utils.clip_grad_norm_(self.policy.parameters(), self.max_grad_norm)
-        self.policy.optimizer.step()
+        torch.nn.utils.clip_grad_norm_(optimizer.param_groups[0]["params"], self.max_grad_norm)
+        optimizer.step()
         with torch.no_grad():
             self.memory.update(drawn.indices, (taken - target).abs().numpy())
 

@@ -106,7 +106,12 @@ class OneHotLinear(nn.Module):
         """One row per plain number, (n_plain, width)."""
         self.bias = nn.Parameter(like.bias.detach())
 
-    def forward(self, codes: Tensor, plain: Tensor) -> Tensor:
-        """Return (B, width) for codes, uint8, (B, P), and plain numbers, (B, n_plain)."""
+    def forward(self, codes: Tensor, plain: Tensor | None) -> Tensor:
+        """Return (B, width) for codes, uint8, (B, P), and plain numbers, (B, n_plain).
+
+        Without plain numbers the result is that of zeros.
+        """
         summed: Tensor = _Product.apply(codes, self.n_codes, self.weight)  # type: ignore[no-untyped-call]
+        if plain is None:
+            return summed + self.bias
         return summed + torch.addmm(self.bias, plain, self.plain)

@@ -116,6 +116,11 @@ class SharedNetwork(nn.Module):
         value = self.value(joint).mean(dim=1)
         return dueling(value, advantage, valid).masked_fill(~valid, NEVER)
 
+    def best(self, obs: Tensor) -> Tensor:
+        """Return the moves of greatest value, (B,)."""
+        best: Tensor = self(obs).argmax(dim=1)
+        return best
+
     def _features(self, clutter: Tensor, towers: Tensor, goal: Tensor, fail: Tensor) -> Tensor:
         """Return what every tower sees, (B, C, n_in)."""
         n, n_towers, k = towers.shape
@@ -198,14 +203,22 @@ class PrintedNetwork(nn.Module):
 
     def forward(self, obs: Tensor) -> Tensor:
         """Return the values of all moves, (B, n_actions); it knows nothing of valid ones."""
-        codes = obs[:, : self.n_places].to(torch.uint8).contiguous()
-        fail = obs[:, self.n_places :].float() / FAILURE_SCALE
-        if not self.informed:
-            fail = torch.zeros_like(fail)
+        codes, fail = self._split(obs)
         advantage = self.advantage(self.advantage_first(codes, fail))
         value = self.value(self.value_first(codes, fail))
         values: Tensor = value + advantage - advantage.mean(dim=1, keepdim=True)
         return values
+
+    def best(self, obs: Tensor) -> Tensor:
+        """Return the moves of greatest value, (B,): those of greatest advantage."""
+        advantage: Tensor = self.advantage(self.advantage_first(*self._split(obs)))
+        return advantage.argmax(dim=1)
+
+    def _split(self, obs: Tensor) -> tuple[Tensor, Tensor | None]:
+        """Return codes, and failure probabilities if they are observed."""
+        codes = obs[:, : self.n_places].to(torch.uint8).contiguous()
+        fail = obs[:, self.n_places :].float() / FAILURE_SCALE if self.informed else None
+        return codes, fail
 
 
 def _second_layer(width: int, n_out: int) -> nn.Sequential:

@@ -41,3 +41,10 @@ def test_starts_as_a_linear_layer_over_all_inputs_does() -> None:
     for parameter in (layer.weight, layer.plain, layer.bias):
         assert parameter.abs().max() <= bound
         assert parameter.abs().max() > 0.9 * bound
+
+
+def test_without_plain_numbers_the_result_is_that_of_zeros() -> None:
+    torch.manual_seed(0)
+    layer = OneHotLinear(9, 12, 5, 8)
+    codes = torch.randint(0, 12, (7, 9), dtype=torch.uint8)
+    torch.testing.assert_close(layer(codes, None), layer(codes, torch.zeros(7, 5)))

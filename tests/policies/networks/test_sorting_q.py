@@ -123,5 +123,18 @@ def test_only_the_informed_network_observes_failure_probabilities():
     assert not torch.equal(informed(obs), informed(other))
 
 
+@pytest.mark.parametrize("kind", NETWORKS)
+def test_the_best_move_is_the_one_of_greatest_value(kind):
+    batch = batch_in(load_cell("sorting-e0"), 300, 5, DISTURBED)
+    torch.manual_seed(3)
+    net = NETWORKS[kind](batch.shape, 32)
+    obs = torch.as_tensor(batch.reset())
+    with torch.no_grad():
+        values, best = net(obs), net.best(obs)
+    taken = values.gather(1, best[:, None])[:, 0]
+    torch.testing.assert_close(taken, values.amax(dim=1), rtol=0.0, atol=1e-5)
+    assert len(best.unique()) > 1
+
+
 def test_presets_name_networks_that_there_are():
     assert set(NETWORKS) == {"shared", "printed", "printed-informed"}
