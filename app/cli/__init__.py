@@ -10,6 +10,8 @@ export          The command ``export``: write a checkpoint as an ONNX model
 evaluate        The commands ``evaluate`` and ``bench``
 http_limits     Limits of HTTP connections: size of the request head, time, progress, number of
                 clients
+joined_head     Answers in one write: the head of an answer leaves with the first part of its
+                body
 options         Options that several commands have, and the environment that every command
                 prepares
 output          Printing of results, as text or as one JSON object

@@ -12,6 +12,7 @@ from uvicorn.protocols.http.httptools_impl import STATUS_LINE, HttpToolsProtocol
 
 from app.api.problems import problem
 from app.api.responses import HEADERS
+from app.cli.joined_head import JoinedHead
 
 HEAD_BYTES = 32 * 1024
 """Limit of a request's head: URL and headers, trailers included [bytes]."""
@@ -115,6 +116,9 @@ class LimitedHttp(HttpToolsProtocol):
             self._refusal = 503, "too-many-requests-at-once", "too many pipelined requests"
             raise ValueError(self._refusal)
         super().on_headers_complete()
+        if self.cycle and not isinstance(self.cycle.transport, JoinedHead):
+            has_body = self.scope["method"] != "HEAD"
+            self.cycle.transport = JoinedHead(self.transport, has_body=has_body)
         self._in_body, self._body_since = True, self.loop.time()
 
     def on_body(self, body: bytes) -> None:
