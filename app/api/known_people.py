@@ -67,15 +67,15 @@ class KnownPerson(NamedTuple):
     estimate: PersonEstimate | None = None
     """Estimate from key-points; None without key-points."""
 
-    def use(self, seen: bool, dropped: bool = False) -> Data:
+    def use(self, used: bool, dropped: bool = False) -> Data:
         """Return the data of the answer's member about this person.
 
         Args:
-            seen: Whether the policy uses this person.
+            used: Whether the policy uses this person.
             dropped: Whether this person is left out because the request has too many.
         """
         use = PersonUse.data_of(
-            self.source, seen, self.speeds, self.person, self.observed, self.estimate
+            self.source, used, self.speeds, self.person, self.observed, self.estimate
         )
         if dropped:
             use["flags"].append("dropped")

@@ -50,7 +50,7 @@ class TrackedPeople:
     """Estimate of each track at the last frame with its person; None without such a frame."""
     observed_age_s: tuple[float, ...]
     """Age of each observation [s]; without one, ``since_frame_s``."""
-    unfollowed: tuple[UnassignedDetection, ...]
+    unassigned: tuple[UnassignedDetection, ...]
     """People of the newest frame without a track, nearest first."""
 
 
@@ -134,7 +134,7 @@ class TrackerSession:
             estimates=self._flagged(estimates, since_frame_s),
             observed=observed,
             observed_age_s=tuple(ages),
-            unfollowed=self.estimator.unfollowed,
+            unassigned=self.estimator.unassigned,
         )
 
     def _flagged(

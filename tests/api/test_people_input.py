@@ -39,7 +39,7 @@ def test_keypoints_of_a_posture_are_worth_what_the_posture_is(
     by_points = asked(client, state, {"keypoints": POINTS})
     assert by_joints["people"][0]["by"] == "joint-angles"
     use = by_points["people"][0]
-    assert (use["by"], use["seen"], use["speeds"]) == ("keypoints", True, "zero")
+    assert (use["by"], use["used"], use["speeds"]) == ("keypoints", True, "zero")
     assert use["flags"] == use["held"] == use["missing"] == []
     assert values(by_points) == pytest.approx(values(by_joints), abs=0.05)
 
@@ -77,7 +77,7 @@ def test_of_four_people_the_nearest_is_seen(client: TestClient, state: dict[str,
     farther = {**WHOLE, "q": [-4.0, 4.0, *WHOLE["q"][2:]]}
     alone = asked(client, state, WHOLE)
     answer = asked(client, state, far, farther, WHOLE, far)
-    assert [one["seen"] for one in answer["people"]] == [False, False, True, False]
+    assert [one["used"] for one in answer["people"]] == [False, False, True, False]
     assert values(answer) == values(alone)
 
 
@@ -280,7 +280,7 @@ def test_of_more_than_four_people_the_nearest_count_and_the_rest_is_named(
     assert values(answer) == values(near)
     kept = [i for i, one in enumerate(answer["people"]) if "dropped" not in one["flags"]]
     assert kept == [0, 4, 8, 9]
-    assert [i for i, one in enumerate(answer["people"]) if one["seen"]] in ([8], [9])
+    assert [i for i, one in enumerate(answer["people"]) if one["used"]] in ([8], [9])
     assert all(
         "people[8]" in o["field"] or "people[9]" in o["field"] or "robot" in o["field"]
         for o in answer["state_outside"]
@@ -299,7 +299,7 @@ def test_people_are_identified_by_their_index_among_many(client: TestClient) -> 
     answer = client.post("/v1/motion", json={**question, "people": [*crowd, near]}).json()
     assert answer["safety"]["set_by"] == answer["safety"]["terms"]["person"] == 6
     assert answer["safety"]["override"] == alone["safety"]["override"]
-    assert answer["people"][6]["seen"] and answer["people"][6]["separation"] < 1.0
+    assert answer["people"][6]["used"] and answer["people"][6]["separation"] < 1.0
     dropped = [i for i, one in enumerate(answer["people"]) if "dropped" in one["flags"]]
     assert dropped == [3, 4, 5]
     assert all(answer["people"][i]["separation"] is None for i in dropped)

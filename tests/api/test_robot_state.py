@@ -180,7 +180,7 @@ def test_far_people_cost_no_decision_and_are_flagged(
 ) -> None:
     alone, both = asked(client, url), asked(client, url, people=[*TASKS[url]["people"], far])
     assert [one["flags"] for one in both["people"]] == [[], ["far"]]
-    assert [one["seen"] for one in both["people"]] == [True, False]
+    assert [one["used"] for one in both["people"]] == [True, False]
     only = asked(client, url, people=[far])
     assert only["people"][0]["flags"] == ["far"]
     if url == "/v1/motion":

@@ -130,7 +130,7 @@ def with_robot(pieces: int, seed: int) -> tuple[Subject, Row]:
     world = batch.world._replace(arm=arm)
     state = batch.state._replace(robot=np.repeat(arm.columns[None], BATCH, axis=0))
     work = new_step_workspace(arm, world.people, state.people)
-    sight = observation_workspace_of(batch.cell)
+    observation = observation_workspace_of(batch.cell)
     task = batch._task
     obs = np.zeros((BATCH, pick.N_PLAIN), dtype=np.float32)
     rew = np.zeros(BATCH, dtype=np.float32)
@@ -140,7 +140,7 @@ def with_robot(pieces: int, seed: int) -> tuple[Subject, Row]:
 
     def step() -> None:
         pick.step_batch(world, task, state, work, next(turn), rew, ended)
-        pick.observe_rows(world, task.grasp, state, every, work, sight, PLAIN, obs)
+        pick.observe_rows(world, task.grasp, state, every, work, observation, PLAIN, obs)
         done = np.flatnonzero(ended)
         if len(done):
             state.episode[done] += 1

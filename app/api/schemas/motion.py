@@ -16,10 +16,10 @@ from app.sim.core.arrays import Vec
 from app.sim.human.person import Person
 from app.sim.perception.multi_person_tracker import MAX_SKELETONS
 from app.sim.reach.motion_types import (
-    Beside,
     MotionDecision,
     MotionMode,
     MotionQuery,
+    PersonWeighting,
 )
 from app.sim.robot.trajectory_segment import TrajectorySegment
 from app.sim.safety.decision import SafetyDecision, powers_of_time
@@ -59,7 +59,7 @@ class MotionRequest(Body):
         "targets around the goal; `direct`: its action for the goal itself; null: interpolated "
         "where the policy has targets",
     )
-    beside: Beside = Field(
+    person_weighting: PersonWeighting = Field(
         "nearest",
         description="several people: the policy's action for the nearest, or the mean of its "
         "actions for each, weighted by distance",
@@ -123,7 +123,7 @@ class MotionRequest(Body):
             people=people,
             observed=observed,
             inference_mode=self.inference_mode,
-            beside=self.beside,
+            person_weighting=self.person_weighting,
             rollout=self.rollout,
             time_left_s=self.time_left_s,
             elapsed_s=self.elapsed_s,

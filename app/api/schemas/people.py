@@ -257,7 +257,7 @@ class PersonUse(Answer):
     """Use of one person of a request."""
 
     by: Source
-    seen: bool = Field(description="whether the policy uses this person: the nearest")
+    used: bool = Field(description="whether the policy uses this person: the nearest")
     as_cylinder: bool = Field(
         description="whether no joint angles are known and a cylinder is used"
     )
@@ -282,7 +282,7 @@ class PersonUse(Answer):
     @staticmethod
     def data_of(
         source: Source,
-        seen: bool,
+        used: bool,
         speeds: Speeds,
         person: Person | None,
         observed: Person | None,
@@ -292,7 +292,7 @@ class PersonUse(Answer):
 
         Args:
             source: Kind of description in the request.
-            seen: Whether the policy uses this person.
+            used: Whether the policy uses this person.
             speeds: Origin of the speeds.
             person: State for the policy; None: not used.
             observed: State for monitoring; None: not used.
@@ -300,7 +300,7 @@ class PersonUse(Answer):
         """
         return {
             "by": source,
-            "seen": seen,
+            "used": used,
             "as_cylinder": person is not None and person.cylinder is not None,
             "monitored_as_cylinder": observed is not None and observed.cylinder is not None,
             "speeds": speeds,

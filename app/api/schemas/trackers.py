@@ -131,7 +131,7 @@ class EstimatesPublic(Answer):
         "frame"
     )
     people: list[EstimatePublic]
-    unfollowed: list[UnassignedDetectionPublic] = Field(
+    unassigned: list[UnassignedDetectionPublic] = Field(
         description="people of the newest frame without a track, nearest first"
     )
 

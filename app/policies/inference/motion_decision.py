@@ -40,8 +40,8 @@ from app.sim.perception.observed_people import (
 from app.sim.reach.batch import goal_region_of
 from app.sim.reach.monitored.batch import HORIZON_S
 from app.sim.reach.motion_types import (
-    BESIDES,
     MOTION_MODES,
+    PERSON_WEIGHTINGS,
     MotionDecision,
     MotionMode,
     MotionQuery,
@@ -193,8 +193,9 @@ class MotionDecider:
             value = getattr(query, name)
             if not 0.0 <= value < math.inf:
                 raise InvalidInput(name, value, "must be finite and not negative [s]")
-        if query.beside not in BESIDES:
-            raise InvalidInput("beside", query.beside, "must name a rule", BESIDES)
+        asked = query.person_weighting
+        if asked not in PERSON_WEIGHTINGS:
+            raise InvalidInput("person_weighting", asked, "must name a rule", PERSON_WEIGHTINGS)
         return robot, goal
 
     def _mode(self, asked: MotionMode | None) -> MotionMode:
@@ -266,7 +267,7 @@ class MotionDecider:
             used = mix.weights[0] > 0.0
             places, shares = around[0][used], mix.weights[0][used]
         weights = [float(who == nearest) for who in range(len(apart))]
-        if query.beside == "distance-weighted" and len(apart) > 1:
+        if query.person_weighting == "distance-weighted" and len(apart) > 1:
             # The nearest first: rounding depends on the place in the batch.
             counts = person_weights(apart[None])[0]
             first, weights = apart.argsort(), counts.tolist()
@@ -274,13 +275,13 @@ class MotionDecider:
             seen: list[PersonValues] = []
             for row, who in enumerate(first.tolist()):
                 obs[row] = stage.observe(places, who)
-                seen.append((who, stage.seen.copy()))
+                seen.append((who, stage.observed.copy()))
             seen.sort(key=lambda one: one[0] or 0)
             acts = self.actor.acts(obs.reshape(-1, stage.obs_size))
             shares_of_acts = np.outer(counts[first], shares).ravel()
         else:
             acts = self.actor.acts(stage.observe(places))
-            seen, shares_of_acts = [(nearest, stage.seen.copy())], shares
+            seen, shares_of_acts = [(nearest, stage.observed.copy())], shares
         targets: tuple[TargetWeight, ...] = ()
         if mode == "interpolated":
             targets = tuple(

@@ -112,7 +112,7 @@ class MultiPersonTracker:
         """Estimate of each track at the last frame that showed its person; None: never."""
         self._waiting: list[Vec] = []
         self._waiting_since = 0.0
-        self.unfollowed: tuple[UnassignedDetection, ...] = ()
+        self.unassigned: tuple[UnassignedDetection, ...] = ()
         """Detections of the newest frame assigned to no track, nearest first."""
 
     def update(
@@ -233,7 +233,7 @@ class MultiPersonTracker:
             for track, j in zip(self._tracks, order, strict=True)
             if j is not None and "jump" in track.frame_flags
         }
-        unfollowed = [
+        unassigned = [
             UnassignedDetection(
                 index=j,
                 reason="foreign-frame"
@@ -247,11 +247,11 @@ class MultiPersonTracker:
             for j, frame in enumerate(frames)
             if frame.implausible or (frame.seen.any() and (j in jumps or j not in order))
         ]
-        self.unfollowed = tuple(sorted(unfollowed, key=lambda one: one.distance_m or np.inf))
+        self.unassigned = tuple(sorted(unassigned, key=lambda one: one.distance_m or np.inf))
         self._waiting_since = t
-        self._waiting = [frames[one.index].points for one in unfollowed if not one.detail]
+        self._waiting = [frames[one.index].points for one in unassigned if not one.detail]
         self._foreign = next((frame.implausible for frame in frames if frame.implausible), None)
-        dropped = any(one.reason == "farther" for one in unfollowed)
+        dropped = any(one.reason == "farther" for one in unassigned)
         for i, (j, before) in enumerate(zip(order, self._order, strict=True)):
             flags: list[Flag] = ["replaced"] if i in replaced else []
             another = i in replaced or "restarted" in self._tracks[i].frame_flags

@@ -14,9 +14,9 @@ from app.sim.safety.layer import SafetySettings
 MotionMode = Literal["interpolated", "direct"]
 """Interpolation between training targets, or the policy queried for the goal itself."""
 MOTION_MODES: tuple[MotionMode, ...] = get_args(MotionMode)
-Beside = Literal["nearest", "distance-weighted"]
+PersonWeighting = Literal["nearest", "distance-weighted"]
 """Several people: observe the nearest, or average the actions beside each of them."""
-BESIDES: tuple[Beside, ...] = get_args(Beside)
+PERSON_WEIGHTINGS: tuple[PersonWeighting, ...] = get_args(PersonWeighting)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -38,7 +38,7 @@ class MotionQuery:
     """Joint accelerations [rad/s^2], shape (6,); required by policies that limit jerk."""
     inference_mode: MotionMode | None = None
     """None interpolates if the policy has targets, else queries it for the goal itself."""
-    beside: Beside = "nearest"
+    person_weighting: PersonWeighting = "nearest"
     """Several people with a policy that observes one."""
     rollout: bool | None = None
     """Whether rollouts improve the action; None if the policy can be simulated."""

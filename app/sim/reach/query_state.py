@@ -88,9 +88,9 @@ class QueryState:
         return self._work.robot.tcp
 
     @property
-    def seen(self) -> Vec:
+    def observed(self) -> Vec:
         """The person observed last: x, y [m], vx, vy [m/s], r [m], growth [m/s], shape (6,)."""
-        return self._work.seen
+        return self._work.observed
 
     @property
     def shapes(self) -> Shapes:

@@ -77,7 +77,7 @@ def test_no_people_are_no_error_and_each_person_is_reported(client: TestClient) 
     assert asked(client, people=[])["people"] == []
     far = {"x": 4.0, "y": 4.0, "vx": 0.0, "vy": 0.0, "r": 0.3}
     answer = asked(client, people=[far, *PLAN["people"]])
-    assert [one["seen"] for one in answer["people"]] == [False, True]
+    assert [one["used"] for one in answer["people"]] == [False, True]
 
 
 def test_wide_margin_offers_moves_with_more_attempts(client: TestClient) -> None:

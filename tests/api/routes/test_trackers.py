@@ -204,11 +204,11 @@ def test_people_beyond_the_limit_leave_tracked_ones_unchanged(
         assert "people-dropped" in person["flags"]
         true = near[k][K["mid_hip"]][0]
         assert person["q"][0] == pytest.approx(true, abs=0.05)
-    assert [(one["index"], one["reason"]) for one in answer["unfollowed"]] == [
+    assert [(one["index"], one["reason"]) for one in answer["unassigned"]] == [
         (2, "farther"),
         (0, "farther"),
     ]
-    assert client.get(tracker).json()["unfollowed"] == answer["unfollowed"]
+    assert client.get(tracker).json()["unassigned"] == answer["unassigned"]
 
 
 def test_person_in_another_frame_is_reported_and_others_are_tracked(

@@ -110,9 +110,9 @@ def test_people_may_come_in_any_order() -> None:
     batch = driven(4, ("worker", "walker", "constant"))
     asked, one = query_of(batch, 1), decider()
     turned = replace(asked, people=asked.people[::-1])
-    for beside in ("nearest", "distance-weighted"):
-        first = one.decide(replace(asked, beside=beside))
-        second = one.decide(replace(turned, beside=beside))
+    for weighting in ("nearest", "distance-weighted"):
+        first = one.decide(replace(asked, person_weighting=weighting))
+        second = one.decide(replace(turned, person_weighting=weighting))
         np.testing.assert_allclose(first.act, second.act, atol=1e-12)
         for here, there in zip(first.person_weights, second.person_weights[::-1], strict=True):
             assert here.separation == there.separation
@@ -125,7 +125,7 @@ def test_distance_weighted_actions_equal_those_of_the_controller() -> None:
     expected = controller_of(actor, "distance-weighted-interpolated").acts(batch)
     decide = MotionDecider(actor, CELL).decide
     for e in np.flatnonzero(batch.state.outcome == 0):
-        decision = decide(replace(query_of(batch, e), beside="distance-weighted"))
+        decision = decide(replace(query_of(batch, e), person_weighting="distance-weighted"))
         np.testing.assert_allclose(decision.act, expected[e], atol=2e-6)
         assert sum(one.weight for one in decision.person_weights) == pytest.approx(1.0)
 
@@ -269,7 +269,7 @@ BAD: list[tuple[dict[str, Any], str]] = [
     ({"elapsed_s": float("nan")}, "elapsed_s"),
     ({"age_s": float("inf")}, "age_s"),
     ({"inference_mode": "around"}, "choices: interpolated, direct"),
-    ({"beside": "farthest"}, "choices: nearest, distance-weighted"),
+    ({"person_weighting": "farthest"}, "choices: nearest, distance-weighted"),
     ({"people": (FAR_PERSON,) * 5}, "at most 4"),
     ({"people": (Person(q=np.full(18, np.nan), qd=np.zeros(18)),)}, r"people\[0\]\.q\[0\]"),
     ({"people": (person_from_cylinder(0.0, 1.0, 99.0, 0.0, 0.3),)}, r"people\[0\]\.qd\[0\]"),
@@ -362,7 +362,7 @@ def random_query(rng: np.random.Generator) -> MotionQuery:
         qd=rng.uniform(-1, 1, 6) * mount.qd_max,
         goal=rng.uniform([-0.5, 0.6, 0.1], [0.5, 1.0, 0.5]),
         people=people,
-        beside="distance-weighted" if rng.uniform() < 0.5 else "nearest",
+        person_weighting="distance-weighted" if rng.uniform() < 0.5 else "nearest",
         safety=SafetySettings(),
     )
 

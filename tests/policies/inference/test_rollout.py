@@ -50,8 +50,8 @@ def workspace(
     network = ACTOR.kernel_network if network is None else network
     assert network is not None
     people, state = batch.world.people, batch.state.people
-    sight = new_observation_workspace(batch.arm, people, state, new_motion_predictor())
-    return new_rollout_workspace(batch.arm, network, base_weight, sight, batch.n_envs)
+    observation = new_observation_workspace(batch.arm, people, state, new_motion_predictor())
+    return new_rollout_workspace(batch.arm, network, base_weight, observation, batch.n_envs)
 
 
 def standing(n_envs: int) -> ReachBatch:
@@ -71,7 +71,7 @@ def simulate(
 ) -> int:
     """Predict the people and simulate one candidate; return its outcome."""
     rule = batch.settings.action.rule()
-    predict_people(batch.world, batch.state, e, N_MOMENTS, work.sight, work.people)
+    predict_people(batch.world, batch.state, e, N_MOMENTS, work.observation, work.people)
     found = rollout.simulate_candidate(
         batch.world, rule, batch.state, e, candidate, beginning, work
     )
@@ -80,7 +80,7 @@ def simulate(
 
 def straight(batch: ReachBatch, e: int, work: RolloutWorkspace) -> np.ndarray:
     """Return the action of a straight motion to the goal."""
-    place_robot(batch.arm, batch.state.q[e], work.sight.robot)
+    place_robot(batch.arm, batch.state.q[e], work.observation.robot)
     rollout.write_straight(batch.world, batch.state.goal[e], work)
     return work.act.copy()
 

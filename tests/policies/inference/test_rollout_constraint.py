@@ -53,7 +53,9 @@ def constrained(batch: ReachBatch, constraint: SsmConstraint) -> list[tuple[floa
     work, found = workspace(batch), []
     work.ssm[:] = constraint
     for e in range(batch.n_envs):
-        predict_people(batch.world, batch.state, e, N_LONG_MOMENTS, work.sight, work.people)
+        predict_people(
+            batch.world, batch.state, e, N_LONG_MOMENTS, work.observation, work.people
+        )
         rollout.apply_ssm_constraint(batch.world, batch.state, e, work)
         found.append((float(work.ssm_distance[0]), work.q_goal.copy()))
     return found
@@ -103,7 +105,7 @@ def test_longer_predictions_agree_with_shorter_ones() -> None:
         batch.reset()
         work = workspace(batch)
         for e in range(40):
-            predict_people(batch.world, batch.state, e, moments, work.sight, work.people)
+            predict_people(batch.world, batch.state, e, moments, work.observation, work.people)
             found.append(work.people.places[:N_MOMENTS, 0].copy())
     np.testing.assert_array_equal(found[:40], found[40:])
 

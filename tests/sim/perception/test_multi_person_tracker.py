@@ -118,14 +118,14 @@ def test_of_a_crowd_the_nearest_are_followed_and_the_rest_is_named() -> None:
     estimates = people.update(0.0, crowd)
     assert following(estimates) == [1.2, 2.5]
     assert all(one.flags == ("people-dropped",) for one in estimates)
-    assert [(one.index, one.reason) for one in people.unfollowed] == [
+    assert [(one.index, one.reason) for one in people.unassigned] == [
         (0, "farther"),
         (2, "farther"),
         (4, "farther"),
     ]
     assert following(people.update(DT, crowd[::-1])) == [1.2, 2.5]
     assert people.update(2 * DT, [at(1.2), at(2.5)])[0].flags == ("people-swapped",)
-    assert people.unfollowed == ()
+    assert people.unassigned == ()
 
 
 def test_a_person_who_comes_nearer_than_the_farthest_followed_takes_that_track() -> None:
@@ -136,9 +136,9 @@ def test_a_person_who_comes_nearer_than_the_farthest_followed_takes_that_track()
         (estimate,) = people.update(k * DT, [at(2.0), at(max(y, 1.0), x=1.0)])
         followed.append(following((estimate,))[0])
         replaced.append("replaced" in estimate.flags)
-        assert "people-dropped" in estimate.flags and len(people.unfollowed) == 1
+        assert "people-dropped" in estimate.flags and len(people.unassigned) == 1
     assert followed[0] == 2.0 and followed[-1] == 1.0
-    assert sum(replaced) == 1 and people.unfollowed[0].index == 0
+    assert sum(replaced) == 1 and people.unassigned[0].index == 0
 
 
 def test_two_people_at_one_distance_do_not_take_turns() -> None:
@@ -173,9 +173,9 @@ def test_no_unfollowed_person_is_nearer_for_long_whatever_people_do(
         crowd = [at(y, 1.5 * (i - 2.5)) for i, y in enumerate(away)]
         order = rng.permutation(6)
         estimates = people.update(t, [crowd[i] for i in order])
-        rest = [one.distance_m for one in people.unfollowed if one.distance_m is not None]
+        rest = [one.distance_m for one in people.unassigned if one.distance_m is not None]
         assert len(rest) >= 6 - n_tracks
-        seen_ones = [i for i in range(6) if i not in {one.index for one in people.unfollowed}]
+        seen_ones = [i for i in range(6) if i not in {one.index for one in people.unassigned}]
         farthest = max(float(np.hypot(*crowd[order[i]][:, :2].T).min()) for i in seen_ones)
         nearer_s = nearer_s + 1.0 / rate_hz if min(rest) < farthest - 0.11 else 0.0
         assert nearer_s <= 2.0 / rate_hz
@@ -193,7 +193,7 @@ def test_a_newcomer_takes_the_track_of_a_lost_person_only_where_it_may_be_the_sa
             assert estimate.stale or k * DT < 0.3
         else:
             assert following((estimate,)) == [3.0] and not estimate.stale
-    assert [one.index for one in people.unfollowed] == [0]
+    assert [one.index for one in people.unassigned] == [0]
 
 
 def test_a_newcomer_starts_a_track_of_its_own_and_the_lost_person_comes_back() -> None:
@@ -220,7 +220,7 @@ def test_a_skeleton_in_another_frame_costs_no_other_person_anything() -> None:
         a, b = people.update(k * DT, [1000.0 * seen(one[k]), seen(other[k])])
         assert "foreign-frame" in a.flags and "millimetres" in str(a.implausible)
         assert b.flags in ((), ("people-swapped",)) and b.implausible is None
-        assert [(o.index, o.reason) for o in people.unfollowed] == [(0, "foreign-frame")]
+        assert [(o.index, o.reason) for o in people.unassigned] == [(0, "foreign-frame")]
     assert a.stale and a.age_s == pytest.approx(15 * DT)
 
 
@@ -236,4 +236,4 @@ def test_a_tracker_of_another_frame_has_never_seen_anybody() -> None:
 def test_an_empty_skeleton_takes_no_track() -> None:
     people = MultiPersonTracker(1, CELL.body, floor_z=CELL.floor_z)
     (estimate,) = people.update(0.0, [np.full((25, 3), np.nan), at(1.5), np.zeros((25, 3))])
-    assert following((estimate,)) == [1.5] and people.unfollowed == ()
+    assert following((estimate,)) == [1.5] and people.unassigned == ()

@@ -19,7 +19,7 @@ from app.sim.collision.checker import Shapes
 from app.sim.collision.fcl_recheck import Trajectory
 from app.sim.core.observation_layout import slices_of
 from app.sim.people.human_motion_config import HumanMotionConfig
-from app.sim.people.kernels.people import new_people_geometry, see_rows
+from app.sim.people.kernels.people import new_people_geometry, observe_people_of_envs
 from app.sim.pick.batch import (
     PickBatch,
     PickSettings,
@@ -94,7 +94,7 @@ def observe_exactly(batch: PickBatch, rows: Index) -> ObservedPeople:
     q, qd = np.empty((n, n_people, 18)), np.empty((n, n_people, 18))
     size = np.empty((n, n_people, shared.bodies.shape[1]))
     geometry = new_people_geometry(shared, n_workers, n_cylinders)
-    see_rows(shared, state.people, state.robot, rows, geometry, q, qd, size)
+    observe_people_of_envs(shared, state.people, state.robot, rows, geometry, q, qd, size)
     np.clip(q[..., 3:], shared.limits[0, 3:], shared.limits[1, 3:], out=q[..., 3:])
     return ObservedPeople(q=q, qd=qd, size=size)
 

@@ -296,7 +296,7 @@ def nearest_person(people: People, robot: Vec, geometry: PeopleGeometry) -> int:
 
 
 @kernel(inline="always")
-def see_people(
+def observe_people(
     people: People,
     state: PeopleState,
     e: int,
@@ -350,7 +350,7 @@ def _write_person(
 
 
 @kernel()
-def see_rows(
+def observe_people_of_envs(
     people: People,
     state: PeopleState,
     robots: Vec,
@@ -360,7 +360,7 @@ def see_rows(
     qd: Vec,
     size: Vec,
 ) -> None:
-    """Write the people of some environments (:func:`see_people`).
+    """Write the people of some environments (:func:`observe_people`).
 
     Args:
         robots: The robots' capsules, shape (n_envs, 9, n).
@@ -373,4 +373,4 @@ def see_rows(
     for k in range(rows.shape[0]):
         e = rows[k]
         place_people(people, state, e, geometry)
-        see_people(people, state, e, robots[e], geometry, q[k], qd[k], size[k])
+        observe_people(people, state, e, robots[e], geometry, q[k], qd[k], size[k])

@@ -51,7 +51,7 @@ class CandidateWorkspace(NamedTuple):
 
     robot: RobotPose
     """The robot."""
-    sight: PickObservationWorkspace
+    observation: PickObservationWorkspace
     """Of the observation."""
     q_goal: Vec
     """Configuration at the target [rad], shape (6,)."""
@@ -84,7 +84,12 @@ def observe_candidates(
         out: Filled, observations of all candidates beside the first set of people, then beside
             the next, shape (m n, length of an observation).
     """
-    q_goal, q_grasp, point, person = work.q_goal, work.q_grasp, work.point, work.sight.person
+    q_goal, q_grasp, point, person = (
+        work.q_goal,
+        work.q_grasp,
+        work.point,
+        work.observation.person,
+    )
     goals, n = targets.goals, targets.goals.shape[0]
     place_robot(arm, around.q, work.robot)
     for s in range(around.human_q.shape[0]):
@@ -116,4 +121,4 @@ def observe_candidates(
             row, left = out[s * n + i], around.time_left
             if i > 0:
                 copy_values(out[s * n], row)
-            observe_target(arm, floor_z, state, left, work.robot, work.sight, row, i > 0)
+            observe_target(arm, floor_z, state, left, work.robot, work.observation, row, i > 0)

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.sim.core.jit import kernel
-from app.sim.people.kernels.people import place_people, see_people
+from app.sim.people.kernels.people import observe_people, place_people
 from app.sim.pick.kernels.grasp import (
     DESCEND,
     GraspRules,
@@ -123,7 +123,7 @@ def observe_rows(
     state: EpisodeState,
     envs: Indices,
     work: StepWorkspace,
-    sight: PickObservationWorkspace,
+    observation: PickObservationWorkspace,
     view: int,
     out: Obs,
 ) -> None:
@@ -139,13 +139,15 @@ def observe_rows(
     """
     crowd, people = work.crowd, world.people
     n_people = max(1, state.people.q.shape[1] + state.people.cylinders.shape[1])
-    human_q, human_qd = sight.human_q[:n_people], sight.human_qd[:n_people]
-    size, point = sight.human_size[:n_people], sight.point
+    human_q, human_qd = observation.human_q[:n_people], observation.human_qd[:n_people]
+    size, point = observation.human_size[:n_people], observation.point
     for k in range(envs.shape[0]):
         e, row = envs[k], out[k]
         place_robot(world.arm, state.q[e], work.robot)
         place_people(people, state.people, e, crowd)
-        see_people(people, state.people, e, work.robot.columns, crowd, human_q, human_qd, size)
+        observe_people(
+            people, state.people, e, work.robot.columns, crowd, human_q, human_qd, size
+        )
         if view == PLAIN:
             for j in range(6):
                 row[j], row[6 + j] = state.q[e, j], state.qd[e, j]
@@ -169,7 +171,15 @@ def observe_rows(
             phase,
             state.closing[e] / grasp.close_s,
         )
-        observe(world.arm, people.floor_z, observed, state.time_left[e], work.robot, sight, row)
+        observe(
+            world.arm,
+            people.floor_z,
+            observed,
+            state.time_left[e],
+            work.robot,
+            observation,
+            row,
+        )
 
 
 @kernel(nogil=True)

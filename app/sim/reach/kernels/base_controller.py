@@ -122,19 +122,19 @@ def approach(x: float, y: float, vx: float, vy: float) -> tuple[float, float]:
 
 
 @kernel(inline="always")
-def _write_approach(seen: Vec, point: Vec, vx: float, vy: float, k: int, out: Obs) -> None:
+def _write_approach(person: Vec, point: Vec, vx: float, vy: float, k: int, out: Obs) -> None:
     """Write the closest approach of the person to a point with velocity (vx, vy)."""
-    t, d = approach(seen[0] - point[0], seen[1] - point[1], seen[2] - vx, seen[3] - vy)
-    out[k], out[k + 1] = t / APPROACH_HORIZON, _scaled(d - seen[4])
+    t, d = approach(person[0] - point[0], person[1] - point[1], person[2] - vx, person[3] - vy)
+    out[k], out[k + 1] = t / APPROACH_HORIZON, _scaled(d - person[4])
 
 
 @kernel(error_model="numpy")
-def _write_groups(robot: Vec, seen: Vec, k: int, out: Obs) -> None:
+def _write_groups(robot: Vec, person: Vec, k: int, out: Obs) -> None:
     """Write distance and direction of the person from each group of links, in plan view."""
     for group in range(3):
         least, dx, dy = 1e9, 1.0, 0.0
         for c in range(GROUPS[group], min(GROUPS[group + 1], robot.shape[1])):
-            wx, wy = seen[0] - robot[X, c], seen[1] - robot[Y, c]
+            wx, wy = person[0] - robot[X, c], person[1] - robot[Y, c]
             ux, uy = robot[UX, c], robot[UY, c]
             s = min(1.0, max(0.0, (wx * ux + wy * uy) / max(ux * ux + uy * uy, 1e-12)))
             px, py = wx - s * ux, wy - s * uy
@@ -142,7 +142,7 @@ def _write_groups(robot: Vec, seen: Vec, k: int, out: Obs) -> None:
             if away - robot[RADIUS, c] < least:
                 least = away - robot[RADIUS, c]
                 dx, dy = px / max(away, 1e-9), py / max(away, 1e-9)
-        out[k + 3 * group] = _scaled(least - seen[4])
+        out[k + 3 * group] = _scaled(least - person[4])
         out[k + 3 * group + 1], out[k + 3 * group + 2] = dx, dy
 
 
@@ -160,11 +160,11 @@ def write_approach_features(
     Args:
         top_z: Height of people's tops [m].
         query: State of the robot and goal.
-        work: Holds the robot placed at ``query.q`` with its Jacobian, and ``seen``.
+        work: Holds the robot placed at ``query.q`` with its Jacobian, and ``observed``.
         k: Index of the first feature.
         out: Filled, shape (>= k + N_APPROACH,).
     """
-    q, qd, goal, seen = query.q, query.qd, query.goal, work.seen
+    q, qd, goal, person = query.q, query.qd, query.goal, work.observed
     robot, moved = work.robot, work.moved
     rate = base_motion(arm, robot, goal, work)
     for j in range(6):
@@ -174,12 +174,12 @@ def write_approach_features(
         for j in range(6):
             work.q[j] = q[j] + share * work.step[j]
         place_robot(arm, work.q, moved)
-        x, y = seen[0] + HORIZONS[i] * seen[2], seen[1] + HORIZONS[i] * seen[3]
-        d, _ = cylinder_clearance(moved.columns, 0, x, y, seen[4], top_z)
+        x, y = person[0] + HORIZONS[i] * person[2], person[1] + HORIZONS[i] * person[3]
+        d, _ = cylinder_clearance(moved.columns, 0, x, y, person[4], top_z)
         out[k + 6 + i] = _scaled(d)
-        out[k + 19 + i] = _scaled(math.hypot(x - goal[0], y - goal[1]) - seen[4])
-    out[k + 9] = 2.0 * seen[5]
-    out[k + 18] = _scaled(math.hypot(seen[0] - goal[0], seen[1] - goal[1]) - seen[4])
+        out[k + 19 + i] = _scaled(math.hypot(x - goal[0], y - goal[1]) - person[4])
+    out[k + 9] = 2.0 * person[5]
+    out[k + 18] = _scaled(math.hypot(person[0] - goal[0], person[1] - goal[1]) - person[4])
     vx = vy = ex = ey = 0.0
     for j in range(6):
         vx += robot.jacobian[0, j] * qd[j]
@@ -188,8 +188,8 @@ def write_approach_features(
     for j in range(2):
         ex += moved.jacobian[0, j] * qd[j]
         ey += moved.jacobian[1, j] * qd[j]
-    _write_approach(seen, robot.tcp, vx, vy, k + 10, out)
-    _write_approach(seen, robot.tcp, 0.0, 0.0, k + 12, out)
-    _write_approach(seen, robot.pos[3], ex, ey, k + 14, out)
-    _write_approach(seen, goal, 0.0, 0.0, k + 16, out)
-    _write_groups(robot.columns, seen, k + 22, out)
+    _write_approach(person, robot.tcp, vx, vy, k + 10, out)
+    _write_approach(person, robot.tcp, 0.0, 0.0, k + 12, out)
+    _write_approach(person, robot.pos[3], ex, ey, k + 14, out)
+    _write_approach(person, goal, 0.0, 0.0, k + 16, out)
+    _write_groups(robot.columns, person, k + 22, out)

@@ -131,12 +131,12 @@ def write_person(state: PeopleState, e: int, p: int, crowd: PeopleGeometry, out:
 
 
 @kernel(inline="always")
-def write_raw_state(query: ReachQuery, seen: Vec, out: Obs) -> None:
+def write_raw_state(query: ReachQuery, person: Vec, out: Obs) -> None:
     """Write the raw state (4.30), shape (N_STATE,)."""
     for j in range(6):
         out[j], out[6 + j] = query.q[j], query.qd[j]
     for i in range(5):
-        out[12 + i] = seen[i]
+        out[12 + i] = person[i]
     for i in range(3):
         out[17 + i] = query.goal[i]
 
@@ -185,14 +185,14 @@ def _scaled(d: float) -> float:
 def _write_state_features(
     arm: Arm, query: ReachQuery, clearance: float, work: ReachObservationWorkspace, out: Obs
 ) -> None:
-    q, qd, goal, seen, robot = query.q, query.qd, query.goal, work.seen, work.robot
+    q, qd, goal, person, robot = query.q, query.qd, query.goal, work.observed, work.robot
     tcp, pos, jacobian = robot.tcp, robot.pos, robot.jacobian
     for j in range(6):
         out[j], out[6 + j] = q[j] / math.pi, qd[j] / arm.limits.qd_max[j]
         out[20 + j], out[26 + j] = sincos(q[j])
     for i in range(5):
-        out[12 + i] = seen[i]
-    out[13] = seen[1] - CENTER_Y
+        out[12 + i] = person[i]
+    out[13] = person[1] - CENTER_Y
     kinematics.tcp_jacobian(robot.rot, pos, tcp, jacobian)
     square = 0.0
     for i in range(3):
@@ -204,9 +204,9 @@ def _write_state_features(
         out[35 + i], out[38 + i] = 2.0 * offset, speed
         out[48 + i] = _scaled(work.clearances[i])
     for i in range(2):
-        out[41 + i] = seen[i] - tcp[i]
-        out[43 + i] = seen[i] - pos[3, i]
-        out[45 + i] = seen[i] - goal[i]
+        out[41 + i] = person[i] - tcp[i]
+        out[43 + i] = person[i] - pos[3, i]
+        out[45 + i] = person[i] - goal[i]
     out[47] = _scaled(clearance)
     out[51] = 2.0 * math.sqrt(square)
 
@@ -228,7 +228,7 @@ def write_features(
         query: State of the robot and goal.
         clearance: Clearance of robot and people [m].
         time_left: Time left [s].
-        work: Holds the robot placed at ``query.q``, ``seen`` and ``clearances``.
+        work: Holds the robot placed at ``query.q``, ``observed`` and ``clearances``.
         out: Filled, shape (>= N_FEATURES,).
     """
     _write_state_features(arm, query, clearance, work, out)

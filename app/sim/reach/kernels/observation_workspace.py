@@ -49,7 +49,7 @@ class ReachObservationWorkspace(NamedTuple):
     """The robot at the observed configuration."""
     crowd: PeopleGeometry
     """The people, placed as they are now."""
-    seen: Vec
+    observed: Vec
     """The observed person, shape (N_PERSON,)."""
     clearances: Vec
     """Clearances extrapolated to the horizons [m], shape (3,)."""
@@ -95,7 +95,7 @@ def new_observation_workspace(
     return ReachObservationWorkspace(
         robot=new_robot_pose(arm),
         crowd=new_people_geometry(people, state.q.shape[1], state.cylinders.shape[1]),
-        seen=np.zeros(N_PERSON),
+        observed=np.zeros(N_PERSON),
         clearances=np.zeros(3),
         body=body,
         gap=np.zeros(body.now.shape[1]),

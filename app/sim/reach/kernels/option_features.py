@@ -69,14 +69,14 @@ GOAL, GROWTH = LAYOUT["goal_gap_ahead"].start, LAYOUT["radius_ahead"].start
 
 @kernel()
 def predict_motion(
-    state: PeopleState, e: int, which: int, seen: int, work: ReachObservationWorkspace
+    state: PeopleState, e: int, which: int, observed: int, work: ReachObservationWorkspace
 ) -> None:
     """Fill ``work.people``, ``predicted`` and ``n`` with the people that count.
 
     Args:
         e: Environment.
         which: The one person that counts, workers first, or ALL_PEOPLE.
-        seen: The observed person; below 0 for none.
+        observed: The observed person; below 0 for none.
         work: Holds the people, placed as they are now.
     """
     n_workers, n_people = state.q.shape[1], state.q.shape[1] + state.walkers.rows.shape[1]
@@ -84,7 +84,7 @@ def predict_motion(
     for p in range(-1 if n_people == 0 else 0, n_people):
         if which != ALL_PEOPLE and p != which:
             continue
-        if p == seen:
+        if p == observed:
             work.n[1] = work.n[0]
         write_person(state, e, p, work.crowd, work.person)
         copy_values(work.person, work.people[work.n[0]])
@@ -214,7 +214,7 @@ def write_option_features(
         there = work.predicted[LOOKS[i] - 1, p]
         distance = math.hypot(there[0] - goal[0], there[1] - goal[1])
         out[k + GOAL + i] = min(3.0, (distance - there[2]) / SCALE)
-        out[k + GROWTH + i] = (there[2] - work.seen[4]) / GROWN
+        out[k + GROWTH + i] = (there[2] - work.observed[4]) / GROWN
     out[k + BASE + N_LOOKS] = _cut(least)
     for i in range(work.aside.shape[0]):
         out[k + ASIDE + i] = work.aside[i]

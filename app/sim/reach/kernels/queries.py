@@ -58,16 +58,16 @@ def _observe_people(
     """Fill the people of environment ``e`` in ``work``; return their clearance [m]."""
     place(world, state, e, work)
     robot, crowd = work.robot, work.crowd
-    seen, clearance = which, state.clear[e, 0]
+    observed, clearance = which, state.clear[e, 0]
     if which == ALL_PEOPLE:
-        seen = nearest_person(world.people, robot.columns, crowd)
+        observed = nearest_person(world.people, robot.columns, crowd)
     elif crowd.q.shape[0] + crowd.cylinders.shape[0] > 1:
         clearance = person_clearance(world.people, robot.columns, crowd, which)
-    write_person(state.people, e, seen, crowd, work.seen)
+    write_person(state.people, e, observed, crowd, work.observed)
     if view != PLAIN:
         extrapolate_clearances(world.people, state.people, e, which, work)
     if view >= FORECAST:
-        predict_motion(state.people, e, which, seen, work)
+        predict_motion(state.people, e, which, observed, work)
         top = world.people.top_z
         predict_option_clearances(world.arm, top, state.q[e], state.qd[e], work)
     return float(clearance)
@@ -101,7 +101,7 @@ def observe_rows(
         for i in range(goals.shape[1]):
             query, row = ReachQuery(state.q[e], state.qd[e], goals[k, i]), out[k, i]
             if view == PLAIN:
-                write_raw_state(query, work.seen, row)
+                write_raw_state(query, work.observed, row)
                 continue
             write_features(arm, top, query, clearance, state.time_left[e], work, row)
             if view >= FORECAST:

@@ -57,7 +57,7 @@ BAD: list[tuple[dict[str, Any], int, str]] = [
     ({"goal": "there"}, 422, "goal"),
     ({"inference_mode": "around"}, 422, "inference_mode"),
     ({"inference_mode": "interpolated", "checkpoint": BOX}, 422, "inference_mode"),
-    ({"beside": "farthest"}, 422, "beside"),
+    ({"person_weighting": "farthest"}, 422, "person_weighting"),
     ({"time_left_s": -1e12}, 422, "time_left_s"),
     ({"elapsed_s": -1}, 422, "elapsed_s"),
     ({"age_s": -1}, 422, "age_s"),

@@ -47,7 +47,7 @@ def test_answer_is_a_piece_per_joint_and_what_explains_it(
     np.testing.assert_allclose(at(answer["commanded"], 0.0), HOME)
     np.testing.assert_allclose(at(answer["commanded"], 0.02), answer["commanded"]["q"])
     (person,) = answer["people"]
-    assert person["by"] == "cylinder" and person["seen"] and person["weight"] == 1.0
+    assert person["by"] == "cylinder" and person["used"] and person["weight"] == 1.0
     assert person["separation"] == pytest.approx(answer["clearance"]["people"])
     assert answer["distance"] > 0.3 and answer["beyond_reach"] == 0.0
     assert answer["outside"] == [] and not answer["unfeasible"]
@@ -150,11 +150,11 @@ def test_overlapping_person_is_a_stop_with_monitoring_and_a_problem_without(
 def test_several_people_of_any_kind_are_taken(client: TestClient) -> None:
     people = [FAR, STANDING, WALKER, {**FAR, "x": 0.9}]
     nearest = asked(client, people=people, rollout=False)
-    assert sum(one["seen"] for one in nearest["people"]) == 1
-    weighted = asked(client, people=people, beside="distance-weighted", rollout=False)
+    assert sum(one["used"] for one in nearest["people"]) == 1
+    weighted = asked(client, people=people, person_weighting="distance-weighted", rollout=False)
     weights = [one["weight"] for one in weighted["people"]]
     assert sum(weights) == pytest.approx(1.0) and min(weights) > 0.0
-    seen = [one["seen"] for one in weighted["people"]].index(True)
+    seen = [one["used"] for one in weighted["people"]].index(True)
     assert weights[seen] == max(weights)
     assert weighted["act"] != nearest["act"]
 

@@ -273,7 +273,7 @@ def improve_batch(
             work.n_sampled[e], work.incumbent_info[e, 0] = 0, 0.0
         constrained = work.ssm[DISTANCE] > 0.0
         moments = N_LONG_MOMENTS if constrained else N_MOMENTS
-        predict_people(world, state, e, moments, work.sight, work.people)
+        predict_people(world, state, e, moments, work.observation, work.people)
         work.ssm_distance[0] = 0.0
         if constrained:
             apply_ssm_constraint(world, state, e, work)

@@ -95,31 +95,31 @@ def periods_of(dt: float) -> int:
 @kernel(inline="always")
 def _observe_people(world: ReachCell, step: int, work: RolloutWorkspace) -> float:
     """Fill the observed people at a step; return the clearance of the placed robot [m]."""
-    sight, robot, top = work.sight, work.sight.robot, world.people.top_z
-    places, n, nearest, seen = work.people.places, work.people.n[0], FAR, 0
+    observation, robot, top = work.observation, work.observation.robot, world.people.top_z
+    places, n, nearest, observed = work.people.places, work.people.n[0], FAR, 0
     for i in range(3):
-        sight.clearances[i] = FAR
+        observation.clearances[i] = FAR
     for p in range(n):
         x, y, r = places[step, p, 0], places[step, p, 1], places[step, p, 2]
         d, _ = cylinder_clearance(robot.columns, 0, x, y, r, top)
         if d < nearest:
-            nearest, seen = d, p
+            nearest, observed = d, p
         vx = (places[step + 1, p, 0] - x) / STEP_S
         vy = (places[step + 1, p, 1] - y) / STEP_S
         for i in range(3):
             there_x, there_y = x + HORIZONS[i] * vx, y + HORIZONS[i] * vy
             d, _ = cylinder_clearance(robot.columns, 0, there_x, there_y, r, top)
-            sight.clearances[i] = min(sight.clearances[i], d)
+            observation.clearances[i] = min(observation.clearances[i], d)
         for i in range(N_TIMES):
             for m in range(3):
-                sight.predicted[i, p, m] = places[step + 1 + i, p, m]
-    now, later = places[step, seen], places[step + 1, seen]
+                observation.predicted[i, p, m] = places[step + 1 + i, p, m]
+    now, later = places[step, observed], places[step + 1, observed]
     for m in range(2):
-        sight.seen[m] = now[m]
-        sight.seen[2 + m] = (later[m] - now[m]) / STEP_S
-    sight.seen[4] = now[2]
-    sight.seen[5] = (later[2] - now[2]) / STEP_S
-    sight.n[0], sight.n[1] = n, seen
+        observation.observed[m] = now[m]
+        observation.observed[2 + m] = (later[m] - now[m]) / STEP_S
+    observation.observed[4] = now[2]
+    observation.observed[5] = (later[2] - now[2]) / STEP_S
+    observation.n[0], observation.n[1] = n, observed
     return nearest
 
 
@@ -128,12 +128,12 @@ def _query_policy(
     world: ReachCell, goal: Vec, time_left: float, step: int, work: RolloutWorkspace
 ) -> None:
     """Write the policy's action at a step into ``work.act``; the robot is placed."""
-    arm, top, sight, obs = world.arm, world.people.top_z, work.sight, work.obs
+    arm, top, observation, obs = world.arm, world.people.top_z, work.observation, work.obs
     query = ReachQuery(work.q, work.qd, goal)
     clearance = _observe_people(world, step, work)
-    predict_option_clearances(arm, top, work.q, work.qd, sight)
-    write_features(arm, top, query, clearance, time_left, sight, obs)
-    write_option_features(arm, top, query, sight, N_FEATURES, obs)
+    predict_option_clearances(arm, top, work.q, work.qd, observation)
+    write_features(arm, top, query, clearance, time_left, observation, obs)
+    write_option_features(arm, top, query, observation, N_FEATURES, obs)
     act_once(work.actor, obs, work.act)
 
 
@@ -147,7 +147,9 @@ def _people_clearance(
         a, b = places[step, p], places[step + 1, p]
         x, y = a[0] + share * (b[0] - a[0]), a[1] + share * (b[1] - a[1])
         r = a[2] + share * (b[2] - a[2])
-        d, _ = cylinder_clearance(work.sight.robot.columns, 0, x, y, r, world.people.top_z)
+        d, _ = cylinder_clearance(
+            work.observation.robot.columns, 0, x, y, r, world.people.top_z
+        )
         least = min(least, d)
     return least
 
@@ -175,7 +177,12 @@ def apply_ssm_constraint(
     world: ReachCell, state: EpisodeState, e: int, work: RolloutWorkspace
 ) -> None:
     """Fill ``work.ssm_distance`` and ``work.q_goal`` for a decision; people are predicted."""
-    arm, sight, robot, goal = world.arm, work.sight, work.sight.robot, state.goal[e]
+    arm, observation, robot, goal = (
+        world.arm,
+        work.observation,
+        work.observation.robot,
+        state.goal[e],
+    )
     place_robot(arm, state.q[e], robot)
     required = work.ssm[DISTANCE]
     work.ssm_distance[0] = required if _separation(world, 0.0, work) > required else 0.0
@@ -185,12 +192,12 @@ def apply_ssm_constraint(
         if distance_to(goal, robot) < IK_TOLERANCE:
             break
         kinematics.tcp_jacobian(robot.rot, robot.pos, robot.tcp, robot.jacobian)
-        base_motion(arm, robot, goal, sight)
+        base_motion(arm, robot, goal, observation)
         longest = IK_STEP
         for j in range(6):
-            longest = max(longest, abs(sight.step[j]))
+            longest = max(longest, abs(observation.step[j]))
         for j in range(6):
-            there = work.q_goal[j] + IK_STEP / longest * sight.step[j]
+            there = work.q_goal[j] + IK_STEP / longest * observation.step[j]
             work.q_goal[j] = max(arm.limits.q_min[j], min(arm.limits.q_max[j], there))
 
 
@@ -204,11 +211,11 @@ def write_straight(world: ReachCell, goal: Vec, work: RolloutWorkspace) -> None:
     if work.ssm_distance[0] > 0.0:
         write_joint_move(world.arm, work.q_goal, work.q, work.act)
         return
-    sight, robot = work.sight, work.sight.robot
+    observation, robot = work.observation, work.observation.robot
     kinematics.tcp_jacobian(robot.rot, robot.pos, robot.tcp, robot.jacobian)
-    base_motion(world.arm, robot, goal, sight)
+    base_motion(world.arm, robot, goal, observation)
     for j in range(6):
-        work.act[j] = max(-1.0, min(1.0, sight.base[j]))
+        work.act[j] = max(-1.0, min(1.0, observation.base[j]))
 
 
 @kernel(inline="always")
@@ -241,7 +248,7 @@ def _write_action(
 @kernel(inline="always")
 def _collides(arm: Arm, clearance: float, work: RolloutWorkspace) -> bool:
     """Return whether the placed robot touches people, the cell or itself."""
-    robot = work.sight.robot
+    robot = work.observation.robot
     return bool(
         clearance <= 0.0
         or cell_clearance(arm, robot.columns)[0] <= 0.0
@@ -306,7 +313,7 @@ def simulate_candidate(
     Returns:
         Outcome (RUNNING, SUCCESS or COLLISION) and score.
     """
-    arm, goal, least, robot = world.arm, state.goal[e], ENOUGH_CLEARANCE, work.sight.robot
+    arm, goal, least, robot = world.arm, state.goal[e], ENOUGH_CLEARANCE, work.observation.robot
     periods, now, elapsed = periods_of(arm.dt), 0, beginning.elapsed
     constrained = work.ssm_distance[0] > 0.0
     time_cost = SSM_TIME_COST if constrained else TIME_COST

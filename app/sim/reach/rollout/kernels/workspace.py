@@ -26,7 +26,7 @@ class RolloutWorkspace(NamedTuple):
 
     actor: CompiledActor
     """The policy."""
-    sight: ReachObservationWorkspace
+    observation: ReachObservationWorkspace
     """Observation of a simulated state."""
     people: PredictedMotion
     """Predicted people of the environment."""
@@ -82,7 +82,11 @@ class RolloutWorkspace(NamedTuple):
 
 
 def new_rollout_workspace(
-    arm: Arm, net: Network, base_weight: float, sight: ReachObservationWorkspace, n_envs: int
+    arm: Arm,
+    net: Network,
+    base_weight: float,
+    observation: ReachObservationWorkspace,
+    n_envs: int,
 ) -> RolloutWorkspace:
     """Return work space for a policy and ``n_envs`` environments.
 
@@ -98,7 +102,7 @@ def new_rollout_workspace(
 
     return RolloutWorkspace(
         actor=new_compiled_actor(net, base_weight),
-        sight=sight,
+        observation=observation,
         people=new_predicted_motion(),
         vias=vias,
         q=np.zeros(6),
