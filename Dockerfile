@@ -7,17 +7,23 @@
 # refuses to start without TANDEM_TOKEN. Database, checkpoints and compiled kernels live in
 # the volume /data.
 
-FROM python:3.12-slim AS build
+ARG PYTHON=3.12
+FROM python:${PYTHON}-slim AS build
+ARG PYTHON
 RUN apt-get update -qq \
     && apt-get install -y -qq --no-install-recommends make \
     && rm -rf /var/lib/apt/lists/*
 WORKDIR /srv/tandem
 COPY Makefile requirements.lock ./
 ARG TORCH_INDEX=https://download.pytorch.org/whl/cpu
-RUN make .venv/runtime.stamp PYTHON=python3.12 TORCH_INDEX=$TORCH_INDEX
+RUN make .venv/runtime.stamp PYTHON=python${PYTHON} TORCH_INDEX=$TORCH_INDEX
 
-FROM python:3.12-slim
-RUN useradd --system --uid 10001 --home-dir /data --shell /usr/sbin/nologin tandem \
+FROM python:${PYTHON}-slim
+# Pinocchio is linked against GNU OpenMP, which slim images do not have.
+RUN apt-get update -qq \
+    && apt-get install -y -qq --no-install-recommends libgomp1 \
+    && rm -rf /var/lib/apt/lists/*
+RUN useradd --uid 10001 --no-create-home --home-dir /data --shell /usr/sbin/nologin tandem \
     && install -d -o tandem -g tandem /data
 WORKDIR /srv/tandem
 COPY --from=build /srv/tandem/.venv .venv

@@ -2,7 +2,7 @@
 
 Results go to standard output (``--json``: one object), logs and errors to standard error.
 Exit status: 0 whatever the result, 1 where this machine is in the way (port taken, database
-in use, disk full, folder read-only), 2 for a wrong call.
+in use, disk full, folder read-only, library missing), 2 for a wrong call.
 """
 
 import io
@@ -58,6 +58,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 2 if isinstance(error, InvalidInput | NotFound) else 1
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    except ImportError as error:
+        if "cannot open shared object file" not in str(error):
+            raise
+        print(f"tandem: a library of the system is missing: {error}", file=sys.stderr)
+        return 1
     except OSError as error:
         place = "" if error.filename is None else f"{error.filename}: "
         print(f"tandem: {place}{error.strerror or error}", file=sys.stderr)

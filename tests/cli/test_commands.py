@@ -201,6 +201,14 @@ def test_folder_that_cannot_be_made_is_named_without_a_traceback(
     assert capsys.readouterr().err == f"tandem: {tmp_path}/file/data: Not a directory\n"
 
 
+def test_missing_library_of_the_system_is_one_line(tmp_path: Path) -> None:
+    fault = "libgomp.so.1: cannot open shared object file: No such file or directory"
+    (tmp_path / "pinocchio.py").write_text(f"raise ImportError({fault!r})\n")
+    ended = run("cells", "list", data=tmp_path / "data", PYTHONPATH=str(tmp_path))
+    assert ended.returncode == 1
+    assert ended.stderr == f"tandem: a library of the system is missing: {fault}\n"
+
+
 @pytest.mark.parametrize("encoding", ["utf-8", "ascii"])
 def test_file_whose_name_cannot_be_printed_is_imported(tmp_path: Path, encoding: str) -> None:
     path = os.fsencode(tmp_path) + b"/B\xe4r \xc3\xa4.csv"
