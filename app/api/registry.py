@@ -139,6 +139,7 @@ class PolicyRegistry(Generic[P]):
         self._default = default
         self._lock = threading.Lock()
         self._policies: OrderedDict[str, P] = OrderedDict()
+        self._removals = 0
 
     def _loaded(self, reference: str | None) -> P | None:
         """Return a policy by SHA-256 or alias if it is in memory, without disk access."""
@@ -152,6 +153,7 @@ class PolicyRegistry(Generic[P]):
     def forget(self, removed: Iterable[str]) -> None:
         """Drop the policies of deleted checkpoints, by SHA-256."""
         with self._lock:
+            self._removals += 1
             for sha256 in removed:
                 self._policies.pop(sha256, None)
 
@@ -178,10 +180,12 @@ class PolicyRegistry(Generic[P]):
         policy = self._loaded(reference)
         if policy is not None:
             return policy
+        removals = self._removals
         record, tensors = self._names.read(reference or self._default)
         policy = self._build(record.manifest, tensors)
         with self._lock:
-            self._policies[record.sha256] = policy
+            if removals == self._removals:  # it may be among the removed ones
+                self._policies[record.sha256] = policy
             while len(self._policies) > MAX_POLICIES:
                 self._policies.popitem(last=False)
         return policy

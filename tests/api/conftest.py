@@ -13,7 +13,10 @@ from app.main import create_app
 from app.settings import Settings
 from tests.api.described import Answered, undescribed
 from tests.api.live_server import WARM_UP_S, served
+from tests.support.databases import database_url, migrated, postgresql, store
 from tests.support.waiting import wait_until
+
+__all__ = ["database_url", "migrated", "postgresql", "store"]
 
 ADDRESS = "http://127.0.0.1:8000"
 
