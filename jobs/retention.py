@@ -63,13 +63,12 @@ class Retention:
 
     def apply(self) -> None:
         """Remove what is beyond the numbers to keep."""
-        gone = retention.prune(
+        for job_id, removed in retention.prune(
             self.store,
             keep_jobs=self.keep_jobs,
             keep_states=self.keep_states,
             acting=self.acting(),
-        )
-        for job_id, removed in gone.items():
+        ):
             self.on_removed(removed)
             logger.info("job %s is deleted: the newest %d are kept", job_id, self.keep_jobs)
             self._remove_files(job_id)

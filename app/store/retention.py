@@ -1,7 +1,7 @@
 """Removal of checkpoints, ended jobs and states: on request, and beyond a number to keep."""
 
 import logging
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 
 import sqlalchemy as sa
 
@@ -87,7 +87,7 @@ def delete_checkpoint(store: Store, sha256: str, acting: Mapping[str, str]) -> N
 
 def prune(
     store: Store, *, keep_jobs: int, keep_states: int, acting: Mapping[str, str]
-) -> dict[str, tuple[str, ...]]:
+) -> Iterator[tuple[str, tuple[str, ...]]]:
     """Delete ended jobs beyond the newest, and states to resume from beyond the newest.
 
     A job with a checkpoint in use stays, and so do the parts of a job that has not ended.
@@ -96,8 +96,9 @@ def prune(
         keep_states: Number of ended jobs whose states are kept.
         acting: As for :func:`delete_job`.
 
-    Returns:
-        SHA-256 of the checkpoints that went with each deleted job, by its id.
+    Yields:
+        The id of each job once it is deleted, and the SHA-256 of the checkpoints that went
+        with it.
 
     Raises:
         StorageFull: No room is left.
@@ -116,15 +117,13 @@ def prune(
             connection.execute(
                 sa.delete(resume_states).where(resume_states.c.job_id.in_(ended))
             )
-    removed = {}
     for job_id in (one for one in old if one not in parts):
         try:
-            removed[job_id] = delete_job(store, job_id, acting)
+            yield job_id, delete_job(store, job_id, acting)
         except WrongState as error:
             logger.info("job %s is kept: %s", job_id, error.message)
         except NotFound:
             pass  # deleted by a request since
-    return removed
 
 
 def _require_no_part(connection: sa.Connection, job: JobRecord) -> None:

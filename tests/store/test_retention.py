@@ -1,7 +1,10 @@
+from pathlib import Path
+
 import pytest
 import sqlalchemy as sa
 
 from app.errors import NotFound, WrongState
+from app.storage_errors import StorageFull
 from app.store import (
     attempts,
     checkpoints,
@@ -14,6 +17,7 @@ from app.store import (
 )
 from app.store.engine import Store
 from app.store.records import Claim, NewJob, ResumeState
+from jobs.retention import Retention
 from tests.store.test_checkpoints import policy, second_job
 from tests.support.databases import claimed
 
@@ -124,14 +128,14 @@ def test_newest_ended_jobs_and_states_are_kept(store: Store, claim: Claim) -> No
         ended.append(later.job_id)
     active = second_job(store)
     save(store, active, 1, b"active")
-    gone = retention.prune(store, keep_jobs=2, keep_states=1, acting={acts: "world main"})
+    gone = dict(retention.prune(store, keep_jobs=2, keep_states=1, acting={acts: "w"}))
     assert gone == {job_id: made[job_id] for job_id in ended[1:3]}
     kept = {ended[0], ended[3], ended[4], active.job_id}
     assert {job.id for job in jobs.list_jobs(store).items} == kept
     assert attempts.load_resume(store, ended[4]) is not None
     assert attempts.load_resume(store, ended[3]) is None
     assert attempts.load_resume(store, active.job_id) is not None
-    assert retention.prune(store, keep_jobs=2, keep_states=1, acting={acts: "w"}) == {}
+    assert not list(retention.prune(store, keep_jobs=2, keep_states=1, acting={acts: "w"}))
 
 
 def test_curve_of_a_deleted_job_is_not_found(store: Store, claim: Claim) -> None:
@@ -152,8 +156,40 @@ def test_parts_of_a_job_that_has_not_ended_are_kept(store: Store, claim: Claim) 
         retention.delete_job(store, part.id, {})
     newest = second_job(store)
     completion.finish(store, newest)
-    gone = retention.prune(store, keep_jobs=1, keep_states=1, acting={})
+    gone = dict(retention.prune(store, keep_jobs=1, keep_states=1, acting={}))
     assert tuple(gone) == (claim.job_id,)
     composed_jobs.end(store, sweep.id, "cancelled")
-    gone = retention.prune(store, keep_jobs=2, keep_states=1, acting={})
+    gone = dict(retention.prune(store, keep_jobs=2, keep_states=1, acting={}))
     assert tuple(gone) == (part.id,)
+
+
+def test_what_was_deleted_before_the_disk_is_full_is_deleted_completely(
+    store: Store, tmp_path: Path
+) -> None:
+    made = {}
+    for content in (b"1", b"2", b"3"):
+        claim = second_job(store)
+        made[claim.job_id] = save(store, claim, 1, content)
+        completion.finish(store, claim, state="cancelled")
+        (tmp_path / f"{claim.job_id}.log").touch()
+    left: list[int] = [2]  # writes: of states, and of the first job
+
+    def fill(_connection: sa.Connection) -> None:
+        left[0] -= 1
+        if left[0] < 0:
+            raise StorageFull("the disk")
+
+    removed: list[str] = []
+    retention = Retention(
+        store=store.fenced(fill),
+        logs=tmp_path,
+        keep_jobs=1,
+        keep_states=1,
+        acting=dict,
+        on_removed=removed.extend,
+    )
+    with pytest.raises(StorageFull):
+        retention.apply()
+    kept = {job.id for job in jobs.list_jobs(store).items}
+    assert {one.stem for one in tmp_path.glob("*.log")} == kept
+    assert removed == [sha256 for job_id, sha256 in made.items() if job_id not in kept] != []

@@ -183,7 +183,7 @@ def test_sweep_ends_however_few_jobs_are_kept(store: Store) -> None:
     sweep = post(store, trials=3)
     for success in (0.2, 0.9, 0.4):
         run_trial(store, sweep, success)
-        retention.prune(store, keep_jobs=1, keep_states=1, acting={})
+        list(retention.prune(store, keep_jobs=1, keep_states=1, acting={}))
     job, trials = look(store, sweep)
     assert (job.state, [one.number for one in trials]) == ("succeeded", [1, 2, 3])
 
