@@ -1,9 +1,11 @@
 """Removal of checkpoints, and of ended jobs with their files: how many are kept."""
 
 import logging
+import threading
 from collections.abc import Callable, Collection, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TypeVar
 
 from app.errors import Conflict
 from app.policies.checkpoints import pretrained
@@ -13,6 +15,9 @@ from app.store.engine import Store
 from jobs import resume_files
 
 logger = logging.getLogger(__name__)
+
+Loaded = TypeVar("Loaded")
+Used = TypeVar("Used")
 
 
 @dataclass(slots=True, kw_only=True)
@@ -31,6 +36,28 @@ class Retention:
     """Returns the SHA-256 of each checkpoint that acts, with its place."""
     on_removed: Callable[[Collection[str]], None] = lambda _: None
     """Called with the SHA-256 of the checkpoints that were removed."""
+    _lock: threading.Lock = field(default_factory=threading.Lock)
+    _removals: int = 0
+
+    def deploy(
+        self,
+        load: Callable[[], Loaded],
+        use: Callable[[Loaded], Used],
+        discard: Callable[[Loaded], object] = lambda _: None,
+    ) -> Used:
+        """Load policies and let them act, with no removal of a checkpoint in between.
+
+        Args:
+            load: Loads them; called again where a checkpoint was removed meanwhile.
+            use: Makes them known to ``acting``; short, since removals wait.
+            discard: Called with what was loaded before a removal.
+        """
+        while True:
+            removals, loaded = self._removals, load()
+            with self._lock:
+                if removals == self._removals:
+                    return use(loaded)
+            discard(loaded)
 
     def delete(self, job_id: str) -> None:
         """Delete an ended job, and the checkpoints that only it has.
@@ -40,7 +67,8 @@ class Retention:
             WrongState: It has not ended, or one of its checkpoints is in use.
             StorageFull: No room is left.
         """
-        self.on_removed(retention.delete_job(self.store, job_id, self.acting()))
+        with self._lock:
+            self._note(retention.delete_job(self.store, job_id, self.acting()))
         self._remove_files(job_id)
 
     def delete_checkpoint(self, reference: str) -> None:
@@ -58,20 +86,26 @@ class Retention:
         sha256 = get_checkpoint(self.store, reference).sha256
         if sha256 in pretrained.SHA256.values():
             raise Conflict(f"the checkpoint {reference!r} is shipped with Tandem and stays")
-        retention.delete_checkpoint(self.store, sha256, self.acting())
-        self.on_removed((sha256,))
+        with self._lock:
+            retention.delete_checkpoint(self.store, sha256, self.acting())
+            self._note((sha256,))
 
     def apply(self) -> None:
         """Remove what is beyond the numbers to keep."""
-        for job_id, removed in retention.prune(
-            self.store,
-            keep_jobs=self.keep_jobs,
-            keep_states=self.keep_states,
-            acting=self.acting(),
-        ):
-            self.on_removed(removed)
-            logger.info("job %s is deleted: the newest %d are kept", job_id, self.keep_jobs)
-            self._remove_files(job_id)
+        with self._lock:
+            for job_id, removed in retention.prune(
+                self.store,
+                keep_jobs=self.keep_jobs,
+                keep_states=self.keep_states,
+                acting=self.acting(),
+            ):
+                self._note(removed)
+                logger.info("job %s is deleted: the newest %d are kept", job_id, self.keep_jobs)
+                self._remove_files(job_id)
+
+    def _note(self, removed: Collection[str]) -> None:
+        self._removals += 1
+        self.on_removed(removed)
 
     def _remove_files(self, job_id: str) -> None:
         (self.logs / f"{job_id}.log").unlink(missing_ok=True)

@@ -2,14 +2,15 @@
 
 import logging
 import threading
+from collections.abc import Sequence
 from typing import Any
 
 from app.api.schemas.worlds import FollowPublic
 from app.api.services import LiveWorld, Services
 from app.api.world_policies import (
-    load_for,
     reach_policy_for,
     sorting_policy_for,
+    submit_loaded,
     task_policy_for,
 )
 from app.errors import ServiceError, WrongState
@@ -17,12 +18,16 @@ from app.live.commands import SetPolicy
 from app.live.reach.commands import is_reaching
 from app.live.sorting.commands import SetSortingPolicy
 from app.policies.checkpoints.checkpoint import SORTING, purpose_of
+from app.policies.inference.live_reach_policy import TrainedReachPolicy
+from app.sim.cells.cell import Cell
+from app.sim.pick.task_policy import TaskPolicy
 from app.store.checkpoints import list_checkpoints
 from app.store.jobs import find_job
 from app.store.records import JobRecord
 
 logger = logging.getLogger(__name__)
 
+PolicyCommand = SetPolicy | SetSortingPolicy
 PERIOD_S = 1.0
 """Period of the check for a newer checkpoint [s]."""
 
@@ -33,6 +38,7 @@ def start(world_id: str, job: JobRecord, services: Services) -> FollowPublic:
     Raises:
         NotFound: There is no such world.
         WrongState: The job is no training, or has ended.
+        Conflict: Another policy was chosen meanwhile.
         InvalidInput: The policy does not fit the cell.
         CheckpointMismatch: Likewise.
     """
@@ -48,7 +54,7 @@ def start(world_id: str, job: JobRecord, services: Services) -> FollowPublic:
     )
     with follows.lock:
         choices = world.handle.choices
-        now = _updated(follow, world, services)
+        now = _updated(follow, world, choices, services)
         follows.by_world[world_id] = now, world, choices + (now.checkpoint is not None)
         if follows.thread is None or not follows.thread.is_alive():
             follows.thread = threading.Thread(
@@ -73,7 +79,7 @@ def deploy_newest(services: Services) -> bool:
             elif world.handle.choices != choices:
                 now = _ended(follow, "another policy was chosen")
             else:
-                now = _refreshed(follow, world, services)
+                now = _refreshed(follow, world, choices, services)
             choices += now.checkpoint != follow.checkpoint
             follows.by_world[world_id] = now, world, choices
         active = any(one[0].active for one in follows.by_world.values())
@@ -90,13 +96,15 @@ def _run(services: Services) -> None:
             logger.exception("a followed training could not be checked")
 
 
-def _refreshed(follow: FollowPublic, world: LiveWorld, services: Services) -> FollowPublic:
+def _refreshed(
+    follow: FollowPublic, world: LiveWorld, choices: int, services: Services
+) -> FollowPublic:
     """Return a follow after a check; it has ended where its job has."""
     job = find_job(services.store, follow.job)
     if job is None:
         return _ended(follow, f"job {follow.number} was deleted")
     try:
-        now = _updated(follow, world, services)
+        now = _updated(follow, world, choices, services)
     except ServiceError as error:
         return _ended(follow, error.message)
     if now.active and job.is_final:
@@ -105,21 +113,27 @@ def _refreshed(follow: FollowPublic, world: LiveWorld, services: Services) -> Fo
     return now
 
 
-def _updated(follow: FollowPublic, world: LiveWorld, services: Services) -> FollowPublic:
-    """Let the newest checkpoint of the job act, if it does not yet."""
+def _updated(
+    follow: FollowPublic, world: LiveWorld, choices: int, services: Services
+) -> FollowPublic:
+    """Let the newest checkpoint of the job act, if it does not yet.
+
+    Raises:
+        Conflict: The world has had other than so many ``choices``.
+    """
     items = list_checkpoints(services.store, job_id=follow.job, limit=1).items
     if not items and follow.checkpoint is not None:
-        _fall_back(world, services)
+        _fall_back(world, choices, services)
         reason = f"the checkpoints of job {follow.number} were removed: the cell's policy acts"
         return _ended(follow, reason, step=None, checkpoint=None)
     if not items or items[0].sha256 == follow.checkpoint:
         return follow
     newest = items[0]
     sorts = purpose_of(newest.manifest) == SORTING
-    command: SetPolicy | SetSortingPolicy = SetPolicy(checkpoint=newest.sha256)
+    command: PolicyCommand = SetPolicy(checkpoint=newest.sha256)
     if sorts:
         command = SetSortingPolicy(checkpoint=newest.sha256)
-    world.handle.submit(command.with_loaded(load_for(command, world.cell, services)))
+    submit_loaded(command, world, services, choices)
     return follow.model_copy(update={"step": newest.step, "checkpoint": newest.sha256})
 
 
@@ -128,17 +142,26 @@ def _ended(follow: FollowPublic, reason: str, **changes: Any) -> FollowPublic:
     return follow.model_copy(update={"active": False, "reason": reason, **changes})
 
 
-def _fall_back(world: LiveWorld, services: Services) -> None:
+def _fall_back(world: LiveWorld, choices: int, services: Services) -> None:
     """Let the policies act that the cell starts with."""
-    cell, sorting = world.cell, sorting_policy_for(world.cell, services)
+
+    def submit(commands: Sequence[PolicyCommand]) -> None:
+        for place, command in enumerate(commands):
+            world.handle.submit(command, choices + place)
+
+    services.retention.deploy(lambda: _own_policies(world.cell, services), submit)
+
+
+def _own_policies(cell: Cell, services: Services) -> tuple[PolicyCommand, ...]:
+    """Return the commands that choose the policies of a cell."""
     if is_reaching(cell):
-        reach = reach_policy_for(cell, services)
-        name = None if reach is None else reach.checkpoint
-        world.handle.submit(SetPolicy(checkpoint=name).with_loaded(reach))
-        return
-    policy = task_policy_for(cell, services)
+        return (_choice_of(reach_policy_for(cell, services)),)
+    first = _choice_of(task_policy_for(cell, services))
+    if (sorting := sorting_policy_for(cell, services)) is None:
+        return (first,)
+    return first, SetSortingPolicy(checkpoint=sorting.checkpoint).with_loaded(sorting)
+
+
+def _choice_of(policy: TaskPolicy | TrainedReachPolicy | None) -> SetPolicy:
     name = None if policy is None else policy.checkpoint
-    world.handle.submit(SetPolicy(checkpoint=name).with_loaded(policy))
-    if sorting is not None:
-        command = SetSortingPolicy(checkpoint=sorting.checkpoint)
-        world.handle.submit(command.with_loaded(sorting))
+    return SetPolicy(checkpoint=name).with_loaded(policy)

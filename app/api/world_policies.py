@@ -7,9 +7,9 @@ in their stations (``layout.require_workspace``).
 import logging
 
 from app.api.registry import REACH_ALIAS, SORTING_ALIASES, P, PolicyRegistry
-from app.api.services import Services
+from app.api.services import LiveWorld, Services
 from app.errors import CheckpointMismatch, Damaged, InvalidInput, NotFound
-from app.live.commands import LoadingCommand, SetMotion, SetPolicy
+from app.live.commands import SetMotion, SetPolicy
 from app.live.playback import Recording
 from app.live.reach.commands import is_reaching
 from app.live.sorting.commands import SetSortingPolicy
@@ -25,19 +25,35 @@ from app.store.checkpoints import list_checkpoints
 
 logger = logging.getLogger(__name__)
 
+NamingCommand = SetMotion | SetPolicy | SetSortingPolicy
+"""A command that names a stored object."""
 MAX_CHOICES = 20
 """Maximum number of choices in an error."""
 MAX_SEARCHED = 200
 """Number of the newest checkpoints that are searched for one of a cell."""
 
 
-def load_for(command: LoadingCommand, cell: Cell, services: Services) -> object:
-    """Return the stored object that a command names; None without a name.
+def submit_loaded(
+    command: NamingCommand, world: LiveWorld, services: Services, choices: int | None = None
+) -> int:
+    """Queue a command together with the stored object that it names; return its number.
+
+    Args:
+        choices: As for :meth:`WorldHandle.submit`.
 
     Raises:
         InvalidInput: Nothing has that name, or the recording has no such run.
         CheckpointMismatch: The policy is of another kind or cell.
+        Conflict: As for :meth:`WorldHandle.submit`.
     """
+    return services.retention.deploy(
+        lambda: command.with_loaded(_object_of(command, world.cell, services)),
+        lambda loaded: world.handle.submit(loaded, choices),
+    )
+
+
+def _object_of(command: NamingCommand, cell: Cell, services: Services) -> object:
+    """Return the stored object that a command names; None without a name."""
     match command:
         case SetMotion():
             return _recording(command, services)

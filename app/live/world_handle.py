@@ -39,20 +39,25 @@ class WorldHandle:
         """Name of the world in URLs."""
         return self._id
 
-    def submit(self, command: Command) -> int:
+    def submit(self, command: Command, choices: int | None = None) -> int:
         """Queue one command and return its number; never waits.
 
         A snapshot with ``commands`` >= this number contains its effect. What a command changes
         is compared with the last snapshot unless an earlier command that it does not show yet
         may change the same.
 
+        Args:
+            choices: The number of choices that the command may replace; None: any.
+
         Raises:
             InvalidInput: The command does not fit this cell.
-            Conflict: The world has been stopped.
+            Conflict: The world has been stopped, or another policy was chosen since.
         """
         with self._lock:
             if not self._is_open:
                 raise Conflict(f"the world {self._id!r} was stopped before it took the command")
+            if choices not in (None, self._choices):
+                raise Conflict("another policy was chosen")
             last = self._last
             if last.commands == self._submitted:
                 self._people = tuple(person.id for person in last.people)

@@ -24,12 +24,12 @@ from app.api.schemas.worlds import (
 )
 from app.api.services import LiveWorld, Services, ServicesDep
 from app.api.world_policies import (
-    load_for,
     named_reach_policy,
     reach_policy_for,
     require_sorting_policy,
     require_task_policy,
     sorting_policy_for,
+    submit_loaded,
     task_policy_for,
 )
 from app.errors import InvalidInput, NotReady
@@ -82,11 +82,13 @@ async def command_world(
     services: ServicesDep,
 ) -> CommandAccepted:
     """Queue one command; the world applies it before its next tick."""
-    tick, cell = world.handle.snapshot().tick, world.cell
+    handle = world.handle
+    tick, choices = handle.snapshot().tick, handle.choices
     if isinstance(body, LoadingCommand):
-        body = body.with_loaded(await run_in_threadpool(load_for, body, cell, services))
-    choices, number = world.handle.choices, world.handle.submit(body)
-    if world.handle.choices != choices:
+        number = await run_in_threadpool(submit_loaded, body, world, services)
+    else:
+        number = handle.submit(body)
+    if handle.choices != choices:
         await run_in_threadpool(following.deploy_newest, services)
     return CommandAccepted(tag=body.tag, number=number, tick=tick)
 
@@ -130,27 +132,41 @@ def set_world_cell(world_id: str, body: WorldCell, services: ServicesDep) -> Wor
     cell = services.cells.get(body.cell)
     if (lack := lacks_for_live(cell)) is not None:
         raise InvalidInput("cell", cell.name, f"cannot be shown live: it {lack}")
-    if is_reaching(cell):
-        if body.sorting_policy is not None:
-            require_sorting_policy(services.sorting_policies.load(body.sorting_policy), cell)
-        reference = body.checkpoint
-        reach_policy = (
-            named_reach_policy(reference, cell, services)
-            if reference
-            else reach_policy_for(cell, services)
+    with services.replacing:
+        if services.stopping.is_set():
+            raise NotReady("stopping")
+
+        def replace(new: LiveWorld) -> tuple[LiveWorld, LiveWorld]:
+            old, services.worlds[world_id] = services.worlds[world_id], new
+            return old, new
+
+        old, new = services.retention.deploy(
+            lambda: services.start_world(world_id, cell, *_policies_of(body, cell, services)),
+            replace,
+            lambda unused: unused.stop(),
         )
-        return _replace_world(world_id, cell, None, None, reach_policy, services)
-    if body.checkpoint is None:
-        policy = task_policy_for(cell, services)
-    else:
-        policy = services.task_policies.load(body.checkpoint)
-        require_task_policy(policy, cell, services)
+    old.stop()
+    return WorldSummary.from_domain(new.handle.snapshot())
+
+
+def _policies_of(
+    body: WorldCell, cell: Cell, services: Services
+) -> tuple[TaskPolicy | None, SortingValues | None, LiveReachPolicy | None]:
+    """Return the policies that a world starts with: selecting tasks, sorting, reaching."""
     if body.sorting_policy is None:
         sorting_policy = sorting_policy_for(cell, services)
     else:
         sorting_policy = services.sorting_policies.load(body.sorting_policy)
         require_sorting_policy(sorting_policy, cell)
-    return _replace_world(world_id, cell, policy, sorting_policy, None, services)
+    if is_reaching(cell):
+        if body.checkpoint is None:
+            return None, None, reach_policy_for(cell, services)
+        return None, None, named_reach_policy(body.checkpoint, cell, services)
+    if body.checkpoint is None:
+        return task_policy_for(cell, services), sorting_policy, None
+    policy = services.task_policies.load(body.checkpoint)
+    require_task_policy(policy, cell, services)
+    return policy, sorting_policy, None
 
 
 @router.put(
@@ -171,21 +187,3 @@ def stop_following(world_id: str, services: ServicesDep) -> None:
     services.world(world_id)
     with services.follows.lock:
         services.follows.by_world.pop(world_id, None)
-
-
-def _replace_world(
-    world_id: str,
-    cell: Cell,
-    policy: TaskPolicy | None,
-    sorting_policy: SortingValues | None,
-    reach_policy: LiveReachPolicy | None,
-    services: Services,
-) -> WorldSummary:
-    """Start the world of an id again, and stop the one that was there."""
-    with services.replacing:
-        if services.stopping.is_set():
-            raise NotReady("stopping")
-        new = services.start_world(world_id, cell, policy, sorting_policy, reach_policy)
-        old, services.worlds[world_id] = services.worlds[world_id], new
-    old.stop()
-    return WorldSummary.from_domain(new.handle.snapshot())
