@@ -66,7 +66,9 @@ def test_backup_is_restored_exactly_and_the_database_before_is_kept(
     assert kept is not None and dump(kept) == later
     assert (data / "memory/a/one.bin").read_bytes() == CONTENT
     assert attempts.load_resume(store, claim.job_id) == resume(10, CONTENT)
-    assert not list(tmp_path.glob("**/*.part.part")) and not list(tmp_path.glob(".backup*"))
+    assert not list(tmp_path.glob("**/*.part.part")) and not list(
+        tmp_path.glob(".unfinished-*")
+    )
 
 
 def test_backup_goes_to_another_folder_that_has_no_database(
@@ -229,7 +231,7 @@ def test_disk_error_leaves_no_half_backup(
         assert list(folder.iterdir()) == []
     else:
         assert dump(path_of(store)) == before
-    assert not list(data.glob(".backup-*"))
+    assert not list(data.glob(".unfinished-*"))
 
 
 def test_head_says_what_is_inside(store: Store, data: Path, tmp_path: Path) -> None:

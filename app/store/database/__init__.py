@@ -1,5 +1,6 @@
 """The database as a whole: tables, their version, who may write, backups.
 
+archive  Archive of a backup: its members, checked by size and SHA-256
 backup   Backups of a data folder, also while the server runs
 lease    Lease: the right of one server to run the jobs of a database
 lock     Lock for one server per data folder and SQLite file

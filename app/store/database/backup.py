@@ -1,41 +1,47 @@
 """Backups of a data folder with a SQLite database, also while the server runs.
 
-A backup is a tar archive: a JSON member with size and SHA-256 of every other member, the
-database as one file, and the other files of the data folder. The database is copied by SQLite's
-online backup, which sees one consistent state and blocks no writer; the files beside it never
-change once they have their name, and are held by links until they are copied.
+A backup is an archive with the database as one file and the other files of the data folder. The
+database is copied by SQLite's online backup, which sees one consistent state and blocks no
+writer; the files beside it never change once they have their name, and are held by links until
+they are copied.
 """
 
 import errno
-import hashlib
-import io
-import json
+import fcntl
 import os
 import shutil
 import sqlite3
 import tarfile
 import tempfile
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import closing, contextmanager
+from collections.abc import Iterator, Mapping
+from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path, PurePosixPath
-from typing import IO, Any
+from typing import Any
 
 from app.errors import Conflict, InvalidInput
 from app.storage_errors import StorageDamaged, StorageFull, StorageUnavailable
+from app.store.database.archive import (
+    DATABASE,
+    FORMAT,
+    is_backup,
+    measured,
+    opened,
+    unpack,
+    write_archive,
+)
 from app.store.database.lock import ServerLock
 from app.store.database.schema import REVISION
 from app.store.engine import BUSY_TIMEOUT_S, Store
 
-HEAD, HEAD_DIGEST = "backup.json", "backup.json.sha256"
-DATABASE = "tandem.db"
-FORMAT = 1
+TEMPORARY = ".unfinished-tandem-backup-"
+"""Start of the names of folders that exist during a backup."""
 NOT_KEPT = (
     "kernels",
     "logs",
     "*.lock",
-    ".backup-*",
+    f"{TEMPORARY}*",
     "*.db",
     "*.db-*",
     "*.db.*",
@@ -43,7 +49,6 @@ NOT_KEPT = (
     "*.unfinished",
 )
 """Names in the data folder that no backup contains, as patterns."""
-CHUNK = 1 << 20
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -79,39 +84,33 @@ def write_backup(store: Store, data_dir: Path, path: Path) -> BackupSummary:
     """
     source = _sqlite_file(store)
     if path.exists():
-        raise InvalidInput("FILE", str(path), "exists: name a new file")
-    part = path.with_name(f"{path.name}.part")
-    copy = path.with_name(f"{path.name}.db.part")
-    try:
-        with (
-            _file_errors(path),
-            tempfile.TemporaryDirectory(dir=data_dir, prefix=".backup-") as held,
-        ):
-            _link_files(data_dir, Path(held), source)
-            _copy_database(source, copy, store.shown_url)
-            created_at = datetime.now(UTC).isoformat(timespec="seconds")
-            _link_files(data_dir, Path(held), source)
-            files = {DATABASE: copy} | {
-                f"files/{name}": file for name, file in _files(Path(held), source)
-            }
-            with closing(sqlite3.connect(copy)) as database:
-                rows = _row_counts(database)
-                (revision,) = database.execute(
-                    "SELECT version_num FROM alembic_version"
-                ).fetchone()
-            head = {
-                "format": FORMAT,
-                "created_at": created_at,
-                "revision": revision,
-                "rows": rows,
-                "files": {name: _measured(file) for name, file in files.items()},
-            }
-            _write_archive(part, head, files)
-            part.replace(path)
-            _sync(path.parent)
-    finally:
-        for unfinished in (part, copy):
-            unfinished.unlink(missing_ok=True)
+        raise _exists(path)
+    with (
+        _file_errors(path),
+        _temporary_folder(data_dir) as held,
+        _temporary_folder(path.parent) as folder,
+    ):
+        part, copy = folder / "backup.tar", folder / DATABASE
+        _link_files(data_dir, held, source)
+        _copy_database(source, copy, store.shown_url)
+        created_at = datetime.now(UTC).isoformat(timespec="seconds")
+        _link_files(data_dir, held, source)
+        files = {DATABASE: copy} | {
+            f"files/{name}": file for name, file in _files(held, source)
+        }
+        with closing(sqlite3.connect(copy)) as database:
+            rows = _row_counts(database)
+            (revision,) = database.execute("SELECT version_num FROM alembic_version").fetchone()
+        head = {
+            "format": FORMAT,
+            "created_at": created_at,
+            "revision": revision,
+            "rows": rows,
+            "files": {name: measured(file) for name, file in files.items()},
+        }
+        write_archive(part, head, files)
+        _publish(part, path)
+        _sync(path.parent)
     return _summary(path, head)
 
 
@@ -139,13 +138,13 @@ def restore_backup(
     lock.acquire()
     part = target.with_name(f"{target.name}.part")
     try:
-        with _file_errors(target), _opened(path) as (archive, head):
+        with _file_errors(target), opened(path) as (archive, head):
             if head["revision"] > REVISION:
                 raise Conflict(
                     f"{path} has schema {head['revision']}, this version of Tandem knows "
                     f"{REVISION} at most: restore it with the version that wrote it"
                 )
-            _unpack(archive, head, DATABASE, part)
+            unpack(archive, head, DATABASE, part)
             _check_database(part, str(path))
             for name in head["files"]:
                 if name != DATABASE:
@@ -164,6 +163,40 @@ def _sqlite_file(store: Store) -> Path:
         rule = "is no SQLite file: use pg_dump and pg_restore"
         raise InvalidInput("TANDEM_DATABASE_URL", store.shown_url, rule)
     return store.sqlite_path
+
+
+def _exists(path: Path) -> InvalidInput:
+    return InvalidInput("FILE", str(path), "exists: name a new file")
+
+
+@contextmanager
+def _temporary_folder(parent: Path) -> Iterator[Path]:
+    """Yield a folder that exists during a backup; remove those of killed backups.
+
+    Each backup holds a shared lock of the parent folder, which ends with its process.
+    """
+    lock = os.open(parent, os.O_RDONLY | os.O_CLOEXEC)
+    try:
+        with suppress(OSError):  # another backup is at work, or the file system has no locks
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            for left in parent.glob(f"{TEMPORARY}*"):
+                shutil.rmtree(left)
+        with suppress(OSError):
+            fcntl.flock(lock, fcntl.LOCK_SH)
+        with tempfile.TemporaryDirectory(dir=parent, prefix=TEMPORARY) as folder:
+            yield Path(folder)
+    finally:
+        os.close(lock)
+
+
+def _publish(part: Path, path: Path) -> None:
+    """Give a complete backup its name, unless another file has got it meanwhile."""
+    try:
+        os.link(part, path)
+    except FileExistsError:
+        raise _exists(path) from None
+    except OSError:  # a file system without links
+        part.replace(path)
 
 
 @contextmanager
@@ -204,7 +237,7 @@ def _files(folder: Path, database: Path) -> Iterator[tuple[str, Path]]:
             PurePosixPath(part).match(one) for part in name.parts for one in NOT_KEPT
         )
         kept = kept and file.is_file() and not file.is_symlink()
-        if kept and not _is_of_database(file, database) and not _is_backup(file):
+        if kept and not _is_of_database(file, database) and not is_backup(file):
             yield name.as_posix(), file
 
 
@@ -214,15 +247,6 @@ def _is_of_database(file: Path, database: Path) -> bool:
     before, name, rest = file.name.partition(database.name)
     same = file.parent.resolve() == database.parent and bool(name) and not before
     return same and rest[:1] in "-."
-
-
-def _is_backup(file: Path) -> bool:
-    """Return whether a file is an earlier backup: a tar archive that begins with its head."""
-    try:
-        with file.open("rb") as content:
-            return content.read(len(HEAD) + 1) == f"{HEAD}\0".encode()
-    except FileNotFoundError:
-        return False  # removed since
 
 
 def _copy_database(source: Path, copy: Path, shown: str) -> None:
@@ -263,101 +287,16 @@ def _row_counts(database: sqlite3.Connection) -> dict[str, int]:
     }
 
 
-def _sha256(content: bytes) -> bytes:
-    return hashlib.sha256(content).hexdigest().encode()
-
-
-def _measured(path: Path) -> dict[str, Any]:
-    digest, size = hashlib.sha256(), 0
-    with path.open("rb") as file:
-        while chunk := file.read(CHUNK):
-            digest.update(chunk)
-            size += len(chunk)
-    return {"size": size, "sha256": digest.hexdigest()}
-
-
-def _write_archive(part: Path, head: Mapping[str, Any], files: Mapping[str, Path]) -> None:
-    text = json.dumps(head, indent=1).encode()
-    with part.open("wb") as output:
-        with tarfile.open(fileobj=output, mode="w", format=tarfile.PAX_FORMAT) as archive:
-            for name, content in ((HEAD, text), (HEAD_DIGEST, _sha256(text))):
-                member = tarfile.TarInfo(name)
-                member.size = len(content)
-                archive.addfile(member, io.BytesIO(content))
-            for name, file in files.items():
-                member = tarfile.TarInfo(name)
-                member.size = head["files"][name]["size"]
-                with file.open("rb") as opened:
-                    archive.addfile(member, opened)
-        output.flush()
-        os.fsync(output.fileno())
-
-
-@contextmanager
-def _opened(path: Path) -> Iterator[tuple[tarfile.TarFile, dict[str, Any]]]:
-    """Open a backup and check that every member is there, whole and unchanged."""
-    try:
-        archive = tarfile.open(path, "r:")
-    except (tarfile.TarError, OSError) as error:
-        raise InvalidInput("FILE", str(path), f"is no backup of Tandem: {error}") from error
-    with archive:
-        try:
-            text = _member(archive, HEAD, path).read()
-            if _member(archive, HEAD_DIGEST, path).read() != _sha256(text):
-                raise ValueError(f"{HEAD} does not have its checksum")
-            head = json.loads(text)
-            if head["format"] != FORMAT or DATABASE not in head["files"]:
-                raise KeyError(DATABASE)
-            for name, expected in head["files"].items():
-                with _member(archive, name, path) as content:
-                    _read_checked(content, name, expected, path, lambda _: None)
-        except (tarfile.TarError, OSError, ValueError, KeyError, TypeError) as error:
-            raise InvalidInput("FILE", str(path), f"is torn or no backup: {error}") from error
-        yield archive, head
-
-
-def _member(archive: tarfile.TarFile, name: str, path: Path) -> IO[bytes]:
-    content = archive.extractfile(name)
-    if content is None or ".." in PurePosixPath(name).parts or name.startswith("/"):
-        raise InvalidInput("FILE", str(path), f"has an unusable member {name!r}")
-    return content
-
-
-def _read_checked(
-    content: IO[bytes],
-    name: str,
-    expected: Mapping[str, Any],
-    path: Path,
-    use: Callable[[bytes], object],
-) -> None:
-    digest, size = hashlib.sha256(), 0
-    while chunk := content.read(CHUNK):
-        digest.update(chunk)
-        size += len(chunk)
-        use(chunk)
-    if size != expected["size"] or digest.hexdigest() != expected["sha256"]:
-        rule = f"is damaged: its member {name!r} does not have its checksum; use another backup"
-        raise InvalidInput("FILE", str(path), rule)
-
-
-def _unpack(archive: tarfile.TarFile, head: Mapping[str, Any], name: str, target: Path) -> None:
-    source = Path(str(archive.name))
-    with target.open("wb") as output, _member(archive, name, source) as content:
-        _read_checked(content, name, head["files"][name], source, output.write)
-        output.flush()
-        os.fsync(output.fileno())
-
-
 def _restore_file(
     archive: tarfile.TarFile, head: Mapping[str, Any], name: str, data_dir: Path, database: Path
 ) -> None:
     target = data_dir / PurePosixPath(name).relative_to("files")
-    is_there = target.is_file() and _measured(target) == head["files"][name]
+    is_there = target.is_file() and measured(target) == head["files"][name]
     if is_there or _is_of_database(target, database):  # as in backups of earlier versions
         return
     target.parent.mkdir(parents=True, exist_ok=True)
     part = target.with_name(f"{target.name}.part")
-    _unpack(archive, head, name, part)
+    unpack(archive, head, name, part)
     part.replace(target)
     _sync(target.parent)
 

@@ -1,0 +1,107 @@
+"""Backups of processes that were killed, or are still at work."""
+
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+from app.store.database.backup import restore_backup, write_backup
+from app.store.engine import Store
+from tests.support.databases import SQLITE_ONLY
+from tests.support.waiting import wait_until
+
+pytestmark = SQLITE_ONLY
+
+SIZE = 20_000_000
+WRITER = """
+import sys
+from itertools import count
+from pathlib import Path
+
+from app.store.database.backup import write_backup
+from app.store.engine import Store
+
+data, folder = Path(sys.argv[2]), Path(sys.argv[3])
+for n in count():
+    write_backup(Store(sys.argv[1]), data, folder / f"{n}.tar")
+"""
+
+
+@pytest.fixture
+def data(tmp_path: Path) -> Path:
+    """A data folder with a file that takes a while."""
+    (tmp_path / "memory").mkdir()
+    (tmp_path / "memory/one.bin").write_bytes(bytes(SIZE))
+    return tmp_path
+
+
+@pytest.fixture
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder for backups."""
+    return tmp_path_factory.mktemp("backups")
+
+
+@contextmanager
+def stopped_writer(store: Store, data: Path, folder: Path) -> Iterator[subprocess.Popen[bytes]]:
+    """Yield a process that writes backups, stopped in the middle of one."""
+    command = [sys.executable, "-c", WRITER, store.url, str(data), str(folder)]
+    with subprocess.Popen(command, stderr=subprocess.PIPE) as process:
+
+        def stop_within() -> bool:
+            assert process.poll() is None
+            process.send_signal(signal.SIGSTOP)
+            if hidden(data) and hidden(folder):
+                return True
+            process.send_signal(signal.SIGCONT)
+            return False
+
+        try:
+            wait_until(stop_within)
+            yield process
+        finally:
+            process.kill()
+
+
+def hidden(folder: Path) -> list[Path]:
+    """Return the temporary files and folders of backups."""
+    return [one for one in folder.glob("*") if one.suffix == ".part" or one.name[0] == "."]
+
+
+def test_next_backup_removes_what_a_killed_one_left(
+    store: Store, data: Path, folder: Path
+) -> None:
+    with stopped_writer(store, data, folder) as process:
+        process.kill()
+    assert hidden(data) and hidden(folder)
+    (data / ".backup-notes").mkdir()
+    write_backup(store, data, folder / "next.tar")
+    assert hidden(data) == [data / ".backup-notes"] and not hidden(folder)
+
+
+def test_next_backup_leaves_those_at_work_alone(store: Store, data: Path, folder: Path) -> None:
+    with stopped_writer(store, data, folder) as process:
+        before, complete = hidden(data) + hidden(folder), set(folder.glob("*.tar"))
+        write_backup(store, data, folder / "next.tar")
+        assert hidden(data) + hidden(folder) == before
+        process.send_signal(signal.SIGCONT)
+        file = folder / f"{len(complete)}.tar"
+        wait_until(lambda: file.exists() or process.poll() is not None)
+    (folder / "other").mkdir()
+    other = Store(f"sqlite:///{folder}/other/tandem.db")
+    restore_backup(other, folder / "other", file)
+    assert (folder / "other/memory/one.bin").stat().st_size == SIZE
+    other.close()
+
+
+def test_two_backups_do_not_take_the_same_name(store: Store, data: Path, folder: Path) -> None:
+    with stopped_writer(store, data, folder) as process:
+        file = folder / f"{len(set(folder.glob('*.tar')))}.tar"
+        write_backup(store, data, file)
+        content = file.read_bytes()
+        process.send_signal(signal.SIGCONT)
+        assert b"exists: name a new file" in process.communicate(timeout=60.0)[1]
+    assert file.read_bytes() == content
