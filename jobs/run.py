@@ -88,14 +88,16 @@ def evaluate(inputs: JobInputs, worker: JobWorker) -> dict[str, Any]:
     """Evaluate the job's checkpoint by its protocol; a step is a row of the result."""
     worker.end_at_once()
     spec = parse_spec(worker.job.spec)
-    assert isinstance(spec, EvaluateSpec) and spec.checkpoint is not None
+    assert isinstance(spec, EvaluateSpec)
+    reference = worker.job.checkpoint or spec.checkpoint  # a job queued before migration 0013
+    assert reference is not None
 
     def on_row(done: int, total: int, row: Row) -> None:
         worker.record_progress(done, _rates(row), total_steps=total)
 
     return run_protocol(
         spec.protocol,
-        inputs.checkpoint(spec.checkpoint),
+        inputs.checkpoint(reference),
         episodes=spec.episodes,
         seed=spec.seed,
         motions=inputs.motions(spec.recordings),

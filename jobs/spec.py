@@ -148,7 +148,9 @@ class EvaluateSpec(_Spec):
     kind: Literal["evaluate"]
     protocol: Name = Field(description="name of the protocol")
     checkpoint: Name | None = Field(
-        None, description="SHA-256 or alias; the protocol's own if null"
+        None,
+        description="SHA-256 or alias, of which the present checkpoint is evaluated; the "
+        "protocol's own if null",
     )
     episodes: int | None = Field(None, ge=1, description="episodes; the protocol's own if null")
     seed: Seed = Field(0, description="seed of the episodes")

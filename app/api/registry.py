@@ -74,7 +74,6 @@ class CheckpointNames:
 
         Raises:
             NotFound: There is no such alias.
-            WrongState: A job that has not ended evaluates its checkpoint by this name.
         """
         remove_alias(self.store, alias)
         self.refresh()

@@ -18,7 +18,6 @@ from app.store.cursors import check_limit, decode_cursor, encode_cursor
 from app.store.database.tables import aliases, checkpoints, job_checkpoints
 from app.store.engine import Store
 from app.store.records import CheckpointRecord, NewCheckpoint, Page
-from app.store.references import require_unused
 
 logger = logging.getLogger(__name__)
 
@@ -153,13 +152,11 @@ def remove_alias(store: Store, name: str) -> None:
 
     Raises:
         NotFound: There is no such alias.
-        WrongState: A job that has not ended evaluates its checkpoint by this name.
     """
     with store.writing() as connection:
         removed = connection.execute(sa.delete(aliases).where(aliases.c.name == name))
         if removed.rowcount == 0:
             raise NotFound("alias", name, sorted(sum(_names(connection).values(), ())))
-        require_unused(connection, "alias", name, lambda job: job.checkpoint == name)
 
 
 def list_aliases(store: Store) -> dict[str, str]:

@@ -33,7 +33,7 @@ from app.store.records import (
     Page,
     References,
 )
-from app.store.references import require_stored
+from app.store.references import named_checkpoint, require_stored
 
 MAX_KEY_LENGTH = 255
 """Longest idempotency key."""
@@ -238,6 +238,7 @@ def _insert(connection: sa.Connection, new: NewJob, key: str | None) -> JobRecor
         "id": str(uuid.uuid4()),
         "overrides": dict(new.overrides or {}),
         "spec": dict(new.spec),
+        "checkpoint": named_checkpoint(connection, new.spec.get("checkpoint")),
         "state": "queued",
         "idempotency_key": key,
         "created_at": datetime.now(UTC),

@@ -89,6 +89,8 @@ class JobRecord(NewJob):
     """UUID as text."""
     number: int
     """Running number, in the order of submission."""
+    checkpoint: str | None
+    """SHA-256 of the checkpoint to evaluate: the one that its alias named at the submission."""
     state: JobState
     """Its state."""
     attempt: int

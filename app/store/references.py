@@ -5,6 +5,7 @@ the later one is refused.
 """
 
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
 from typing import Any
 
 import sqlalchemy as sa
@@ -19,16 +20,20 @@ def references_of(job: NewJob) -> References:
     return _references(job.spec, job.overrides or {})
 
 
+def named_checkpoint(connection: sa.Connection, reference: str | None) -> str | None:
+    """Return the SHA-256 that an alias names; anything else as it is."""
+    query = sa.select(aliases.c.sha256).where(aliases.c.name == reference)
+    return connection.execute(query).scalar() or reference
+
+
 def require_stored(connection: sa.Connection, references: References) -> None:
     """Check that what a job refers to is stored.
 
     Raises:
         InvalidInput: Something is not, since it was deleted after the job was checked.
     """
-    found = references.checkpoint
-    pointed = sa.select(aliases.c.sha256).where(aliases.c.name == found)
-    same = sa.or_(checkpoints.c.sha256 == found, checkpoints.c.sha256.in_(pointed))
-    _require(connection, "checkpoint", found, checkpoints, same)
+    named = checkpoints.c.sha256 == named_checkpoint(connection, references.checkpoint)
+    _require(connection, "checkpoint", references.checkpoint, checkpoints, named)
     cell = references.cell
     _require(connection, "overrides.cell", cell, cells, cells.c.name == cell)
     for place, name in enumerate(references.recordings):
@@ -37,11 +42,15 @@ def require_stored(connection: sa.Connection, references: References) -> None:
 
 
 def unfinished(connection: sa.Connection) -> Iterator[tuple[int, References]]:
-    """Yield number and references of each job that has not ended, oldest first."""
-    query = sa.select(jobs.c.number, jobs.c.spec, jobs.c.overrides)
+    """Yield number and references of each job that has not ended, oldest first.
+
+    Its checkpoint is the one that its alias named at the submission.
+    """
+    query = sa.select(jobs.c.number, jobs.c.spec, jobs.c.overrides, jobs.c.checkpoint)
     query = query.where(jobs.c.state.not_in(FINAL_STATES)).order_by(jobs.c.number)
     for row in connection.execute(query):
-        yield row.number, _references(row.spec, row.overrides)
+        found = _references(row.spec, row.overrides)
+        yield row.number, replace(found, checkpoint=row.checkpoint or found.checkpoint)
 
 
 def require_unused(

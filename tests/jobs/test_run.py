@@ -15,7 +15,7 @@ from app.store import attempts, checkpoints, events, job_actions, jobs, metrics
 from app.store.engine import Store
 from app.store.records import Claim
 from jobs.cell_catalog import CellCatalog
-from jobs.checkpoints import to_store
+from jobs.checkpoints import shipped, to_store
 from jobs.recording_catalog import RecordingCatalog
 from jobs.spec import parse_spec
 from jobs.supervisor import Supervisor
@@ -166,6 +166,21 @@ def test_evaluation_of_an_unknown_checkpoint_fails_by_name(store: Store) -> None
     body = {"kind": "evaluate", "protocol": "pick-single", "checkpoint": "nobody"}
     job = wait_until_final(store, jobs.create_job(store, parse_spec(body).new_job()).id)
     assert (job.state, job.error) == ("failed", "no checkpoint 'nobody'")
+
+
+@SQLITE_ONLY
+def test_evaluation_is_of_the_checkpoint_that_its_alias_named_when_it_was_posted(
+    store: Store, tmp_path: Path
+) -> None:
+    for name in ("reach", "pick"):
+        checkpoints.put_checkpoint(store, shipped(name))
+    checkpoints.set_alias(store, "line-2", pretrained.SHA256["reach"])
+    body = {"kind": "evaluate", "protocol": "pick-single", "checkpoint": "line-2"}
+    job = jobs.create_job(store, parse_spec({**body, "episodes": 1}).new_job())
+    checkpoints.set_alias(store, "line-2", pretrained.SHA256["pick"])
+    with supervised(store, tmp_path):
+        ended = wait_until_final(store, job.id)
+    assert "must be a policy that picks" in (ended.error or "")
 
 
 @pytest.mark.usefixtures("supervisor")

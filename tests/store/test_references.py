@@ -5,6 +5,7 @@ import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
+from itertools import product
 
 import pytest
 import sqlalchemy as sa
@@ -79,8 +80,10 @@ def at_once(store: Store, first: Delete, second: Delete) -> list[BaseException |
         return [one.exception(WAIT_S) for one in writes]
 
 
-@pytest.mark.parametrize("stored", [uploaded, alias, trained, cell, recording])
-@pytest.mark.parametrize("deletes_first", [True, False])
+@pytest.mark.parametrize(
+    ("stored", "deletes_first"),
+    [*product((uploaded, trained, cell, recording), (True, False)), (alias, True)],
+)
 def test_of_a_job_and_a_delete_at_once_the_later_one_is_refused(
     store: Store, stored: Callable[[Store], tuple[References, Delete]], deletes_first: bool
 ) -> None:
@@ -93,6 +96,22 @@ def test_of_a_job_and_a_delete_at_once_the_later_one_is_refused(
     assert done is None, done
     assert isinstance(refused, InvalidInput if deletes_first else WrongState), refused
     assert jobs.count_jobs(store)["queued"] == known + (not deletes_first)
+
+
+def test_job_refers_to_the_checkpoint_that_its_alias_named_when_it_was_queued(
+    store: Store,
+) -> None:
+    references, remove = alias(store)
+    sha256 = checkpoints.list_aliases(store)["best"]
+    queue(store, references)
+    other = checkpoints.put_checkpoint(store, policy(b"2")).sha256
+    checkpoints.set_alias(store, "best", other)
+    with pytest.raises(WrongState, match="is evaluated by job 1"):
+        retention.delete_checkpoint(store, sha256, {})
+    remove(store)
+    retention.delete_checkpoint(store, other, {})
+    (job,) = jobs.list_jobs(store).items
+    assert (job.checkpoint, job.spec["checkpoint"]) == (sha256, "best")
 
 
 @pytest.mark.parametrize("stored", [uploaded, alias, cell, recording])

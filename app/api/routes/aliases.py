@@ -15,13 +15,6 @@ RESERVED: dict[int | str, dict[str, Any]] = {
     409: {"description": "It is the name of a shipped checkpoint"},
     507: {},
 }
-IN_USE: dict[int | str, dict[str, Any]] = {
-    409: {
-        "description": "It is the name of a shipped checkpoint, or a job that has not ended "
-        "evaluates its checkpoint by this name"
-    },
-    507: {},
-}
 
 
 @router.get("", summary="List the aliases")
@@ -48,8 +41,8 @@ def get_alias(name: str, services: ServicesDep) -> Alias:
 def set_alias(name: str, body: AliasTarget, services: ServicesDep, response: Response) -> Alias:
     """Create an alias, or point it to another checkpoint in one step.
 
-    Its name can be used wherever a checkpoint is named; requests in progress and live worlds
-    keep the checkpoint that they have loaded.
+    Its name can be used wherever a checkpoint is named; requests in progress, live worlds and
+    posted jobs keep the checkpoint that it named before.
     """
     _require_own(name)
     record, _ = services.checkpoints.read(body.checkpoint)
@@ -60,7 +53,7 @@ def set_alias(name: str, body: AliasTarget, services: ServicesDep, response: Res
     return Alias.of(name, record.sha256)
 
 
-@router.delete("/{name}", status_code=204, summary="Remove an alias", responses=IN_USE)
+@router.delete("/{name}", status_code=204, summary="Remove an alias", responses=RESERVED)
 def remove_alias(name: str, services: ServicesDep) -> None:
     """Remove an alias; its checkpoint stays."""
     _require_own(name)

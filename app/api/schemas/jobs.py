@@ -23,6 +23,10 @@ class JobPublic(Answer):
     name: str | None = Field(description="a name for people")
     notes: str | None = Field(description="text for people")
     priority: int = Field(description="queued jobs of a higher priority start first")
+    checkpoint: str | None = Field(
+        description="SHA-256 of the checkpoint that it evaluates: the one that its alias named "
+        "when it was posted; null for other kinds"
+    )
     parent: str | None = Field(
         description="id of the job that this one repeats or changes; it may be deleted"
     )

@@ -109,6 +109,7 @@ jobs = Table(
     Column("ended_by", String(16)),
     Column("part_of", String(36)),  # no foreign key, as for the parent
     Column("trial", Integer),
+    Column("checkpoint", String(64)),
     Index("ix_jobs_state_number", "state", "number"),  # pages of jobs in a state
     Index("ix_jobs_part_of_number", "part_of", "number"),  # pages without parts, or of them
     sqlite_autoincrement=True,

@@ -105,7 +105,7 @@ function Facts({ entries }) {
 /** Jobs among the listed ones that evaluated a checkpoint. */
 function evaluations(one, jobs) {
   const names = [one.sha256, ...one.aliases];
-  return (jobs ?? []).filter((job) => job.kind === "evaluate" && names.includes(job.spec?.checkpoint));
+  return (jobs ?? []).filter((job) => job.kind === "evaluate" && names.includes(job.checkpoint ?? job.spec?.checkpoint));
 }
 
 function Uses({ one, acts, jobs }) {
