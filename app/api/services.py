@@ -181,7 +181,7 @@ class Services:
     readiness: Readiness = field(default_factory=Readiness)
     """Whether the service can decide."""
     replacing: threading.Lock = field(default_factory=threading.Lock)
-    """Held while a world is replaced, or all are stopped."""
+    """Held while a world is replaced, all are stopped, or a cell is removed."""
     uploads: threading.BoundedSemaphore = field(
         default_factory=lambda: threading.BoundedSemaphore(MAX_UPLOADS)
     )

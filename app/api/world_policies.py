@@ -122,12 +122,12 @@ def task_policy_for(cell: Cell, services: Services) -> TaskPolicy | None:
 def newest_for(
     cell: Cell, purpose: str, policies: PolicyRegistry[P], services: Services
 ) -> P | None:
-    """Return the newest policy that was trained in a cell for a purpose and is not damaged."""
+    """Return the newest usable policy that was trained in a cell for a purpose."""
     for record in list_checkpoints(services.store, limit=MAX_SEARCHED).items:
         if purpose_of(record.manifest) == purpose and is_for(record.manifest, cell):
             try:
                 return policies.load(record.sha256)
-            except Damaged as error:
+            except (Damaged, InvalidInput) as error:  # damaged, or deleted since
                 logger.warning("left out for cell %s: %s", cell.name, error.message)
     return None
 

@@ -73,8 +73,9 @@ async def create_cell(
 )
 def delete_cell(name: str, services: ServicesDep) -> None:
     """Remove a cell; policies trained in it have their own copy."""
-    _require_unused(services, name)
-    services.cells.remove(name)
+    with services.replacing:
+        _require_unused(services, name)
+        services.cells.remove(name)
 
 
 def _require_unused(services: Services, name: str) -> None:

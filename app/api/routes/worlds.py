@@ -129,12 +129,12 @@ def set_world_cell(world_id: str, body: WorldCell, services: ServicesDep) -> Wor
     moves straight to its goals.
     """
     services.world(world_id)
-    cell = services.cells.get(body.cell)
-    if (lack := lacks_for_live(cell)) is not None:
-        raise InvalidInput("cell", cell.name, f"cannot be shown live: it {lack}")
     with services.replacing:
         if services.stopping.is_set():
             raise NotReady("stopping")
+        cell = services.cells.get(body.cell)
+        if (lack := lacks_for_live(cell)) is not None:
+            raise InvalidInput("cell", cell.name, f"cannot be shown live: it {lack}")
 
         def replace(new: LiveWorld) -> tuple[LiveWorld, LiveWorld]:
             old, services.worlds[world_id] = services.worlds[world_id], new

@@ -1,22 +1,30 @@
 """Checkpoints that are deleted while they are loaded for a live world."""
 
 import asyncio
+import logging
 from concurrent.futures import Future, ThreadPoolExecutor, wait
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
+import sqlalchemy as sa
 
+from app.api.routes.cells import delete_cell
 from app.api.routes.worlds import command_world, set_world_cell
 from app.api.schemas.worlds import CommandAccepted, WorldCell
 from app.api.services import Services
+from app.api.world_policies import newest_for
 from app.errors import Conflict, InvalidInput
 from app.live.commands import PauseClock, SetPolicy
 from app.main import acting_in
-from app.sim.cells.cell import Cell
+from app.policies.checkpoints.checkpoint import CHOOSING
+from app.sim.cells.cell import Cell, load_cell
 from app.sim.pick.task_policy import TaskPolicy
 from app.store import checkpoints
+from app.store.database import tables
 from app.store.engine import Store
+from jobs.checkpoints import shipped
+from tests.support import workshop
 from tests.support.databases import SQLITE_ONLY
 from tests.support.idle_service import add_world, idle_service, loading, own_policy
 from web.viewer.loop import LiveCell
@@ -87,3 +95,47 @@ def test_world_does_not_start_with_a_policy_that_is_deleted_meanwhile(
     assert services.worlds["main"] is before
     with pytest.raises(Conflict, match="was stopped"):
         started[0].handle.submit(PauseClock())
+
+
+def test_cell_is_not_removed_while_a_world_starts_in_it(services: Services) -> None:
+    services.checkpoints.publish("pick", shipped("pick"))
+    services.cells.add(workshop.cell())
+    removals: list[Future[None]] = []
+    with ThreadPoolExecutor(1) as thread:
+
+        def start(id: str, cell: Cell, policy: TaskPolicy | None, *_: object) -> LiveCell:
+            removals.append(thread.submit(delete_cell, "workshop", services))
+            wait(removals, 0.5)
+            return LiveCell(cell, policy, id=id)
+
+        set_world_cell("main", WorldCell(cell="workshop"), replace(services, start_world=start))
+        with pytest.raises(Conflict, match="is shown by the live world 'main'"):
+            removals[0].result(30.0)
+    assert services.cells.get("workshop") == services.worlds["main"].cell
+
+
+def test_newest_policy_of_a_cell_is_left_out_if_it_is_deleted_meanwhile(
+    services: Services, store: Store
+) -> None:
+    deleted, damaged = (checkpoints.put_checkpoint(store, own_policy()).sha256 for _ in "ab")
+    with store.writing() as connection:
+        connection.execute(
+            sa.update(tables.checkpoints)
+            .where(tables.checkpoints.c.sha256 == damaged)
+            .values(tensors=b"damaged")
+        )
+
+    class Deletes(logging.Handler):
+        """Deletes a checkpoint once the one before it is found to be damaged."""
+
+        def emit(self, record: logging.LogRecord) -> None:
+            services.retention.delete_checkpoint(deleted)
+
+    handler = Deletes()
+    logging.getLogger("app.api.registry").addHandler(handler)
+    try:
+        cell = load_cell("pick-and-place")
+        assert newest_for(cell, CHOOSING, services.task_policies, services) is None
+    finally:
+        logging.getLogger("app.api.registry").removeHandler(handler)
+    assert [one.sha256 for one in checkpoints.list_checkpoints(store).items] == [damaged]
