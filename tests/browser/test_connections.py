@@ -92,3 +92,19 @@ def test_sign_in_form_sends_its_token_once(browser: Browser, server: str) -> Non
         )
     assert sent == [f"{server}/session"]
     page.close()
+
+
+def test_effect_of_a_command_is_unknown_after_a_lost_connection(
+    open_page: Callable[..., Page],
+) -> None:
+    page = open_page(scene=False)
+    unseen = {"number": 10**9}
+    page.route("**/v1/worlds/main/commands", lambda route: route.fulfill(json=unseen))
+    page.click('[data-goal="cube2"]')
+    page.wait_for_selector('[data-role="link"][data-pending="1"]')
+    page.evaluate(SEE, True)
+    unknown = page.locator(".banner.bad")
+    expect(unknown).to_contain_text("Effect unknown: toggle candidate.", timeout=10_000)
+    with page.expect_request(EVENTS):
+        page.evaluate(SEE, False)
+    expect(unknown).to_contain_text("look at the cell again")

@@ -1,10 +1,13 @@
 // Commands that the server has taken and that no snapshot shows yet.
 import { Unreachable } from "./api.js";
 
+/** The stream of snapshots was lost before one showed a command: its effect is unknown. */
+export class Lost extends Error {}
+
 export class Unconfirmed {
   #waiting = new Set();
 
-  /** Resolve once a snapshot shows a command; throw if it was refused, or not shown in time. */
+  /** Resolve once a snapshot shows a command; throw if it was refused, lost or is late. */
   wait(number, patience) {
     return new Promise((resolve, reject) => {
       const end = (finish, value) => {
@@ -13,7 +16,7 @@ export class Unconfirmed {
         finish(value);
       };
       const one = {
-        number, done: () => end(resolve), refused: (reason) => end(reject, new Error(reason)),
+        number, done: () => end(resolve), failed: (error) => end(reject, error),
       };
       const late = `no snapshot has shown it within ${Math.round(patience / 1000)} s`;
       const timer = setTimeout(() => end(reject, new Unreachable(late)), patience);
@@ -25,13 +28,13 @@ export class Unconfirmed {
   see({ commands, refused }) {
     const reasons = new Map(refused.map(({ number, reason }) => [number, reason]));
     for (const one of [...this.#waiting]) {
-      if (reasons.has(one.number)) one.refused(reasons.get(one.number));
+      if (reasons.has(one.number)) one.failed(new Error(reasons.get(one.number)));
       else if (commands >= one.number) one.done();
     }
   }
 
-  /** The world of the commands is gone: its commands went with it. */
+  /** The stream of snapshots is lost. */
   drop() {
-    for (const one of [...this.#waiting]) one.done();
+    for (const one of [...this.#waiting]) one.failed(new Lost());
   }
 }

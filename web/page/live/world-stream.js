@@ -1,7 +1,7 @@
 // The live cell as this page knows it: its last snapshot, its recent values, the link to it.
 import { useCallback, useEffect, useRef, useState } from "../vendor/htm-preact-standalone.module.js";
 import { follow, get, post, put, Unreachable } from "../api.js";
-import { Unconfirmed } from "../confirm.js";
+import { Lost, Unconfirmed } from "../confirm.js";
 import { History } from "./history.js";
 import { hidden, seen } from "../visibility.js";
 
@@ -70,6 +70,10 @@ async function carryOut(command, unconfirmed) {
     const { number } = await post(`v1/worlds/${WORLD}/commands`, command, {}, options);
     await unconfirmed.wait(number, COMMAND_MS);
   } catch (problem) {
+    if (problem instanceof Lost) {
+      throw new Error(`Effect unknown: ${name}. The connection was lost before the cell `
+        + "confirmed it; look at the cell again.");
+    }
     if (!(problem instanceof Unreachable)) throw problem;
     throw new Unreachable(`Not confirmed: ${name}. ${problem.message[0].toUpperCase()}${
       problem.message.slice(1)}; the command may still be carried out later.`);
