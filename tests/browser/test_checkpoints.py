@@ -1,6 +1,7 @@
 """A visitor looks at the stored checkpoints, names one, uploads, compares and deletes one."""
 
 import json
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -18,6 +19,18 @@ NAME = "of-a-visitor"
 
 def card(alias: str) -> str:
     return f'[data-checkpoint="{pretrained.SHA256[alias]}"]'
+
+
+def uploaded(server: str, seed: int) -> str:
+    """Store a checkpoint of a visitor; return its id."""
+    shipped = pretrained.load("reach")
+    manifest = json.dumps({**shipped.manifest, "seed": seed}).encode()
+    stored = patient_http.post(
+        f"{server}/v1/checkpoints",
+        content=manifest + b"\n" + shipped.tensors,
+        headers={"Content-Type": "application/octet-stream"},
+    )
+    return str(stored.json()["sha256"])
 
 
 def opened(open_page: Callable[..., Page], alias: str) -> Page:
@@ -40,10 +53,26 @@ def test_alias_is_added_and_removed(open_page: Callable[..., Page], server: str)
     assert patient_http.get(f"{server}/v1/aliases/{NAME}").status_code == 404
 
 
-def test_alias_of_a_shipped_checkpoint_is_kept(open_page: Callable[..., Page]) -> None:
+def test_shipped_checkpoint_says_so_and_keeps_its_alias(open_page: Callable[..., Page]) -> None:
     page = opened(open_page, "reach")
-    page.click('button[title="Remove the alias reach"]')
-    expect(page.locator("[data-role=checkpoints] .field-error")).to_contain_text("shipped")
+    expect(page.locator(f"{card('reach')} .job-sub")).to_have_text(
+        "reach-td3 · 40.96 M steps · shipped"
+    )
+    expect(page.locator(f"{card('reach')} .uses")).to_have_text("Shipped")
+    expect(page.get_by_title("Alias of a shipped checkpoint")).to_have_text("reach")
+    expect(page.get_by_title("Remove the alias reach")).to_have_count(0)
+
+
+def test_shipped_checkpoints_are_choices_behind_a_page_of_newer_ones(
+    open_page: Callable[..., Page],
+) -> None:
+    page = open_page(scene=False)
+    newest = "**/v1/checkpoints?limit=100"
+    page.route(newest, lambda route: route.fulfill(json={"items": [], "next_cursor": None}))
+    with page.expect_response("**/v1/checkpoints/pick"):
+        page.locator("[data-role=acting]").focus()
+    options = page.locator("[data-role=acting] optgroup[label=Shipped] option")
+    expect(options).to_contain_text(["pick · pick-td3", "pick-monitored"])
 
 
 def test_uploaded_files_make_the_same_checkpoint(open_page: Callable[..., Page]) -> None:
@@ -70,18 +99,13 @@ def test_two_checkpoints_are_compared_by_what_differs(open_page: Callable[..., P
 def test_uploaded_checkpoint_is_deleted_after_a_question(
     open_page: Callable[..., Page], server: str
 ) -> None:
-    shipped = pretrained.load("reach")
-    manifest = json.dumps({**shipped.manifest, "seed": 81}).encode()
-    stored = patient_http.post(
-        f"{server}/v1/checkpoints",
-        content=manifest + b"\n" + shipped.tensors,
-        headers={"Content-Type": "application/octet-stream"},
-    )
-    sha256 = stored.json()["sha256"]
+    sha256 = uploaded(server, seed=81)
     own = f'[data-checkpoint="{sha256}"]'
     page = opened(open_page, "reach")
     expect(page.locator(f"{card('reach')} [data-action=delete-checkpoint]")).to_have_count(0)
+    expect(page.locator(f"{own} .job-sub")).to_contain_text(re.compile("ago|just now"))
     page.click(f"{own} .job-head")
+    expect(page.locator(f"{own} .uses")).to_have_text("Uploaded")
     page.click(f"{own} [data-action=delete-checkpoint]")
     page.get_by_role("button", name="Keep it").click()
     page.click(f"{own} [data-action=delete-checkpoint]")

@@ -1,5 +1,6 @@
 """What a visitor sees when a request fails, a clock is wrong, or a list is long."""
 
+import re
 from collections.abc import Callable
 from typing import Any
 
@@ -7,6 +8,7 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from app.policies.checkpoints import pretrained
+from tests.browser.test_checkpoints import uploaded
 from tests.browser.test_training import open_form
 from tests.support import patient_http
 
@@ -85,13 +87,17 @@ def test_list_of_jobs_says_that_it_is_old_or_not_complete(
     expect(page.locator(".job").first).to_be_visible()
 
 
-def test_ages_are_by_the_clock_of_the_server(open_page: Callable[..., Page]) -> None:
+def test_ages_are_by_the_clock_of_the_server(
+    open_page: Callable[..., Page], server: str
+) -> None:
+    sha256 = uploaded(server, seed=82)
     page = open_page(scene=False)
     page.evaluate(WRONG_CLOCK)
     page.click("#tab-training")
-    shown = page.locator("[data-checkpoint] .job-sub").first
-    expect(shown).to_contain_text("ago")
+    shown = page.locator(f'[data-checkpoint="{sha256}"] .job-sub')
+    expect(shown).to_contain_text(re.compile("ago|just now"))
     expect(shown).not_to_contain_text("days")
+    patient_http.delete(f"{server}/v1/checkpoints/{sha256}").raise_for_status()
 
 
 def test_a_rounded_million_is_written_as_one(open_page: Callable[..., Page]) -> None:

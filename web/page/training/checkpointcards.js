@@ -1,11 +1,11 @@
 // Stored checkpoints: card, use, evaluations, aliases, upload, delete, two of them side by side.
 import { html, useEffect, useState } from "../vendor/htm-preact-standalone.module.js";
 import { Ask, Fault, useAction } from "../action.js";
-import { get, postFile, put, remove } from "../api.js";
+import { postFile, put, remove } from "../api.js";
 import * as format from "../format.js";
 import { Alert, Icon } from "../icons.js";
+import { PAGE, storedCheckpoints } from "./checkpoints.js";
 
-const PAGE = 100;
 const PURPOSES = { "choosing tasks": "task selection", "reaching goals": "reach", sorting: "sorting" };
 
 /** The section of the checkpoints; `acting` are the SHA-256 of those of the live cell. */
@@ -14,8 +14,8 @@ export function CheckpointCards({ link, jobs, acting }) {
   const [error, setError] = useState(null);
   const [open, setOpen] = useState(null);
   const [pair, setPair] = useState([]);
-  const refresh = () => get(`v1/checkpoints?limit=${PAGE}`).then(
-    (page) => { setList(page.items); setError(null); }, setError);
+  const refresh = () => storedCheckpoints().then(
+    (stored) => { setList(stored); setError(null); }, setError);
   const stamp = (jobs ?? []).map((job) => job.state).join();
   useEffect(() => { if (link === "live") refresh(); }, [link, stamp]);
   const choose = (sha256) => setPair((now) =>
@@ -34,7 +34,8 @@ export function CheckpointCards({ link, jobs, acting }) {
     <ul class="jobs">${(list ?? []).map((one) => html`<${Card} key=${one.sha256} one=${one}
       open=${open === one.sha256} chosen=${pair.includes(one.sha256)} acting=${acting} jobs=${jobs}
       onOpen=${setOpen} onChoose=${choose} onChanged=${refresh} />`)}</ul>
-    ${list?.length === PAGE && html`<p class="faint">The newest ${PAGE} are shown.</p>`}
+    ${list?.length >= PAGE && html`<p class="faint">The newest ${PAGE} and the shipped ones are
+      shown.</p>`}
   </section>`;
 }
 
@@ -45,7 +46,7 @@ function Card({ one, open, chosen, acting, jobs, onOpen, onChoose, onChanged }) 
       onClick=${() => onOpen(open ? null : one.sha256)}>
       <${Icon} name="chevron" />
       <span class="job-name" title=${nameOf(one)}>${nameOf(one)}</span>
-      ${acts ? html`<span class="chip chip-good">acts</span>`
+      ${acts ? html`<span class="chip chip-good">deployed</span>`
         : html`<span class="chip">${PURPOSES[one.purpose] ?? one.purpose}</span>`}
       <span class="job-sub">${subtitle(one)}</span>
     </button>
@@ -71,7 +72,7 @@ function nameOf(one) {
 function subtitle(one) {
   const steps = one.step ?? one.manifest.step;
   return [one.aliases.length > 0 && one.preset, Number.isFinite(steps) && `${format.steps(steps)} steps`,
-    format.ago(one.created_at)].filter(Boolean).join(" · ");
+    one.shipped.length ? "shipped" : format.ago(one.created_at)].filter(Boolean).join(" · ");
 }
 
 function facts(one) {
@@ -112,9 +113,10 @@ function Uses({ one, acts, jobs }) {
   const tested = evaluations(one, jobs);
   const maker = jobs?.find((job) => job.id === one.job_id);
   const uses = [
-    acts && "Acts in the live cell",
+    acts && "Deployed to the live cell",
     one.job_id ? `Made by job ${maker?.number ?? format.short(one.job_id)}`
-      : one.manifest.recalibration ? "Recalibrated or uploaded" : "Shipped or uploaded",
+      : one.shipped.length ? "Shipped"
+        : one.manifest.recalibration ? "Recalibrated or uploaded" : "Uploaded",
     ...tested.map((job) => `Job ${job.number} · ${job.spec.protocol}: ${job.state}`),
   ].filter(Boolean);
   return html`<ul class="uses" aria-label="Use">${uses.map((text) => html`<li key=${text}>${text}</li>`)}
@@ -139,7 +141,10 @@ function Aliases({ one, onChanged }) {
     run(() => put(`v1/aliases/${encodeURIComponent(name.trim())}`, { checkpoint: one.sha256 }));
   };
   return html`<form class="job-actions" onSubmit=${add} aria-label="Aliases">
-    ${one.aliases.map((alias) => html`<button type="button" class="tool" key=${alias}
+    ${one.shipped.map((alias) => html`<span class="chip" key=${alias}
+      title="Alias of a shipped checkpoint">${alias}</span>`)}
+    ${one.aliases.filter((alias) => !one.shipped.includes(alias)).map((alias) => html`<button
+      type="button" class="tool" key=${alias}
       title=${`Remove the alias ${alias}`}
       onClick=${() => run(() => remove(`v1/aliases/${encodeURIComponent(alias)}`))}>
       ${alias}<${Icon} name="close" /></button>`)}

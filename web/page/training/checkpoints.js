@@ -3,17 +3,29 @@ import { html, useCallback, useEffect, useState } from "../vendor/htm-preact-sta
 import { get } from "../api.js";
 import * as format from "../format.js";
 
+export const PAGE = 100;
 const PER_JOB = 5;
 const CHOOSING = "choosing tasks";
 const REACHING = "reaching goals";
 const SORTING = "sorting";
+
+/** The newest checkpoints and all shipped ones; `shipped` are the names of these. */
+export async function storedCheckpoints() {
+  const [{ items }, aliases] = await Promise.all([get(`v1/checkpoints?limit=${PAGE}`), get("v1/aliases")]);
+  const shipped = aliases.items.filter((one) => one.shipped);
+  const older = shipped.filter(({ checkpoint }) => items.every(({ sha256 }) => sha256 !== checkpoint));
+  const found = await Promise.allSettled(older.map(({ name }) => get(`v1/checkpoints/${name}`)));
+  const names = shipped.map((one) => one.name);
+  return [...items, ...found.flatMap(({ value }) => value ?? [])].map((one) =>
+    ({ ...one, shipped: one.aliases.filter((name) => names.includes(name)) }));
+}
 
 /** Known checkpoints; asked for again when `stamp` changes and by `refresh`. */
 export function useCheckpoints(link, stamp) {
   const [list, setList] = useState([]);
   const refresh = useCallback(() => {
     if (link !== "live") return;
-    get("v1/checkpoints?limit=100").then((page) => setList(page.items), () => {});
+    storedCheckpoints().then(setList, () => {});
   }, [link]);
   useEffect(refresh, [refresh, stamp]);
   return { list, refresh };
@@ -58,15 +70,17 @@ function options(groups, now, title) {
         ${name(c, group.job)}</option>`)}</optgroup>`)}`;
 }
 
-/** Shipped checkpoints first, then each job's newest few, and whatever acts now. */
+/** Shipped checkpoints first, then uploaded ones, each job's newest few, and the active one. */
 function grouped(list, jobs, now) {
-  const shipped = list.filter((c) => !c.job_id);
   const byJob = new Map();
   for (const c of list.filter((one) => one.job_id)) {
     const items = byJob.get(c.job_id) ?? [];
     if (items.length < PER_JOB || c.sha256 === now) byJob.set(c.job_id, [...items, c]);
   }
-  const groups = shipped.length ? [{ label: "Shipped", items: shipped, job: null }] : [];
+  const groups = [
+    { label: "Shipped", items: list.filter((c) => c.shipped.length), job: null },
+    { label: "Uploaded", items: list.filter((c) => !c.job_id && !c.shipped.length), job: null },
+  ].filter((group) => group.items.length);
   for (const [id, items] of byJob) {
     const job = `job ${jobs?.find((j) => j.id === id)?.number ?? format.short(id)}`;
     groups.push({ label: job[0].toUpperCase() + job.slice(1), items, job });
