@@ -3,7 +3,7 @@
 from collections.abc import Callable
 
 import pytest
-from playwright.sync_api import Page, expect
+from playwright.sync_api import Page, Route, expect
 
 from tests.support import patient_http
 
@@ -69,6 +69,34 @@ def test_value_plot_draws_while_its_data_is_older_than_the_history(
         }"""
     )
     assert names == ["first"]
+
+
+def test_long_names_of_goals_are_cut_beside_their_values_and_given_in_full(
+    open_page: Callable[..., Page],
+) -> None:
+    name = "Front conveyor, magazine 3, left of the gearbox housing"
+
+    def rename(route: Route) -> None:
+        answer = route.fetch()
+        cells = answer.json()
+        for station in (one for cell in cells["items"] for one in cell["stations"]):
+            station["label"] = name
+        route.fulfill(json=cells)
+
+    page = open_page((400, 800), scene=False)
+    page.route("**/v1/cells", rename)
+    page.reload()
+    named = {".line-names span": ".plot", ".bar-name span": ".bar-name"}
+    for one, place in named.items():
+        label = page.locator(f"section[aria-labelledby=values-title] {one}").first
+        expect(label).to_have_attribute("title", name)
+        ends = [
+            page.locator(f"section[aria-labelledby=values-title] {part}").first.evaluate(
+                "e => e.getBoundingClientRect().right"
+            )
+            for part in (one, place)
+        ]
+        assert ends[0] <= ends[1] + 0.5, one
 
 
 def test_a_value_of_a_contact_does_not_flatten_the_plot(open_page: Callable[..., Page]) -> None:

@@ -75,7 +75,6 @@ export function themeColours() {
   const read = (name) => style.getPropertyValue(name).trim();
   return {
     ink: read("--ink"),
-    soft: read("--ink-2"),
     faint: read("--ink-3"),
     grid: read("--grid"),
     panel: read("--panel"),

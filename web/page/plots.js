@@ -5,6 +5,7 @@ import { SPAN_S } from "./live/history.js";
 import { drawValues, valueRange } from "./live/value-plot.js";
 import { themeColours } from "./palette.js";
 
+const [LEAST_NAME, MOST_NAME] = [58, 120];
 const FONT = "11px Inter, system-ui, sans-serif";
 
 /** The page's colours; changes with the system's light and dark. */
@@ -73,7 +74,7 @@ export function ValuePlot({ history, ids, labelOf, colourOf, chosen, onHover }) 
 function valueOptions(theme, ids, live) {
   return {
     legend: { show: false },
-    padding: [8, 58, 0, 0],
+    padding: [8, roomForNames(ids.map(live.current.labelOf)), 0, 0],
     cursor: { y: false, drag: { setScale: false, x: false, y: false }, points: { show: false } },
     scales: {
       x: { time: false, range: [-SPAN_S, 0] },
@@ -89,6 +90,14 @@ function valueOptions(theme, ids, live) {
       setCursor: [(plot) => live.current.onHover?.(plot.cursor.idx)],
     },
   };
+}
+
+/** Width of the names beside the value plot [px]; longer ones are cut. */
+function roomForNames(names) {
+  const context = document.createElement("canvas").getContext("2d");
+  context.font = FONT.replace("11px", "650 11px");
+  const widest = Math.max(0, ...names.map((name) => context.measureText(name).width));
+  return Math.ceil(Math.min(MOST_NAME, Math.max(LEAST_NAME, widest + 10)));
 }
 
 function padded(low, high, least) {

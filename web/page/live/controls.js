@@ -54,9 +54,9 @@ function Goals({ world, cell, send, colourOf, labelOf }) {
     ${(cell?.stations ?? []).map(({ id }) => {
       const on = active.has(id);
       return html`<button key=${id} type="button" class="goal" aria-pressed=${String(on)}
-        data-goal=${id} onClick=${() => send({ tag: "toggle-candidate", id })}>
+        data-goal=${id} title=${labelOf(id)} onClick=${() => send({ tag: "toggle-candidate", id })}>
         <i class="swatch" style=${on ? { background: colourOf(id) } : {}}></i>
-        ${labelOf(id)}</button>`;
+        <span>${labelOf(id)}</span></button>`;
     })}
   </div>`;
 }

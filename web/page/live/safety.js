@@ -29,9 +29,9 @@ export function Safety({ world }) {
       <span class="hint" tabindex="0" aria-describedby="safety-help">ISO 10218-2
         <span class="tip tip-left" role="tooltip" id="safety-help">The robot must be able to stop
           before a person ${safety.use_measured_velocity ? "at the measured velocity plus" : "moving at"}
-          ${safety.human_speed.toFixed(1)} m/s can reach it. The layer checks the path ahead; S_p is the
+          ${safety.human_speed.toFixed(1)} m/s can reach it. The layer checks the path ahead; S<sub>p</sub> is the
           bound of the standard, so near the limit the two differ slightly, and a robot that moves
-          away may be faster. S_p is the sum of the distances that person and robot cover until
+          away may be faster. S<sub>p</sub> is the sum of the distances that person and robot cover until
           the robot has stopped, and of the margins. Not a certified safety function.</span>
       </span>
     </header>
@@ -76,8 +76,8 @@ function Terms({ safety, people }) {
   }
   const subject = people.length > 1 ? nameOf(person) : "Person";
   const rows = [
-    ["person", "human contribution Sh", person_m],
-    ["robot", "robot reaction and stopping Sr + Ss", robot_m],
+    ["person", html`human contribution S<sub>h</sub>`, person_m],
+    ["robot", html`robot reaction and stopping S<sub>r</sub> + S<sub>s</sub>`, robot_m],
     ["margin", "margins C + Z", margin],
   ];
   return html`<dl class="terms">
@@ -85,7 +85,7 @@ function Terms({ safety, people }) {
       <dt>${subject} to ${LINKS[link] ?? "robot"}</dt>
       <dd data-role="separation">${format.gap(separation)}</dd></div>
     <div class="terms-top"><dt>Protective separation distance S<sub>p</sub></dt><dd data-role="required">${metres(required)}</dd></div>
-    ${rows.map(([key, label, value]) => html`<div key=${key}><dt><i class=${`term term-${key}`}></i>${label}</dt>
+    ${rows.map(([key, label, value]) => html`<div key=${key}><dt><i class=${`term term-${key}`}></i><span>${label}</span></dt>
       <dd>${metres(value)}</dd></div>`)}
   </dl>`;
 }

@@ -78,7 +78,7 @@ export function SmallPrint({ world }) {
   return html`<section class="card small-print" aria-label="Counters and provenance">
     <dl class="tiles">
       ${[["reached", "Picked"], ["broken_off", "Broken off"], ["contacts", "Contacts"],
-        ["contacts_at_rest", "Contacts at rest"], ["timeouts", "Timed out"],
+        ["contacts_at_rest", "Contacts at standstill"], ["timeouts", "Timed out"],
         ["switches", "Target switches"]].map(([key, label]) => html`<div key=${key}>
           <dt>${label}</dt><dd data-counter=${key}>${counters[key] ?? 0}</dd></div>`)}
     </dl>

@@ -1,7 +1,7 @@
 // Lines of the value plot: each goal in its colour, as in the scene; the chosen one is thicker;
 // a dashed line marks a target switch.
+import { html, render } from "../vendor/htm-preact-standalone.module.js";
 
-const FONT = "px Inter, system-ui, sans-serif";
 const LABEL_GAP = 13;
 const THIN = 1.6;
 const THICK = 3.4;
@@ -47,8 +47,8 @@ export function drawValues(plot, { history, labelOf, colourOf }, theme) {
   }
   markChoices(ctx, switches, (i) => at(i, columns[ids.indexOf(chosen[i])]), theme, dpr);
   ctx.restore();
-  label(ctx, plot, ids, columns, chosen.findLast((one) => one), labelOf, theme, dpr);
   ctx.restore();
+  label(plot, ids, columns, chosen.findLast((one) => one), labelOf);
 }
 
 /** Stroke the pieces that `wanted` accepts. */
@@ -95,30 +95,25 @@ function markChoices(ctx, switches, at, theme, dpr) {
 }
 
 /** Names at the right ends of the lines, pushed apart where they would overlap. */
-function label(ctx, plot, ids, columns, chosen, labelOf, theme, dpr) {
-  const { bbox } = plot;
+function label(plot, ids, columns, chosen, labelOf) {
+  const { offsetLeft, offsetTop, clientWidth, clientHeight } = plot.over;
   const last = columns[0]?.findLastIndex((_, i) => columns.some((one) => Number.isFinite(one[i])));
   const ends = ids
     .map((id, k) => ({ id, value: columns[k][last] }))
     .filter((end) => Number.isFinite(end.value))
-    .map((end) => ({ ...end, y: plot.valToPos(end.value, "y", true) }))
+    .map((end) => ({ ...end, name: labelOf(end.id), y: plot.valToPos(end.value, "y") }))
     .sort((a, b) => a.y - b.y);
-  const gap = LABEL_GAP * dpr;
   ends.forEach((end, i) => {
-    if (i) end.y = Math.max(end.y, ends[i - 1].y + gap);
+    if (i) end.y = Math.max(end.y, ends[i - 1].y + LABEL_GAP);
   });
-  const over = (ends.at(-1)?.y ?? 0) - (bbox.top + bbox.height);
-  if (over > 0) {
-    for (let i = ends.length - 1, floor = bbox.top + bbox.height; i >= 0; i--) {
-      ends[i].y = Math.min(ends[i].y, floor);
-      floor = ends[i].y - gap;
-    }
+  for (let i = ends.length - 1, floor = clientHeight; i >= 0 && ends[i].y > floor; i--) {
+    ends[i].y = floor;
+    floor -= LABEL_GAP;
   }
-  ctx.textAlign = "left";
-  ctx.textBaseline = "middle";
-  for (const end of ends) {
-    ctx.font = `${end.id === chosen ? 650 : 450} ${11 * dpr}${FONT}`;
-    ctx.fillStyle = end.id === chosen ? theme.ink : theme.soft;
-    ctx.fillText(labelOf(end.id), bbox.left + bbox.width + 8 * dpr, end.y);
-  }
+  const box = plot.root.querySelector(".line-names")
+    ?? plot.root.firstChild.appendChild(document.createElement("div"));
+  box.className = "line-names";
+  box.style.left = `${offsetLeft + clientWidth + 8}px`;
+  render(ends.map(({ id, name, y }) => html`<span key=${id} title=${name}
+    class=${id === chosen ? "is-chosen" : ""} style=${{ top: `${offsetTop + y}px` }}>${name}</span>`), box);
 }

@@ -34,7 +34,7 @@ export function Values({ world, cell, history, colourOf, labelOf }) {
             rank=${rankOf(c, rows)} scale=${scale} />`)}
         </ul>`}
     <div class="plot-head">
-      <span>last ${SPAN_S} s</span>
+      <span>Q over the last ${SPAN_S} s</span>
       <span class="readout" aria-hidden="true">${past
         ? html`<${Readout} past=${past} age=${history.age(at)} labelOf=${labelOf} />`
         : html`<span class="faint"><i class="switch-mark"></i>target switch</span>`}</span>
@@ -65,7 +65,8 @@ function Bar({ candidate, chosen, isChosen, colour, label, rank, scale }) {
   const classes = ["bar", isChosen && "is-chosen", reachable === false && "is-unreachable"];
   return html`<li class=${classes.filter(Boolean).join(" ")} tabindex="0" data-candidate=${id}
     data-chosen=${isChosen ? "true" : "false"} aria-describedby=${`tip-${id}`}>
-    <span class="bar-name"><i class="swatch" style=${{ background: colour }}></i>${label}</span>
+    <span class="bar-name"><i class="swatch" style=${{ background: colour }}></i>
+      <span title=${label}>${label}</span></span>
     <span class="bar-track">
       <i class="bar-zero" style=${{ left: `${zero}%` }}></i>
       <i class="bar-fill" style=${bar}></i>

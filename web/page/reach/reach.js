@@ -20,7 +20,7 @@ function Outcomes({ world }) {
   const tiles = [
     ["reached", "Reached", counters.reached],
     ["contacts", "Contacts", counters.contacts],
-    ["contacts_at_rest", "Contact at standstill", counters.contacts_at_rest],
+    ["contacts_at_rest", "Contacts at standstill", counters.contacts_at_rest],
     ["timeouts", "Timed out", counters.timeouts],
   ];
   return html`<section class="card small-print" aria-label="Outcomes and provenance">

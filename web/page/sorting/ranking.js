@@ -105,7 +105,7 @@ export function SortingSmallPrint({ world, cell, checkpoints, jobs, send }) {
   const counters = { ...world.sorting.counters, ...world.counters };
   const shown = [["attempts", "Grasps"], ["failures", "Failed"], ["moves", "Moves"],
     ["planner_fallbacks", "Planner fallbacks"], ["contacts", "Contacts"],
-    ["contacts_at_rest", "Contacts at rest"]];
+    ["contacts_at_rest", "Contacts at standstill"]];
   return html`<section class="card small-print" aria-label="Counters and provenance">
     <dl class="tiles">
       ${shown.map(([key, label]) => html`<div key=${key}>
