@@ -3,6 +3,8 @@
 application       The HTTP application: routers, error handlers, access control and the
                   page
 bodies            ASGI middleware that checks address and body of a request before its route
+compression       Compression of answers for clients that accept it, by ``Accept-Encoding``
+                  (RFC 9110)
 description       The OpenAPI document: answers of every operation, access, and names of
                   operations
 following         Live worlds that follow a training

@@ -7,12 +7,12 @@ from pathlib import Path
 from fastapi import FastAPI, Request
 from fastapi.routing import APIRoute
 from opentelemetry.trace import TracerProvider
-from starlette.middleware.gzip import GZipMiddleware
 from starlette.responses import FileResponse, Response
 from starlette.staticfiles import StaticFiles
 
 from app.api import description, problems
 from app.api.bodies import BodyMiddleware
+from app.api.compression import Compression
 from app.api.direct_routes import DirectRouteMiddleware
 from app.api.metrics import Metrics
 from app.api.responses import ResponseMiddleware
@@ -148,4 +148,4 @@ def add_page(app: FastAPI, static: Path) -> None:
     async def icon() -> FileResponse:
         return FileResponse(static / "favicon.ico", media_type="image/x-icon")
 
-    app.mount("/static", GZipMiddleware(files), name="static")
+    app.mount("/static", Compression(files), name="static")

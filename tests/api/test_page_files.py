@@ -66,6 +66,31 @@ def test_files_of_the_page_are_packed_and_asked_for_again(
     assert client.get(f"/static/{name}", headers={"If-None-Match": '"other"'}).is_success
 
 
+@pytest.mark.parametrize(
+    ("accepted", "packed"),
+    [
+        ("gzip", True),
+        ("br, GZIP;q=0.001", True),
+        ("gzip ; q=1.0, *;q=0", True),
+        ("*", True),
+        ("gzip;q=0", False),
+        ("gzip;q=0, *", False),
+        ("deflate, gzip; q=0.000", False),
+        ("*;q=0", False),
+        ("br", False),
+        ("", False),
+    ],
+)
+@pytest.mark.parametrize("path", ["/viewer/main/", "/static/app.js"])
+def test_gzip_is_sent_to_clients_that_do_not_refuse_it(
+    client: TestClient, path: str, accepted: str, packed: bool
+) -> None:
+    answer = client.get(path, headers={"Accept-Encoding": accepted})
+    assert (answer.headers.get("content-encoding") == "gzip") is packed
+    assert "accept-encoding" in answer.headers["vary"].lower()
+    assert answer.content
+
+
 @pytest.mark.parametrize("path", ["/", "/viewer/main/"])
 def test_pages_are_asked_for_again(client: TestClient, path: str) -> None:
     answer = client.get(path)

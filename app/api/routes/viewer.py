@@ -23,6 +23,7 @@ from websockets.asyncio.client import ClientConnection, unix_connect
 from websockets.exceptions import ConnectionClosed
 from websockets.typing import Subprotocol
 
+from app.api.compression import accepts_gzip
 from app.api.services import MAX_VIEWERS, LiveWorld, ServicesDep, services_of
 from app.api.sockets import MAX_MESSAGE, TOO_LARGE, refuse
 from app.errors import ServiceError
@@ -76,7 +77,7 @@ async def page(
         "Cache-Control": "no-cache",
         "Vary": "Accept-Encoding",
     }
-    if "gzip" in accept_encoding:
+    if accepts_gzip(accept_encoding):
         return Response(
             packed, media_type="text/html", headers=headers | {"Content-Encoding": "gzip"}
         )
