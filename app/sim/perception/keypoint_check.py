@@ -8,6 +8,10 @@ origin) or unit by bone lengths, heights of body parts over the floor, and pose.
 people who stand, bend, kneel, sit, lie on the floor or on a table, reach up, or stand on a step
 of half a metre. An implausible skeleton counts as unseen, and so does one without a usable
 key-point. Bounds are ours.
+
+Some skeletons with the floor as origin remain plausible: of people who kneel, squat or lie, who
+then seem to do so on a table; of people whose legs are not seen; and all of them if the
+difference of the origins is at most that of a step.
 """
 
 from dataclasses import dataclass
@@ -48,8 +52,14 @@ _UNITS = {"millimetres": 1000.0, "centimetres": 100.0, "inches": 39.37, "feet": 
 
 _STEP_M = 0.5
 """Largest height of a step or platform below a person [m]."""
+_LEG_END_M = _STEP_M + 0.15
+"""Largest height of the lower end of legs that hang or stand, with errors of a tracker [m]."""
+_SHANK_M = 0.15
+"""Least height of the knees over the feet of such legs [m]."""
 _BELOW_M = -0.3
 """Least height of any part over the floor, with errors of a tracker [m]."""
+_KNEES_BELOW_M = -0.15
+"""The same of knees, whose centres are over the floor in all postures [m]."""
 _PARTS: dict[str, tuple[tuple[int, ...], float]] = {
     "feet": (
         tuple(
@@ -274,13 +284,16 @@ def _why_not_standing(points: Vec, floor_z: float) -> str | None:
     """Return the reason why heights over the floor are implausible, or None."""
     heights = {part: float(_middle(points, part)[2] - floor_z) for part in _PARTS}
     for part, height in heights.items():
-        high = _PARTS[part][1]
-        if not (np.isnan(height) or _BELOW_M <= height <= high):
-            return (
-                f"{part} are {height:.2f} m over the floor, a person's {_BELOW_M:g} to "
-                f"{high:g} m"
-            )
-    hips, shoulders = heights["hips"], heights["shoulders"]
+        low, high = _KNEES_BELOW_M if part == "knees" else _BELOW_M, _PARTS[part][1]
+        if not (np.isnan(height) or low <= height <= high):
+            return f"{part} are {height:.2f} m over the floor, a person's {low:g} to {high:g} m"
+    hips, shoulders, knees = heights["hips"], heights["shoulders"], heights["knees"]
+    end = 2.0 * knees - hips if np.isnan(heights["feet"]) else heights["feet"]
+    if knees < hips + 0.1 and knees - end > _SHANK_M and end > _LEG_END_M:
+        return (
+            f"legs reach down to {end:.2f} m over the floor, those of a person who stands or "
+            f"sits to {_LEG_END_M:g} m or less"
+        )
     if shoulders < hips + 0.1 and hips > _FLAT_HIPS_M:
         return (
             f"hips are {hips:.2f} m over the floor and shoulders {shoulders:.2f} m: level or "

@@ -176,6 +176,36 @@ def test_an_origin_on_the_floor_is_named() -> None:
     assert "does z count from the floor here?" in str(found.implausible)
 
 
+FEET = [K[f"{part}_{s}"] for part in ("ankle", "heel", "big_toe", "small_toe") for s in "rl"]
+
+
+@pytest.mark.parametrize("scale", [0.75, 0.85, 1.0, 1.1])
+@pytest.mark.parametrize("base", [0.7, 0.75, 0.95])
+def test_short_and_tall_people_with_the_floor_as_origin_are_implausible(
+    base: float, scale: float
+) -> None:
+    for name in ("standing", "arms up", "reaching forward", "kneeling on one knee"):
+        points = posture(name, 0.0, scale)
+        for hidden in ([], FEET):
+            points[hidden] = NAN
+            found = check_keypoints(points, floor_z=-base)
+            assert "does z count from the floor here?" in str(found.implausible), name
+    found = check_keypoints(posture("sitting on a chair", 0.0, scale), floor_z=-base)
+    assert "does z count from the floor here?" in str(found.implausible)
+
+
+@pytest.mark.parametrize("scale", [0.75, 0.85, 1.0])
+@pytest.mark.parametrize("base", [0.7, 0.75, 0.95])
+def test_people_with_the_robot_as_origin_in_a_cell_of_the_floor_are_implausible(
+    base: float, scale: float
+) -> None:
+    points = posture("standing", -base, scale)
+    for hidden in ([], FEET):
+        points[hidden] = NAN
+        found = check_keypoints(points, floor_z=0.0)
+        assert "over the floor" in str(found.implausible)
+
+
 @pytest.mark.parametrize("up", [0.75, 2.0, -0.75, -2.0])
 def test_a_person_over_or_under_the_floor_is_implausible(up: float) -> None:
     points = posture("standing", FLOOR) + [0.0, 0.0, up]
