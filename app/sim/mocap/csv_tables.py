@@ -19,6 +19,7 @@ from app.sim.mocap.artifacts import Artifact
 from app.sim.mocap.bvh import check_dt
 from app.sim.mocap.csv_text import CsvText, read_csv_text
 from app.sim.mocap.faults import bad, shown
+from app.sim.mocap.length_units import MAX_HIGH, MAX_PACE, pace
 from app.sim.mocap.tables import TextTable, complete_rows, missing_values
 
 CSV_COLUMNS = ("time", *JOINT_NAMES, "pelvis_z")
@@ -39,6 +40,8 @@ SAME_RATE = 0.05
 """Relative difference of the declared rate and that of the times that counts as none."""
 MAX_PLACE = 100.0
 """Largest distance of the pelvis from the origin [m]."""
+SPAN_Z = (-1.2, 2.0)
+"""Range of the height of the pelvis relative to standing [m]."""
 
 _SECONDS = ("s", "sec", "second", "seconds")
 _METRES = ("m", "metre", "metres", "meter", "meters")
@@ -84,16 +87,17 @@ def read_csv(text: str, names: Mapping[str, str] | None = None) -> AngleTrack:
     sound = {name: column[good] for name, column in values.items()}
     q = np.stack([sound[name] for name in JOINT_NAMES], axis=1)
     q[:, 2:] = in_radians({name: sound[name] for name in JOINT_NAMES[2:]}, degrees)
-    require_places({name: sound[name] for name in ("pelvis_x", "pelvis_y")})
-    pelvis_z = sound.get("pelvis_z", np.zeros(len(q)))
-    require_places({"pelvis_z": pelvis_z}, most=2.0)
+    places = {name: sound[name] for name in _PLACES if name in sound}
+    pelvis_z = places.get("pelvis_z", np.zeros(len(q)))
     _require_rise(pelvis_z)
+    require_places({name: places[name] for name in ("pelvis_x", "pelvis_y")})
     times: Vec
     if "time" in sound:
         times = check_times(sound["time"], file.table, good)
         _require_rate(times, file.declared)
     else:
         times = np.asarray(_dt(file.declared.get("rate_hz")) * np.flatnonzero(good))
+    require_pace(places, times)
     return AngleTrack(
         times=times,
         q=q,
@@ -145,7 +149,11 @@ def _check_units(file: CsvText, columns: Mapping[str, int], degrees: bool) -> No
 
 
 def _require_rise(pelvis_z: Vec) -> None:
-    """Check that the pelvis's height is relative to standing."""
+    """Check that the pelvis's height is in metres, and relative to standing."""
+    extreme = float(max(pelvis_z.min(), pelvis_z.max(), key=abs))
+    if not SPAN_Z[0] <= extreme <= SPAN_Z[1]:
+        rule = f"is the height relative to standing; must be {SPAN_Z[0]:g} to {SPAN_Z[1]:g} m"
+        raise bad("column pelvis_z", f"{extreme:.4g}", rule, _unit_hint(extreme, extreme))
     rise = float(np.median(pelvis_z))
     if rise > MAX_RISE:
         rule = f"is the median rise above standing; must be at most {MAX_RISE:g} m"
@@ -202,18 +210,52 @@ def _continuous(angles: Vec) -> Vec:
     return np.asarray(path - 2.0 * np.pi * np.round(turns))
 
 
-def require_places(places: Mapping[str, Vec], most: float = MAX_PLACE) -> None:
+def require_places(places: Mapping[str, Vec]) -> None:
     """Check that positions are in metres.
 
     Raises:
-        BadRecording: A distance from the origin exceeds ``most`` [m].
+        BadRecording: A distance from the origin exceeds ``MAX_PLACE``.
     """
-    for name, column in places.items():
-        far = float(np.abs(column).max())
-        if far > most:
-            hint = f"looks like millimetres: in m that is {far / 1000.0:.4g}"
-            rule = f"must be at most {most:g} m"
-            raise bad(f"column {name}", f"{far:.4g}", rule, hint if far > 100.0 else "")
+    far = {name: float(np.abs(column).max()) for name, column in places.items()}
+    for name, value in far.items():
+        if value > MAX_PLACE:
+            hint = _unit_hint(max(far.values()), value)
+            raise bad(
+                f"column {name}", f"{value:.4g}", f"must be at most {MAX_PLACE:g} m", hint
+            )
+
+
+def require_pace(places: Mapping[str, Vec], times: Vec) -> None:
+    """Check that positions are in metres by the speed of the pelvis.
+
+    Raises:
+        BadRecording: It is faster than a person in most frames.
+    """
+    dt = float(np.median(np.diff(times)))
+    speed = pace(np.column_stack(list(places.values())), dt, 50.0)
+    if speed > MAX_PACE:
+        rule = f"is the median speed of the pelvis; must be at most {MAX_PACE:g} m/s"
+        raise bad(
+            f"columns {', '.join(places)}", f"{speed:.4g}", rule, _unit_hint(speed, speed)
+        )
+
+
+def require_height(name: str, column: Vec) -> None:
+    """Check that the height of the pelvis over the file's zero is in metres.
+
+    Raises:
+        BadRecording: The median exceeds ``MAX_HIGH``, as that of a child in centimetres does.
+    """
+    height = float(np.median(column))
+    if abs(height) > MAX_HIGH:
+        rule = f"is the median height of the pelvis; must be within {MAX_HIGH:g} m of zero"
+        raise bad(f"column {name}", f"{height:.4g}", rule, _unit_hint(height, height))
+
+
+def _unit_hint(largest: float, value: float) -> str:
+    """Return a value in metres, by the unit of the largest length that is none in metres."""
+    unit, per_metre = ("centimetres", 100.0) if abs(largest) <= 300.0 else ("millimetres", 1e3)
+    return f"looks like {unit}: in m that is {value / per_metre:.4g}"
 
 
 def check_times(times: Vec, table: TextTable, good: NDArray[np.bool_]) -> Vec:

@@ -235,16 +235,21 @@ def require_one_unit(
 
 def _possible_path(pelvis: Vec, dt: float) -> Callable[[float], bool]:
     """Return the test whether a path is human, as a function of its unit [m]."""
-    step = max(1, round(0.1 / dt))
-    moved = np.linalg.norm(pelvis[step:] - pelvis[:-step], axis=1) / (step * dt)
-    pace = float(np.percentile(moved, 95.0)) if len(moved) else 0.0
+    fastest = pace(pelvis, dt, 95.0)
     extent, height = float(np.ptp(pelvis, axis=0).max()), float(np.median(pelvis[:, 2]))
 
     def possible(length: float) -> bool:
         still = 0.0 < length * extent < MIN_EXTENT
-        return not still and length * pace <= MAX_PACE and length * abs(height) <= MAX_HIGH
+        return not still and length * fastest <= MAX_PACE and length * abs(height) <= MAX_HIGH
 
     return possible
+
+
+def pace(pelvis: Vec, dt: float, share: float) -> float:
+    """Return a percentile of the speeds of a pelvis over 0.1 s [the file's unit/s]."""
+    step = max(1, round(0.1 / dt))
+    moved = np.linalg.norm(pelvis[step:] - pelvis[:-step], axis=1) / (step * dt)
+    return float(np.percentile(moved, share)) if len(moved) else 0.0
 
 
 def _planted(pelvis: Vec, ankles: Vec, dt: float, stature: float) -> tuple[float, float]:

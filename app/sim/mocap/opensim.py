@@ -21,7 +21,14 @@ import scipy
 
 from app.sim.core.arrays import Vec
 from app.sim.mocap.bvh import axis_turns, lines_of
-from app.sim.mocap.csv_tables import AngleTrack, check_times, in_radians, require_places
+from app.sim.mocap.csv_tables import (
+    AngleTrack,
+    check_times,
+    in_radians,
+    require_height,
+    require_pace,
+    require_places,
+)
 from app.sim.mocap.faults import bad, shown
 from app.sim.mocap.inverse_kinematics import euler_angles, one_branch
 from app.sim.mocap.joint_centres import euler_turns
@@ -94,7 +101,10 @@ def read_opensim(text: str, names: Mapping[str, str] | None = None) -> AngleTrac
     good = complete_rows(values)
     sound = {name: column[good] for name, column in values.items()}
     times = check_times(sound.pop("time"), table, good)
-    require_places({name: sound[name] for name in PLACES})
+    places = {name: sound[name] for name in PLACES}
+    require_height("pelvis_ty", places["pelvis_ty"])
+    require_places(places)
+    require_pace(places, times)
     turning = {name: column for name, column in sound.items() if name not in PLACES}
     angle = dict(zip(turning, in_radians(turning, degrees).T, strict=True))
     return AngleTrack(

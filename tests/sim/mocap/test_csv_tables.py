@@ -82,6 +82,33 @@ def test_pelvis_height_over_the_floor_is_refused() -> None:
     assert "looks like the height over the floor" in message
 
 
+def with_rise(pelvis_z: np.ndarray) -> str:
+    lines = csv_text(working(len(pelvis_z))).splitlines()
+    rows = [f"{line},{z:.6f}" for line, z in zip(lines[2:], pelvis_z, strict=True)]
+    return "\n".join([lines[0], f"{lines[1]},pelvis_z", *rows])
+
+
+@pytest.mark.parametrize(
+    ("pelvis_z", "metres"),
+    [(np.full(30, -45.0), "-0.45"), (np.linspace(0.5, -1.5, 30), "-0.015")],
+)
+def test_rise_of_the_pelvis_in_centimetres_is_refused(
+    pelvis_z: np.ndarray, metres: str
+) -> None:
+    message = fault(with_rise(pelvis_z))
+    assert message.startswith(f"column pelvis_z = {pelvis_z.min():g} is the height relative")
+    assert f"must be -1.2 to 2 m (looks like centimetres: in m that is {metres})" in message
+
+
+def test_place_in_centimetres_is_refused_by_the_speed_of_the_pelvis() -> None:
+    q = working(200)
+    q[:, :2] = 100.0 * (q[:, :2] - q[:, :2].mean(axis=0))
+    message = fault(csv_text(q))
+    assert message.startswith("columns pelvis_x, pelvis_y = ")
+    assert "is the median speed of the pelvis; must be at most 3 m/s" in message
+    assert "looks like centimetres" in message
+
+
 def test_pelvis_in_millimetres_is_refused() -> None:
     q = Q.copy()
     q[:, :2] *= 1000.0

@@ -114,6 +114,30 @@ def test_pelvis_in_millimetres_is_refused() -> None:
     assert "looks like millimetres" in fault(opensim_text(angles))
 
 
+@pytest.mark.parametrize("height", [0.12, 0.45, 0.68, 0.95])
+def test_pelvis_of_a_child_or_a_seated_person_in_centimetres_is_refused(height: float) -> None:
+    angles = coordinates()
+    for name in ("pelvis_tx", "pelvis_tz"):
+        angles[name][:] = 0.0
+    angles["pelvis_ty"][:] = height
+    assert read_opensim(opensim_text(angles)).pelvis_z[0] == pytest.approx(height)
+    angles["pelvis_ty"] *= 100.0
+    message = fault(opensim_text(angles))
+    assert (
+        f"column pelvis_ty = {100.0 * height:g} is the median height of the pelvis" in message
+    )
+    assert f"within 3 m of zero (looks like centimetres: in m that is {height:g})" in message
+
+
+def test_place_in_centimetres_is_refused_by_the_speed_of_the_pelvis() -> None:
+    angles = coordinates()
+    for name in ("pelvis_tx", "pelvis_tz"):
+        angles[name] *= 100.0
+    message = fault(opensim_text(angles))
+    assert message.startswith("columns pelvis_tx, pelvis_ty, pelvis_tz = ")
+    assert "is the median speed of the pelvis" in message
+
+
 def with_names(text: str, renamed: dict[str, str]) -> str:
     """Rename columns of a file."""
     lines = text.splitlines()
