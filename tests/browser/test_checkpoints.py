@@ -94,6 +94,7 @@ def test_two_checkpoints_are_compared_by_what_differs(open_page: Callable[..., P
     table = page.locator("[data-role=checkpoint-differences] table")
     expect(table.get_by_role("row", name="Cell")).to_contain_text("sorting-e1")
     expect(table.get_by_role("row", name="Seed")).to_have_count(0)
+    expect(table.get_by_role("row", name="learning.total_steps")).to_contain_text("\u202f000")
 
 
 def test_uploaded_checkpoint_is_deleted_after_a_question(

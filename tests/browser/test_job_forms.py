@@ -114,6 +114,7 @@ def test_evaluation_is_started_with_choices_of_the_server(
     expect(page.locator("#evaluate-checkpoint")).to_contain_text("sorting-e1")
     page.select_option("#evaluate-protocol", "pick-mocap")
     expect(page.locator("form.train").first).to_contain_text("No recording is stored yet")
+    expect(page.locator("#evaluate-episodes-help")).to_contain_text("1 to 100\u202f000.")
     page.fill("#evaluate-episodes", "1000000")
     page.click("form.train [type=submit]")
     expect(page.locator("#evaluate-episodes-error")).to_contain_text("100000")

@@ -32,7 +32,11 @@ def test_visitor_adds_a_person_changes_its_size_and_plays_a_recording(
     server = one_person
     page = open_page(scene=False)
     page.click('[data-mode="recorded"]')
-    expect(page.locator('[data-role="empty-motions"]')).to_contain_text("recordings import")
+    empty = page.locator('[data-role="empty-motions"]')
+    expect(empty).to_contain_text("recordings import")
+    page.set_viewport_size({"width": 400, "height": 800})
+    expect(empty).to_be_visible()
+    page.set_viewport_size({"width": 1024, "height": 700})
     page.click('[data-action="add-person"]')
     page.click('[data-person="1"]')
     page.click('[data-action="size"]')

@@ -49,7 +49,7 @@ export function People({ world, send, children }) {
       ${children}
     </div>
     ${!person && html`<div class="dock-row"><span class="dock-label"></span>
-      <p class="dock-hint">Nobody is in the cell.</p></div>`}
+      <p class="dock-note">Nobody is in the cell.</p></div>`}
     ${person?.cylinder && html`<${PedestrianControls} key=${person.id} person=${person}
       name=${nameOf(person.id)} world=${world} send=${send} />`}
     ${person && !person.cylinder && html`<${MotionSource} key=${person.id} person=${person} send=${send}
@@ -177,7 +177,7 @@ function Size({ person, send }) {
 
 function Note({ children, role }) {
   return html`<div class="dock-row"><span class="dock-label">Recording</span>
-    <p class="dock-hint" data-role=${role}>${children}</p></div>`;
+    <p class="dock-note" data-role=${role}>${children}</p></div>`;
 }
 
 /** The stored recordings; null until they are known. */

@@ -5,6 +5,7 @@ import { postFile, put, remove } from "../api.js";
 import * as format from "../format.js";
 import { Alert, Icon } from "../icons.js";
 import { PAGE, storedCheckpoints } from "./checkpoints.js";
+import { grouped } from "./formfields.js";
 
 const PURPOSES = { "choosing tasks": "task selection", "reaching goals": "reach", sorting: "sorting" };
 
@@ -215,7 +216,7 @@ function flat(value, prefix = "") {
   return Object.fromEntries(Object.entries(value).flatMap(([key, one]) => {
     const name = prefix ? `${prefix}.${key}` : key;
     return one !== null && typeof one === "object" && !Array.isArray(one)
-      ? Object.entries(flat(one, name)) : [[name, typeof one === "string" ? one : JSON.stringify(one)]];
+      ? Object.entries(flat(one, name)) : [[name, grouped(one)]];
   }));
 }
 

@@ -20,7 +20,7 @@ export function Comparison({ ids, onClose }) {
   useEffect(() => dialog.current.showModal(), []);
   return html`<dialog class="compare" ref=${dialog} onClose=${onClose} data-role="comparison"
     aria-labelledby="compare-title">
-    <header class="card-head"><h2 id="compare-title">Comparison of ${ids.length} jobs</h2>
+    <header class="card-head"><h2 id="compare-title">Comparison of ${ids.length} ${ids.length === 1 ? "job" : "jobs"}</h2>
       <button type="button" class="quiet-button" aria-label="Close the comparison"
         onClick=${() => dialog.current.close()}><${Icon} name="close" /></button></header>
     ${error && html`<${Alert}>${error.message}</${Alert}>`}

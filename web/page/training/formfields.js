@@ -137,10 +137,16 @@ function helpText(field) {
 }
 
 function rangeText({ minimum, maximum }) {
-  const [low, high] = [minimum, maximum].map((v) => (Number.isFinite(v) ? show(v) : null));
+  const [low, high] = [minimum, maximum].map((v) => (Number.isFinite(v) ? grouped(v) : null));
   if (low !== null && high !== null) return `${low} to ${high}.`;
   if (low !== null) return `At least ${low}.`;
   return high !== null ? `At most ${high}.` : "";
+}
+
+/** A value as it is shown; from five digits on, those of a whole number in groups of three. */
+export function grouped(v) {
+  return Number.isInteger(v) && Math.abs(v) >= 1e4
+    ? show(v).replace(/\B(?=(\d{3})+$)/g, "\u202f") : show(v);
 }
 
 /** The keyboard of a phone: that of decimal numbers lacks letters and, on some, a minus sign. */
