@@ -82,7 +82,10 @@ class SortingEpisode(FieldGroup):
         0.3, 0.0, 1.0, "", "Share of episodes with a random map of failure probabilities"
     )
     horizon_factor: float = number(
-        4.0, 1.0, 100.0, "attempts per cell", "Horizon: length at which episodes are truncated"
+        4.0, 1.0, 100.0, "attempts per cell", "Horizon: length at which episodes time out"
+    )
+    timeout: Literal["truncates", "terminates"] = choice(
+        "truncates", "Time-out: truncates an episode, or ends it"
     )
 
     @model_validator(mode="after")
@@ -179,9 +182,9 @@ def _printed(name: str, cell: str, n_t: int, kind: str) -> SortingPreset:
     """Return table 3.1 with the defaults of Stable-Baselines 2, the library of the thesis.
 
     The defaults: an update for every step, the target network copied every 500 of them, the
-    first update after 1,000 steps, gradients up to a norm of 10. Not printed and chosen here:
-    localisation failures in 5 % of the picks, and a reward in which parking and failures cost
-    as much as a move. N_t is the least number of steps; the training goes on as long again.
+    first update after 1,000 steps, gradients up to a norm of 10, time-outs as ends of the task.
+    Not printed and chosen here: localisation failures in 5 % of the picks, and a reward in
+    which parking and failures cost as much as a move. N_t is the least number of steps; the training goes on as long again.
 
     Deviates: 40 environments are stepped together, then follow 40 updates.
 
@@ -217,6 +220,7 @@ def _printed(name: str, cell: str, n_t: int, kind: str) -> SortingPreset:
             disturbed_share=0.0,
             localisation_rate=0.05,
             random_map_share=0.0,
+            timeout="terminates",
         ),
         people=SortingPeople(human_rate=0.0),
         expert=ExpertLabels(share=0.0),

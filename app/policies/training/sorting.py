@@ -41,7 +41,8 @@ def start(preset: SortingPreset, seed: int, cell: Cell) -> tuple[TrainingRun, So
         InvalidInput: There is nothing to sort in the cell.
     """
     batch = batch_in(cell, preset.learning.n_envs, seed, preset.settings(0.0))
-    env = BatchVecEnv(SortingTask(cell, batch))
+    timeouts_end = preset.episode.timeout == "terminates"
+    env = BatchVecEnv(SortingTask(cell, batch, timeouts_end=timeouts_end))
     expert = expert_of(batch.shape) if preset.expert.share else None
     model = SortingDQN(preset, env, batch, seed, expert)
     parts = CheckpointParts(

@@ -23,13 +23,17 @@ NAMES = np.array(OUTCOMES, dtype=object)
 
 
 class SortingTask:
-    """Sorting tasks of a cell."""
+    """Sorting tasks of a cell.
+
+    Args:
+        timeouts_end: Whether a time-out ends a task, and does not truncate its episode.
+    """
 
     render_fps = 4
     """Attempts per second of a video."""
 
-    def __init__(self, cell: Cell, batch: SortingBatch) -> None:
-        self._cell, self.batch = cell, batch
+    def __init__(self, cell: Cell, batch: SortingBatch, *, timeouts_end: bool = False) -> None:
+        self._cell, self.batch, self._timeouts_end = cell, batch, timeouts_end
         n_actions = batch.shape.n_actions
         self.action_space = cast("spaces.Space[Any]", spaces.Discrete(n_actions))
         self.observation_space = _obs_space(batch.shape)
@@ -49,7 +53,7 @@ class SortingTask:
 
     def truncates(self, ended: Rows) -> Mask:
         """Return whether outcomes truncate an episode, shape (n_envs,)."""
-        late: Mask = ended == TIMEOUT
+        late: Mask = (ended == TIMEOUT) & (not self._timeouts_end)
         return late
 
     def infos(self) -> Infos:

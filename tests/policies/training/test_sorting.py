@@ -10,6 +10,7 @@ from app.policies.training.reporter import Callbacks
 from app.policies.training.sorting import SortingReporter, start
 from app.sim.cells.cell import load_cell
 from app.sim.sorting.batch import OUTCOMES, SortingSettings, batch_in
+from app.sim.sorting.kernels.task import TIMEOUT
 from tests.policies.conftest import Recorder, preset_of
 
 SMALL = {
@@ -74,6 +75,18 @@ def test_the_thesis_presets_have_the_defaults_of_its_library(name, n_t):
     halfway, end = preset.settings(0.5), preset.settings(1.0)
     assert (halfway.solved_episodes, halfway.solved_share) == pytest.approx((0.25, 0.4))
     assert (end.solved_episodes, end.solved_share) == (0.0, 0.0)
+
+
+@pytest.mark.parametrize(("name", "ends"), [("e0-thesis", True), ("e0-dqn", False)])
+def test_a_time_out_ends_a_task_in_the_library_of_the_thesis_alone(name, ends):
+    _, model = start(presets.get(f"sorting-{name}"), 1, load_cell("sorting-e0"))
+    env, truncated = model.get_env(), []
+    env.reset()
+    while len(truncated) < 20:
+        _, _, done, infos = env.step(np.zeros(env.num_envs, dtype=np.int64))
+        late = done & (env.ended == TIMEOUT)
+        truncated += [infos[i]["TimeLimit.truncated"] for i in np.flatnonzero(late)]
+    assert set(truncated) == {not ends}
 
 
 def test_the_curriculum_of_the_thesis_has_faded_at_n_t():
