@@ -127,6 +127,28 @@ def posted(page: Page, path: str, act: Callable[[], None]) -> dict[str, Any]:
     return job
 
 
+DRAWN_CLOSED = """() => {
+  window.drawnClosed = [];
+  const look = new MessageChannel();
+  look.port1.onmessage = () => {
+    const jobs = document.querySelectorAll(".job");
+    if (jobs.length) window.drawnClosed.push(!document.querySelector(".job.is-open"));
+  };
+  new MutationObserver(() => look.port2.postMessage(0))
+    .observe(document.body, { childList: true, subtree: true });
+}"""
+"""Script that notes, in a task after each change of the page, whether no job is open."""
+
+
+def test_first_job_is_drawn_open(open_page: Callable[..., Page], ended: dict[str, Any]) -> None:
+    page = open_page(scene=False)
+    page.evaluate(DRAWN_CLOSED)
+    page.click("#tab-training")
+    page.wait_for_selector(".job.is-open .job-actions")
+    page.wait_for_function("drawnClosed.length > 0")
+    assert not any(page.evaluate("drawnClosed"))
+
+
 def test_ended_job_is_retried_cloned_and_named(
     open_page: Callable[..., Page], server: str, ended: dict[str, Any]
 ) -> None:

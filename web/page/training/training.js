@@ -1,5 +1,5 @@
 // The training side: jobs with their curves, and the form that starts one.
-import { html, useEffect, useState } from "../vendor/htm-preact-standalone.module.js";
+import { html, useLayoutEffect, useState } from "../vendor/htm-preact-standalone.module.js";
 import { Segmented } from "../choice.js";
 import { Icon } from "../icons.js";
 import { Comparison, MAX_JOBS } from "./compare.js";
@@ -20,7 +20,7 @@ export function Training({ link, cell, jobs: newest, error, waiting, refresh, ac
   const [form, setForm] = useState(null);
   const [open, setOpen] = useState(undefined);
   const jobs = useOpened(newest, open);
-  useEffect(() => {
+  useLayoutEffect(() => { // before any click: one on a job drawn closed would close it
     const own = jobs?.filter((job) => !job.part_of);
     if (open === undefined && own?.length) setOpen((own.find(isActive) ?? own[0]).id);
   }, [jobs]);
