@@ -140,7 +140,8 @@ DRAWN_CLOSED = """() => {
 """Script that notes, in a task after each change of the page, whether no job is open."""
 
 
-def test_first_job_is_drawn_open(open_page: Callable[..., Page], ended: dict[str, Any]) -> None:
+@pytest.mark.usefixtures("ended")
+def test_first_job_is_drawn_open(open_page: Callable[..., Page]) -> None:
     page = open_page(scene=False)
     page.evaluate(DRAWN_CLOSED)
     page.click("#tab-training")
