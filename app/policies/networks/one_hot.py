@@ -9,6 +9,7 @@ sum therefore starts from free places and adds the differences of the others::
 Function and weights are those of the dense product up to rounding.
 """
 
+import math
 from typing import Any
 
 import numpy as np
@@ -90,21 +91,25 @@ class _Product(torch.autograd.Function):
 class OneHotLinear(nn.Module):
     """Linear layer over one-hot codes and plain numbers.
 
+    Weights are Glorot-uniform, biases zero, as in Stable-Baselines 2 (docs/method.md 1.4).
+
     Args:
         n_places: Number of codes, P.
         n_codes: Number of codes of a place; 0 is a free place.
+        n_plain: Number of plain numbers.
         width: Number of outputs.
     """
 
     def __init__(self, n_places: int, n_codes: int, n_plain: int, width: int) -> None:
         super().__init__()
-        like = nn.Linear(n_places * n_codes + n_plain, width)
+        n_coded = n_places * n_codes
+        bound = math.sqrt(6.0 / (n_coded + n_plain + width))
         self.n_codes = n_codes
-        self.weight = nn.Parameter(like.weight.detach()[:, :-n_plain].t().contiguous())
+        self.weight = nn.Parameter(torch.empty(n_coded, width).uniform_(-bound, bound))
         """One row per place and code, (P * n_codes, width)."""
-        self.plain = nn.Parameter(like.weight.detach()[:, -n_plain:].t().contiguous())
+        self.plain = nn.Parameter(torch.empty(n_plain, width).uniform_(-bound, bound))
         """One row per plain number, (n_plain, width)."""
-        self.bias = nn.Parameter(like.bias.detach())
+        self.bias = nn.Parameter(torch.zeros(width))
 
     def forward(self, codes: Tensor, plain: Tensor | None) -> Tensor:
         """Return (B, width) for codes, uint8, (B, P), and plain numbers, (B, n_plain).

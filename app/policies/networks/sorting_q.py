@@ -23,6 +23,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
+from app.policies.networks.actor_critic import initialise_glorot
 from app.policies.networks.one_hot import OneHotLinear
 from app.sim.sorting.kernels.task import FAILURE_SCALE
 from app.sim.sorting.state import SortingShape
@@ -200,6 +201,7 @@ class PrintedNetwork(nn.Module):
         self.advantage_first, self.value_first = OneHotLinear(*sizes), OneHotLinear(*sizes)
         self.advantage = _second_layer(width, shape.n_actions)
         self.value = _second_layer(width, 1)
+        initialise_glorot(self)
 
     def forward(self, obs: Tensor) -> Tensor:
         """Return the values of all moves, (B, n_actions); it knows nothing of valid ones."""

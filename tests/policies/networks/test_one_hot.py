@@ -34,13 +34,14 @@ def test_value_and_gradients_are_those_of_the_plain_product(
         torch.testing.assert_close(ours, theirs, rtol=1e-5, atol=1e-5)
 
 
-def test_starts_as_a_linear_layer_over_all_inputs_does() -> None:
+def test_initial_weights_are_glorot_uniform_and_biases_zero() -> None:
     torch.manual_seed(0)
     layer = OneHotLinear(20, 10, 20, 64)
-    bound = (20 * 10 + 20) ** -0.5
-    for parameter in (layer.weight, layer.plain, layer.bias):
-        assert parameter.abs().max() <= bound
-        assert parameter.abs().max() > 0.9 * bound
+    bound = (6 / (20 * 10 + 20 + 64)) ** 0.5
+    for weights in (layer.weight, layer.plain):
+        assert 0.99 * bound < weights.abs().max() <= bound
+        assert weights.std().item() == pytest.approx(bound / 3**0.5, rel=0.02)
+    assert not layer.bias.any()
 
 
 def test_without_plain_numbers_the_result_is_that_of_zeros() -> None:

@@ -109,6 +109,10 @@ def test_the_printed_network_has_two_streams_of_two_layers():
         assert first.weight.shape == (50 * 7, 128)
         assert (stream[1].in_features, stream[1].out_features) == (128, 128)
     assert (net.advantage[3].out_features, net.value[3].out_features) == (SHAPE.n_actions, 1)
+    for stream in (net.advantage, net.value):
+        bound = (6 / (128 + 128)) ** 0.5  # Glorot-uniform, as in the library of the thesis
+        assert 0.99 * bound < stream[1].weight.abs().max() <= bound
+        assert not stream[1].bias.any() and not stream[3].bias.any()
     obs = torch.as_tensor(batch_in(load_cell("sorting-e0"), 3, 1).reset())
     advantage = net(obs) - net(obs).mean(dim=1, keepdim=True)
     assert torch.allclose(advantage.mean(dim=1), torch.zeros(3), atol=1e-6)
