@@ -257,7 +257,10 @@ class PersonUse(Answer):
     """Use of one person of a request."""
 
     by: Source
-    used: bool = Field(description="whether the policy uses this person: the nearest")
+    used: bool = Field(
+        description="whether this person is the nearest, which every policy observes; some "
+        "policies observe another one for each candidate, too"
+    )
     as_cylinder: bool = Field(
         description="whether no joint angles are known and a cylinder is used"
     )
@@ -292,7 +295,7 @@ class PersonUse(Answer):
 
         Args:
             source: Kind of description in the request.
-            used: Whether the policy uses this person.
+            used: Whether this person is the nearest of those that the policy observes.
             speeds: Origin of the speeds.
             person: State for the policy; None: not used.
             observed: State for monitoring; None: not used.
