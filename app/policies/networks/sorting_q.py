@@ -1,16 +1,18 @@
 """Networks that value the moves of the sorting task.
 
-:class:`SharedNetwork` is ours. It looks at every tower with the same weights, at colours
-counted from that tower's own, and only at what is left to do: what must come off (from the top
-down) and what must go on (from the next level up). A pick fails and leaves everything as it
-was, so the true value of a pick is linear in the failure probability of its cell; the network
-says value and slope per type and tower, and never prefers the riskier of two duplicates.
+:class:`SharedNetwork` (ours) applies the same weights to every tower. Its inputs per tower are
+colours relative to the tower's own and the remaining work only: *misplaced* objects, which must
+be removed (from the top down), and *needed* ones, which must be added (from the lowest level
+that differs from the goal up). A failed pick changes nothing, so the true value of a pick is
+linear in the failure probability of its slot. The network outputs value and slope per object
+type and tower; the value never increases with the failure probability, so that the riskier of
+two duplicates is never preferred.
 
-:class:`PrintedNetwork` is the thesis': one-hot numbers, two layers of 128 (table 3.1) in each
-of two streams; :class:`InformedNetwork` also observes failure probabilities.
+:class:`PrintedNetwork` is that of the thesis: one-hot codes, two layers of 128 (table 3.1) in
+each of two streams; :class:`InformedNetwork` also observes failure probabilities.
 
-Both are dueling: ``Q = V + A - mean A``; ours takes the mean over the moves that are valid and
-puts all others out of the question, in exploration, targets and prediction alike.
+Both are dueling: ``Q = V + A - mean A``. :class:`SharedNetwork` takes the mean over valid moves
+and gives all others the value ``NEVER``, in exploration, targets and prediction.
 
 Source: docs/method.md 1.4; Wang et al., *Dueling network architectures* (2016).
 """
@@ -31,10 +33,11 @@ from app.sim.sorting.state import SortingShape
 NEVER = -1e9
 """Value of a move that changes nothing."""
 BACK_SLOPE = 0.3
-"""By how much a free cell that fails always can be worth more or less than one that never does:
-an object put there costs more attempts to fetch, if it is fetched at all."""
+"""Largest effect of the failure probability of a free slot, from 0 to 1, on the value of a move
+to it: an object there takes more attempts to pick again, if it is picked again at all."""
 WINDOW = 4
-"""Objects of a tower, on and over the seam of what is in place, that are seen one by one."""
+"""Number of misplaced and of needed objects of a tower that are observed one by one; the others
+are only counted."""
 
 
 def layout_of(shape: SortingShape) -> list[list[Any]]:
@@ -44,7 +47,7 @@ def layout_of(shape: SortingShape) -> list[list[Any]]:
 
 
 class SortingView(nn.Module):
-    """Takes observations apart: cells, towers, goal and failure probabilities."""
+    """Split observations into clutter slots, towers, goal and failure probabilities."""
 
     def __init__(self, shape: SortingShape) -> None:
         super().__init__()
@@ -63,7 +66,12 @@ class SortingView(nn.Module):
 
 
 def valid_moves(clutter: Tensor, towers: Tensor) -> Tensor:
-    """Return which moves change something, (B, n_actions), as ``sorting.valid_moves``."""
+    """Return which moves change the state, (B, n_actions), as ``sorting.valid_moves``.
+
+    Args:
+        clutter: Codes of the slots, (B, K).
+        towers: Codes of the towers, (B, C, K).
+    """
     n, n_towers, k = towers.shape
     there, tops = clutter > 0, (towers > 0).any(dim=2)
     own = torch.eye(n_towers, dtype=torch.bool, device=towers.device)
@@ -74,7 +82,13 @@ def valid_moves(clutter: Tensor, towers: Tensor) -> Tensor:
 
 
 def dueling(value: Tensor, advantage: Tensor, valid: Tensor) -> Tensor:
-    """Return ``V + A - mean A``, the mean taken over valid moves."""
+    """Return ``V + A - mean A``, (B, n_actions), with the mean over valid moves.
+
+    Args:
+        value: V, (B, 1).
+        advantage: A, (B, n_actions).
+        valid: Whether a move is valid, (B, n_actions).
+    """
     share = valid.float() / valid.sum(dim=1, keepdim=True).clamp(min=1)
     return value + advantage - (advantage * share).sum(dim=1, keepdim=True)
 
@@ -83,7 +97,7 @@ class SharedNetwork(nn.Module):
     """Values of all moves, with one set of weights for all towers."""
 
     relative: Tensor
-    """Codes as each tower counts colours, (C, n_types + 1)."""
+    """Codes with colours relative to each tower's, (C, n_types + 1)."""
     absolute: Tensor
     """The inverse mapping, (C, n_types + 1)."""
 
@@ -108,7 +122,7 @@ class SharedNetwork(nn.Module):
         clutter, towers, goal, fail = self.view(obs)
         n, n_towers, _ = towers.shape
         seen = self.tower(self._features(clutter, towers, goal, fail))
-        # Every tower sees itself first, then the others in order of their colours.
+        # Inputs of a tower come first, then those of the others in order of their colours.
         order = torch.arange(n_towers, device=obs.device)
         order = (order[:, None] + order[None, :]) % n_towers
         joint = self.joint(seen[:, order].flatten(2))
@@ -123,61 +137,67 @@ class SharedNetwork(nn.Module):
         return best
 
     def _features(self, clutter: Tensor, towers: Tensor, goal: Tensor, fail: Tensor) -> Tensor:
-        """Return what every tower sees, (B, C, n_in)."""
+        """Return the inputs of every tower, (B, C, n_in)."""
         n, n_towers, k = towers.shape
         codes, levels = self.shape.n_types + 1, torch.arange(k, device=towers.device)
         rel_tower = self.relative[torch.arange(n_towers)[None, :, None], towers]
         rel_goal = self.relative[torch.arange(n_towers)[None, :, None], goal]
         height, wanted = (towers > 0).sum(dim=2), (goal > 0).sum(dim=2)
         same = (towers == goal).long().cumprod(dim=2).sum(dim=2)
-        seam = torch.minimum(same, torch.minimum(height, wanted))
-        junk = rel_tower * (levels >= seam[:, :, None])
-        needed = rel_goal * (levels >= seam[:, :, None])
+        in_place = torch.minimum(same, torch.minimum(height, wanted))
+        misplaced = rel_tower * (levels >= in_place[:, :, None])
+        needed = rel_goal * (levels >= in_place[:, :, None])
         steps = levels[:WINDOW] if k >= WINDOW else torch.arange(WINDOW, device=towers.device)
-        up = (seam[:, :, None] + steps).clamp(max=k - 1)
-        fits = seam[:, :, None] + steps < k
+        up = (in_place[:, :, None] + steps).clamp(max=k - 1)
+        fits = in_place[:, :, None] + steps < k
         down = height[:, :, None] - 1 - steps
         next_needed = needed.gather(2, up) * fits
-        next_junk = junk.gather(2, down.clamp(min=0)) * (down >= 0)
+        next_misplaced = misplaced.gather(2, down.clamp(min=0)) * (down >= 0)
         counts = clutter.new_zeros((n, codes), dtype=torch.float32)
         counts.scatter_add_(1, clutter, torch.ones_like(fail))
         safest = torch.ones_like(counts).scatter_reduce_(1, clutter, fail, "amin")
         absolute = self.absolute.expand(n, -1, -1)
         parts = [
             functional.one_hot(next_needed, codes).flatten(2).float(),
-            functional.one_hot(next_junk, codes).flatten(2).float(),
+            functional.one_hot(next_misplaced, codes).flatten(2).float(),
             _histogram(needed, codes),
-            _histogram(junk, codes),
+            _histogram(misplaced, codes),
             counts[:, None].expand(-1, n_towers, -1).gather(2, absolute) / 2.0,
             safest[:, None].expand(-1, n_towers, -1).gather(2, absolute),
-            (height - seam)[:, :, None] / 4.0,
-            (wanted - seam)[:, :, None] / 4.0,
-            (height == seam)[:, :, None].float(),
-            (wanted == seam)[:, :, None].float(),
+            (height - in_place)[:, :, None] / 4.0,
+            (wanted - in_place)[:, :, None] / 4.0,
+            (height == in_place)[:, :, None].float(),
+            (wanted == in_place)[:, :, None].float(),
         ]
         return torch.cat(parts, dim=2)
 
     def _advantages(self, out: Tensor, clutter: Tensor, towers: Tensor, fail: Tensor) -> Tensor:
-        """Turn what the towers say, (B, C, outputs), into advantages of all moves.
+        """Return the advantages of all moves, (B, n_actions), from the outputs of the towers.
 
-        A tower's gain from an object is one number, wherever the object comes from; one that
-        comes from another tower cannot fail, and what that tower gains by it is added.
+        The gain of a tower from an object does not depend on where it comes from. A move from
+        another tower cannot fail; the gain of that tower from the removal is added.
+
+        Args:
+            out: Outputs of the head, (B, C, 2 n_types + 2 + C).
+            clutter: Codes of the slots, (B, K).
+            towers: Codes of the towers, (B, C, K).
+            fail: Failure probabilities of the slots, (B, K).
         """
         n, n_towers, _ = out.shape
         n_types = self.shape.n_types
         gain, slope, back, across = torch.split(out, [n_types, n_types, 2, n_towers], dim=2)
-        # (B, K, C): relative type of each cell's object, as each tower counts colours.
+        # (B, K, C): type of each slot's object, relative to each tower.
         kind = (self.relative.T[clutter] - 1).clamp(min=0)
         per_cell = kind.transpose(1, 2)
         risk = functional.softplus(slope).gather(2, per_cell) * fail[:, None]
         place = (gain.gather(2, per_cell) - risk).transpose(1, 2)
         preference = BACK_SLOPE * torch.tanh(back[:, :, 1:])
         free = back[:, :, :1] + preference * fail[:, None]
-        # Column j of a tower is the tower j colours further.
+        # Column j of a tower's output concerns the tower j colours further.
         order = torch.arange(n_towers, device=out.device)
         order = (order[None, :] - order[:, None]) % n_towers
         over = across.gather(2, order.expand(n, -1, -1))
-        # (B, C from, C to): relative type of each top, as the tower it goes to counts colours.
+        # (B, C from, C to): type of each top object, relative to the tower it is moved to.
         top = towers.gather(2, ((towers > 0).sum(dim=2, keepdim=True) - 1).clamp(min=0))
         top_kind = (self.relative.T[top.squeeze(2)] - 1).clamp(min=0)
         over = over + gain.gather(2, top_kind.transpose(1, 2)).transpose(1, 2)
@@ -185,7 +205,7 @@ class SharedNetwork(nn.Module):
 
 
 class PrintedNetwork(nn.Module):
-    """Two dueling streams of two layers each over one-hot numbers (table 3.1).
+    """Two dueling streams of two layers each over one-hot codes (table 3.1).
 
     As in Stable-Baselines 2, the library of the thesis, value and advantages have hidden layers
     of their own. Failure probabilities are not observed: the policy has to learn them.
@@ -204,7 +224,7 @@ class PrintedNetwork(nn.Module):
         initialise_glorot(self)
 
     def forward(self, obs: Tensor) -> Tensor:
-        """Return the values of all moves, (B, n_actions); it knows nothing of valid ones."""
+        """Return the values of all moves, (B, n_actions), valid or not."""
         codes, fail = self._split(obs)
         advantage = self.advantage(self.advantage_first(codes, fail))
         value = self.value(self.value_first(codes, fail))
@@ -229,13 +249,13 @@ def _second_layer(width: int, n_out: int) -> nn.Sequential:
 
 
 class InformedNetwork(PrintedNetwork):
-    """The same with the failure probabilities of the cells in the observation."""
+    """:class:`PrintedNetwork` with the failure probabilities of the slots as inputs."""
 
     informed = True
 
 
 def _relative_codes(shape: SortingShape) -> Tensor:
-    """Return codes as each tower counts colours from its own, (C, n_types + 1)."""
+    """Return codes with colours relative to each tower's own, (C, n_types + 1)."""
     rows = []
     for tower in range(shape.n_colours):
         turned = [
@@ -247,7 +267,7 @@ def _relative_codes(shape: SortingShape) -> Tensor:
 
 
 def _histogram(codes: Tensor, n: int) -> Tensor:
-    """Count codes along the last axis, halved; code 0 is free places and counts nothing."""
+    """Return half the count of each code but 0 along the last axis, (B, C, n)."""
     counts = codes.new_zeros((*codes.shape[:2], n), dtype=torch.float32)
     counts.scatter_add_(2, codes, (codes > 0).float())
     return counts / 2.0
