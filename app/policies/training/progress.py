@@ -1,4 +1,4 @@
-"""What a training tells while it runs, and how it ended."""
+"""Points of the learning curve of a training, and its result."""
 
 from dataclasses import dataclass
 
@@ -9,9 +9,9 @@ from app.policies.checkpoints.checkpoint import Checkpoint
 class Progress:
     """One point of the learning curve: episodes without exploration.
 
-    Picks count the episodes of environments without exploration since the last point, or play
-    episodes for this point alone if the preset has ``progress_episodes``; the other scenarios
-    always do.
+    Pick trainings count the episodes of environments without exploration since the last point,
+    or run episodes for this point alone if the preset has ``progress_episodes``; the other
+    scenarios always run some.
     """
 
     step: int
@@ -35,14 +35,14 @@ class Progress:
     steps_per_s: float
     """Environment steps per second of wall time in the window."""
     cpu_s: float
-    """CPU time of the training so far, interrupted attempts up to their checkpoint included."""
+    """CPU time so far [s], that of interrupted attempts up to their checkpoint included."""
     time_left_s: float | None
     """Estimated wall time to the end [s]; None while no updates run, which cost most of it."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TrainResult:
-    """How a training ended."""
+    """Result of a training."""
 
     checkpoint: Checkpoint
     """The policy at the end."""

@@ -1,7 +1,7 @@
-"""Training on the sorting task: model, checkpoints, curriculum and what its curve counts.
+"""Training on the sorting task: model, checkpoints, curriculum and learning curve.
 
-A point of the curve is played for it alone: greedy episodes from clean starts of the sizes met
-in training, the same ones at every point. The CPU time that takes is not counted as training.
+A point of the curve is measured in greedy episodes from clean starts with the sizes of the
+training, the same ones at every point. Their CPU time is not counted as training.
 """
 
 from collections.abc import Mapping
@@ -27,7 +27,7 @@ from app.sim.sorting.kernels.task import FAILURE_SCALE
 from app.sim.sorting.state import NULL, SortingShape
 
 FADE_EVERY = 16
-"""Steps of all tasks between two looks at the curriculum."""
+"""Steps of all tasks between two updates of the curriculum."""
 
 
 def start(preset: SortingPreset, seed: int, cell: Cell) -> tuple[TrainingRun, SortingDQN]:
@@ -77,7 +77,7 @@ def expert_of(shape: SortingShape) -> Expert:
 
 
 class SortingReporter(Reporter):
-    """Fades the curriculum and plays the episodes behind the curve.
+    """Fades the curriculum and runs the episodes behind the curve.
 
     Args:
         run: The attempt.
@@ -99,7 +99,7 @@ class SortingReporter(Reporter):
         self._played = batch_in(run.cell, n, CURVE_SEED, settings)
 
     def watch(self, rewards: NDArray[np.floating]) -> None:
-        """Let the curriculum fade with the steps."""
+        """Fade the curriculum with the steps; ``rewards`` only state the number of tasks."""
         if (self.num_timesteps // len(rewards)) % FADE_EVERY == 0:
             share = self._preset.episode.fade_share
             self._faded = self.num_timesteps / (share * self._preset.learning.total_steps)
@@ -111,7 +111,7 @@ class SortingReporter(Reporter):
         self._trained.tasks.settings = self._preset.settings(self._faded)
 
     def rates(self) -> dict[str, Any]:
-        """Return how greedy episodes end now."""
+        """Return rates of greedy episodes of the present network."""
         with self._run.untimed():
             return outcome_rates(*play(self._greedy, self._played), OUTCOMES)
 

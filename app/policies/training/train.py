@@ -81,7 +81,7 @@ def train(
         on_progress: Called every ``progress_steps``.
         on_checkpoint: Called every ``checkpoint_steps`` and at the end or stop with the step,
             the policy and the state to resume from.
-        should_stop: Asked after every step of the cells, so it must be cheap.
+        should_stop: Called after every step of the environments, so it must be cheap.
         cell: The work cell that the preset names; by default the shipped one of that name.
         memory: Files of the replay memory; None if no states are wanted.
         resume: The last state of an interrupted attempt; needs ``memory``.
