@@ -164,7 +164,7 @@ def _check_table_words(command: AddBlock | MoveBlock | SetGoal, cell: Cell) -> N
     clusters = cell.stations_of("cluster")
     towers = [one.id for one in clusters]
     places = [*(one.id for one in cell.stations_of("clutter")), *towers]
-    sizes, no_place = SIZE_NAMES[3], "is no clutter cell or tower of this cell"
+    sizes, no_place = SIZE_NAMES[3], "is no clutter slot or tower of this cell"
     match command:
         case AddBlock():
             colours = [one.colour or one.id for one in clusters]

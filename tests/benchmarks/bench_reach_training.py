@@ -10,8 +10,8 @@ gymnasium/reach        one environment alone, random actions
 
 All in processor seconds of one thread, as in ``bench_training.py``. The stock learners have
 their default hyper-parameters: networks of 400 and 300 units, minibatches of 256, an update
-after every step. A step of ours is one of 128 cells, and an update learns from 512 transitions;
-it is counted from where the actor learns, too.
+after every step. A step of ours is that of one of 128 environments, and an update learns from
+512 transitions; it is counted from where the actor learns, too.
 """
 
 import itertools

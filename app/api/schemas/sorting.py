@@ -34,10 +34,10 @@ Key = Annotated[str, Field(pattern=r"^[0-9a-f]{16}$")]
 
 
 class SortingLayout(Body):
-    """A sorting task without a work cell: its clutter cells are ``cell0``, ``cell1``, ..."""
+    """A sorting task without a work cell: its clutter slots are ``cell0``, ``cell1``, ..."""
 
     n_cells: int = Field(
-        ge=1, le=MAX_CELLS, description="clutter cells: most objects, and levels of a tower"
+        ge=1, le=MAX_CELLS, description="clutter slots: most objects, and levels of a tower"
     )
     colours: list[Name] = Field(
         min_length=1, max_length=MAX_COLOURS, description="colours; each names a tower"
@@ -55,7 +55,7 @@ class SortingObject(Body):
 
     colour: Word = Field(description="colour, one of the towers'")
     size: Word = Field(description="`small`, `medium` or `large` in a work cell")
-    at: Word = Field(description="id of its clutter cell or tower")
+    at: Word = Field(description="id of its clutter slot or tower")
     level: int | None = Field(
         None, ge=0, lt=MAX_CELLS, description="level on a tower from 0; null in the clutter"
     )
@@ -113,7 +113,7 @@ class SortingFields(Body):
 
     objects: list[SortingObject] = Field(
         max_length=MAX_CELLS,
-        description="all objects, at most one per clutter cell of the task",
+        description="all objects, at most one per clutter slot of the task",
     )
     goal: dict[str, Annotated[list[GoalEntry], Field(max_length=MAX_CELLS)]] = Field(
         max_length=MAX_COLOURS,
@@ -124,8 +124,8 @@ class SortingFields(Body):
     failure_map: dict[str, Finite] = Field(
         default_factory=dict,
         max_length=MAX_CELLS,
-        description="failure probability of a pick by clutter cell, 0 to 0.99; the work "
-        "cell's, or 0, for other cells",
+        description="failure probability of a pick by clutter slot, 0 to 0.99; "
+        "that of the work cell, or 0, for other slots",
     )
 
     def state_of(self, names: SortingNames, fail: Vec) -> SortingState:
@@ -196,7 +196,7 @@ class SortingRequest(SortingFields):
 class SortingPlace(Answer):
     """Place of a pick or of a placement."""
 
-    station: str = Field(description="id of the clutter cell or tower")
+    station: str = Field(description="id of the clutter slot or tower")
     level: int | None = Field(description="level on a tower from 0; null in the clutter")
 
 
@@ -314,7 +314,7 @@ def outside_of(
 
 
 def _size_of(shape: SortingShape) -> str:
-    return f"{shape.n_cells} cells, {shape.n_colours} colours, {shape.n_sizes} sizes"
+    return f"{shape.n_cells} slots, {shape.n_colours} colours, {shape.n_sizes} sizes"
 
 
 def move_of(move: Move, state: SortingState, names: SortingNames, ids: Ids) -> SortingMove:

@@ -29,7 +29,7 @@ def random_task(shape: SortingShape, fail: Vec, seed: int, number: int) -> Sorti
 
     Args:
         shape: Size of the task.
-        fail: Failure probabilities of the clutter cells, shape (K,).
+        fail: Failure probabilities of the clutter slots, shape (K,).
         seed: Seed of the world.
         number: Number of earlier tasks.
     """
@@ -85,7 +85,7 @@ class SortingTestRun:
             InvalidInput: The cell is too small for the test.
         """
         if not self._test.fits(shape):
-            raise InvalidInput("id", self.name, "needs more cells, colours or sizes than here")
+            raise InvalidInput("id", self.name, "needs more slots, colours or sizes than here")
         self._shape = shape
         return self._test.start(shape, fail, self._rng)
 
@@ -120,7 +120,7 @@ class SortingTestRun:
         self._contacts += 1
 
     def note_pick(self, *, riskier: bool) -> None:
-        """Count a grasp; ``riskier`` if a duplicate lies in a safer cell."""
+        """Count a grasp; ``riskier`` if a duplicate lies in a safer slot."""
         self._picks += 1
         self._riskier += riskier
 
@@ -156,7 +156,7 @@ class SortingTestRun:
             f"{self._contacts or 'no'} {'contact' if self._contacts == 1 else 'contacts'}",
         ]
         if self._test.safer_duplicates:
-            parts.append(f"{self._riskier} of {self._picks} grasps in a riskier cell")
+            parts.append(f"{self._riskier} of {self._picks} grasps in a riskier slot")
         return f"{', '.join(parts)}.".capitalize()
 
 

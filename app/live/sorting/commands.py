@@ -30,7 +30,7 @@ class AddBlock(LiveCommand):
     size: Name
     """small, medium or large"""
     at: Name | None = None
-    """free clutter cell, or tower (on its top); null: the first free clutter cell"""
+    """free clutter slot, or tower (on its top); null: the first free clutter slot"""
 
 
 class RemoveBlock(LiveCommand):
@@ -48,7 +48,7 @@ class MoveBlock(LiveCommand):
     id: Name
     """id of the block"""
     to: Name
-    """free clutter cell, or tower (on its top)"""
+    """free clutter slot, or tower (on its top)"""
 
 
 class SetGoal(LiveCommand):

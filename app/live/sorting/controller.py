@@ -165,7 +165,7 @@ class SortController:
 
 
 def has_safer_duplicate(table: SortingTable, cell: int) -> bool:
-    """Return whether an identical block lies in a safer clutter cell."""
+    """Return whether an identical block lies in a safer clutter slot."""
     block, least = table.clutter[cell], table.fail[cell] - ALIKE
     return block is not None and any(
         one is not None and one.code == block.code and fail < least

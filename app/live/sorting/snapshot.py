@@ -1,7 +1,7 @@
 """State of the sorting task of a live cell at one tick.
 
 Blocks have constant ids; the sorting policy knows only colour and size. Places are
-station ids: ``cell3`` is a clutter cell, ``red`` a tower. Lengths are in the robot base frame.
+station ids: ``cell3`` is a clutter slot, ``red`` a tower. Lengths are in the robot base frame.
 """
 
 from dataclasses import dataclass
@@ -107,7 +107,7 @@ class SortingSnapshot(ReadModel):
     goal: tuple[GoalBlockSnapshot, ...]
     """goal, tower by tower from the lowest level"""
     failure: tuple[float, ...]
-    """probability that a grasp fails, by clutter cell"""
+    """probability that a grasp fails, by clutter slot"""
     colours: tuple[str, ...]
     """colours, in the order of the towers"""
     sizes: tuple[str, ...]

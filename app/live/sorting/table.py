@@ -2,7 +2,7 @@
 
 Blocks have constant ids; :attr:`SortingTable.state` has no ids, like the observation of the
 sorting policy. A held block counts at its former place or, if that is occupied, at the first
-free clutter cell. One is always free, since there are at most as many blocks as cells.
+free clutter slot. One is always free, since there are at most as many blocks as cells.
 
 Source: docs/method.md 1.1 and 1.2.
 """
@@ -42,7 +42,7 @@ class SortingTable:
         self.shape = self.names.shape
         """Size of the task."""
         self.fail = fail_of(cell)
-        """Failure probability of each clutter cell, shape (K,)."""
+        """Failure probability of each clutter slot, shape (K,)."""
         self.clutter: list[Block | None] = [None] * self.shape.n_cells
         self.towers: list[list[Block]] = [[] for _ in range(self.shape.n_colours)]
         self.goal = np.zeros((self.shape.n_colours, self.shape.n_cells), dtype=np.int8)
@@ -155,14 +155,14 @@ class SortingTable:
         """Add a block.
 
         Raises:
-            InvalidInput: An unknown word, no free place, or as many blocks as clutter cells.
+            InvalidInput: An unknown word, no free place, or as many blocks as clutter slots.
         """
         names = self.names
         code = self.shape.code(
             _index("colour", colour, names.colours), _index("size", size, names.sizes)
         )
         if len(self.blocks) >= self.shape.n_cells:
-            rule = f"would be more than {self.shape.n_cells} blocks, one per clutter cell"
+            rule = f"would be more than {self.shape.n_cells} blocks, one per clutter slot"
             raise InvalidInput("blocks", len(self.blocks) + 1, rule)
         position = self._free_cell() if at is None else self._free("at", at)
         block = self._new(code)
@@ -323,7 +323,7 @@ class SortingTable:
         taken = self.held_position if self.held is not None else None
         free = [k for k in range(self.shape.n_cells) if self.is_free(k) and k != taken]
         if not free:
-            raise InvalidInput("at", None, "has no default: no clutter cell is free")
+            raise InvalidInput("at", None, "has no default: no clutter slot is free")
         return free[0]
 
     def _free(self, field: str, place: str, block: Block | None = None) -> int:

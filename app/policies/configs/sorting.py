@@ -82,7 +82,7 @@ class SortingEpisode(FieldGroup):
         0.3, 0.0, 1.0, "", "Share of episodes with a random map of failure probabilities"
     )
     horizon_factor: float = number(
-        4.0, 1.0, 100.0, "attempts per cell", "Horizon: length at which episodes time out"
+        4.0, 1.0, 100.0, "attempts per slot", "Horizon: length at which episodes time out"
     )
     timeout: Literal["truncates", "terminates"] = choice(
         "truncates", "Time-out: truncates an episode, or ends it"

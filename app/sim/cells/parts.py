@@ -109,7 +109,7 @@ class Station(CellData):
 
     id: Id = Field(description="name in requests")
     kind: Literal["cube", "dock", "clutter", "cluster"] = Field(
-        description="what stands there: a cube or a dock to pick and place, a clutter cell to "
+        description="what stands there: a cube or a dock to pick and place, a clutter slot to "
         "sort from, a cluster (a tower of blocks of one colour) to sort to"
     )
     label: Label = Field(description="name for people")
@@ -117,7 +117,7 @@ class Station(CellData):
         description="point the tcp must reach; a cluster's lowest level [m]"
     )
     failure_probability: Annotated[float | None, Within(0.0, MAX_FAILURE, "")] = Field(
-        default=None, description="chance that a pick from this clutter cell fails"
+        default=None, description="chance that a pick from this clutter slot fails"
     )
     colour: Literal["red", "green", "blue"] | None = Field(
         default=None, description="colour of the blocks of a cluster"

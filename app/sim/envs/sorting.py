@@ -92,7 +92,7 @@ class SortingEnv(SingleEnv):
     | ``tandem/SortingE0-v0`` | ``sorting-e0`` | 10 | 2 | 3 | 44 |
     | ``tandem/SortingE1-v0`` | ``sorting-e1`` | 20 | 3 | 3 | 129 |
 
-    ``cell`` may be any work cell with clutter cells and clusters. ``gymnasium.make_vec`` gives
+    ``cell`` may be any work cell with clutter slots and clusters. ``gymnasium.make_vec`` gives
     the batched :class:`SortingVectorEnv`.
 
     ## Task
@@ -100,12 +100,12 @@ class SortingEnv(SingleEnv):
     certain one: objects of one colour and size are duplicates.
 
     ## Action space
-    ``Discrete(C (2 K + C))``, with ``K`` clutter cells and ``C`` towers:
+    ``Discrete(C (2 K + C))``, with ``K`` clutter slots and ``C`` towers:
 
     | action | move |
     |--------|------|
-    | ``k C + c`` | clutter cell ``k`` to tower ``c`` |
-    | ``K C + c K + k`` | top of tower ``c`` to clutter cell ``k`` |
+    | ``k C + c`` | clutter slot ``k`` to tower ``c`` |
+    | ``K C + c K + k`` | top of tower ``c`` to clutter slot ``k`` |
     | ``2 K C + c C + d`` | top of tower ``c`` to ``d``; ``c == d`` changes nothing |
 
     ``info["action_mask"]`` (int8, as ``Discrete.sample`` takes it) and :meth:`action_masks`
@@ -117,7 +117,7 @@ class SortingEnv(SingleEnv):
 
     | index | content | most |
     |-------|---------|------|
-    | ``0..K-1`` | clutter cells | ``C S`` |
+    | ``0..K-1`` | clutter slots | ``C S`` |
     | ``K..K+CK-1`` | towers, each from its lowest level | ``C S`` |
     | ``K+CK..K+2CK-1`` | the goal's towers, likewise | ``C S`` |
     | ``K+2CK..2K+2CK-1`` | failure probability of a pick from each cell, times 250 | 250 |
@@ -137,7 +137,7 @@ class SortingEnv(SingleEnv):
     ``settings.weights`` holds the coefficients.
 
     ## Start
-    ``K_E`` objects of random types lie in random clutter cells, ``K_G`` of them are the goal,
+    ``K_E`` objects of random types lie in random clutter slots, ``K_G`` of them are the goal,
     the largest at the bottom of each tower; both are triangular with their mode at the most,
     K and ``K_E``, unless ``settings`` fix them. ``settings.disturbed_share`` of the episodes
     start with objects already on towers, rightly or wrongly.
@@ -155,7 +155,7 @@ class SortingEnv(SingleEnv):
         settings: Starts, disturbances, rewards and ends.
         first_env: Number of the equal row of a vector environment.
         render_mode: ``rgb_array`` or None: blocks in clutter and towers, those that the goal
-            asks for translucent; clutter cells are darker the likelier a pick fails.
+            asks for translucent; clutter slots are darker the likelier a pick fails.
 
     Source: thesis sections 3.3 and 3.4, docs/method.md 1. Deviates: coefficients and failure
     map are not printed and chosen here; the failure map is observed.

@@ -42,9 +42,9 @@ class SortingSettings:
     """Starts, disturbances, rewards and ends of episodes."""
 
     horizon_factor: float = 4.0
-    """Attempts per clutter cell after which an episode is cut off."""
+    """Attempts per clutter slot after which an episode is cut off."""
     disturbed_share: float = 0.0
-    """Share of episodes that start with junk on the towers and goals partly built."""
+    """Share of episodes that start with any objects on the towers and partly built goals."""
     solved_episodes: float = 0.0
     """Share of episodes that start partly solved (e_s of docs/method.md 1.4)."""
     solved_share: float = 0.0
@@ -68,10 +68,10 @@ class SortingSettings:
 
 
 def shape_of(cell: Cell) -> SortingShape:
-    """Return the shape of a cell's sorting task: clutter cells and towers.
+    """Return the shape of a cell's sorting task: clutter slots and towers.
 
     Raises:
-        InvalidInput: The cell has no clutter cells or no clusters.
+        InvalidInput: The cell has no clutter slots or no clusters.
     """
     n_cells, n_colours = len(cell.stations_of("clutter")), len(cell.stations_of("cluster"))
     if not n_cells or not n_colours:
@@ -81,7 +81,7 @@ def shape_of(cell: Cell) -> SortingShape:
 
 
 def fail_of(cell: Cell) -> Vec:
-    """Return the failure probabilities of a cell's clutter cells, shape (K,)."""
+    """Return the failure probabilities of a cell's clutter slots, shape (K,)."""
     return np.array([one.failure_probability or 0.0 for one in cell.stations_of("clutter")])
 
 
@@ -131,7 +131,7 @@ class SortingBatch(Stateful):
 
     Args:
         shape: Size of the tasks.
-        fail: Failure probabilities of the clutter cells, shape (K,).
+        fail: Failure probabilities of the clutter slots, shape (K,).
         seed: Seed; episode ``k`` of row ``e`` is fixed by (seed, e, k).
         settings: Starts, disturbances, rewards and ends.
         first_env: Number of the first row in the random streams.

@@ -5,7 +5,7 @@ name      K_E, K_G      content
 ========= ============= ================================================================
 test-1    5, 5          sort everything
 test-2    10, 10        the same with twice the objects
-test-3    10, 5         every object of the goal has a duplicate in a riskier cell
+test-3    10, 5         every object of the goal has a duplicate in a riskier slot
 test-4    5, 5          at the goal a larger object is added below sorted ones
 test-5    8, 5          an alternative is added on the way, then the goal changes
 test-6    8, 3          three of one colour, then three of another as well
@@ -103,7 +103,7 @@ def _objects(codes: NDArray[np.int8]) -> NDArray[np.int8]:
 def _scattered(
     codes: NDArray[np.int64], goal: Codes, shape: SortingShape, fail: Vec, rng: Generator
 ) -> SortingState:
-    """Return a state with all objects in random clutter cells."""
+    """Return a state with all objects in random clutter slots."""
     clutter = np.zeros(shape.n_cells, dtype=np.int8)
     clutter[rng.permutation(shape.n_cells)[: len(codes)]] = codes
     return replace(empty_state(shape), clutter=clutter, goal=goal, fail=fail.copy())
@@ -114,9 +114,9 @@ def _any(n: int, shape: SortingShape, rng: Generator) -> NDArray[np.int64]:
 
 
 def _with_duplicates(shape: SortingShape, fail: Vec, rng: Generator) -> SortingState:
-    """Return five objects of the goal, each with a duplicate in a riskier cell.
+    """Return five objects of the goal, each with a duplicate in a riskier slot.
 
-    The safer one of each couple stands in one of the safest ``n_cells // 2`` cells.
+    The safer one of each pair is in one of the ``n_cells // 2`` slots of least risk.
     """
     codes = _any(5, shape, rng)
     ranked = np.lexsort((rng.random(shape.n_cells), fail))
@@ -160,10 +160,10 @@ def _of_two_colours(shape: SortingShape, fail: Vec, rng: Generator) -> SortingSt
 
 
 def add_to_clutter(state: SortingState, code: int, rng: Generator) -> SortingState:
-    """Return a state with one more object, in a random free clutter cell.
+    """Return a state with one more object, in a random free clutter slot.
 
     Raises:
-        InvalidInput: There is no free cell, or as many objects as cells.
+        InvalidInput: There is no free slot, or as many objects as slots.
     """
     free = np.flatnonzero(state.clutter == NULL)
     if len(free) == 0 or state.n_objects >= len(state.clutter):
@@ -267,8 +267,8 @@ TESTS: tuple[SortingTest, ...] = (
     SortingTest(
         name="test-3",
         title="Choose the lower-risk duplicate",
-        text="Each of five blocks has a duplicate in a cell where picks fail more often.",
-        expected="Every block is sorted, each from the safer cell, without a contact.",
+        text="Each of five blocks has a duplicate in a slot where picks fail more often.",
+        expected="Every block is sorted, each from the safer slot, without a contact.",
         safer_duplicates=True,
         n_objects=10,
         n_goal=5,

@@ -24,7 +24,7 @@ REASONS: dict[Why, str] = {
     "solved": "The goal is reached: there is nothing to move.",
     "asked": "The exact planner was asked for.",
     "no-policy": "No policy decides here, so the exact planner does.",
-    "other-shape": "The policy was trained for another number of cells, colours or sizes.",
+    "other-shape": "The policy was trained for another number of slots, colours or sizes.",
     "untrained-goal": "The policy was not trained for a goal like this one.",
     "repeated": "A state came back that no failed pick and no person explains.",
     "attempts-exceeded": "It took 1.5 times the attempts that were expected.",

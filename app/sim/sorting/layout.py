@@ -1,11 +1,11 @@
 """Geometry of a sorting cell: blocks, tool positions, and the work of people.
 
-Blocks are as high as a level of the towers and narrower than the clutter's cells. The point of
+Blocks are as high as a level of the towers and narrower than the clutter slots. The position of
 a station is that of the tcp when the magnet touches the top of the block; the pick policy
 brings the tool to APPROACH_M above it.
 
 For the pick scenario (``pick.py``, ``primitive_library.py``) a sorting cell is one whose
-clutter cells are cubes and whose towers are docks (:func:`reaching_cell`), for the work of
+clutter slots are cubes and whose towers are docks (:func:`reaching_cell`), for the work of
 people and for training and evaluation of policies.
 """
 
@@ -36,7 +36,7 @@ def lacks_for_tasks(cell: Cell) -> str | None:
         return "needs at least one station of kind clutter and one of kind cluster"
     clutter, towers = cell.stations_of("clutter"), cell.stations_of("cluster")
     if len(clutter) > MAX_CELLS or len(towers) > MAX_COLOURS:
-        return f"has more than {MAX_CELLS} clutter cells or {MAX_COLOURS} clusters"
+        return f"has more than {MAX_CELLS} clutter slots or {MAX_COLOURS} clusters"
     return None
 
 
@@ -54,7 +54,7 @@ def lacks_for_sorting(cell: Cell) -> str | None:
     if len({one.level_height for one in towers}) > 1:
         return "needs the same level height for each cluster"
     if any((one.levels or 1) < len(clutter) for one in towers):
-        return f"needs at least {len(clutter)} levels for each cluster, one per clutter cell"
+        return f"needs at least {len(clutter)} levels for each cluster, one per clutter slot"
     return None
 
 

@@ -32,7 +32,7 @@ class SortingNames:
     shape: SortingShape
     """Size."""
     cells: tuple[str, ...]
-    """Clutter cells, in the order of their positions."""
+    """Clutter slots, in the order of their positions."""
     towers: tuple[str, ...]
     """Towers, in the order of their colours."""
     levels: tuple[int, ...]
@@ -62,7 +62,7 @@ class NamedObject:
     size: str
     """One of its sizes."""
     at: str
-    """Clutter cell or tower it is on."""
+    """Clutter slot or tower it is on."""
     level: int | None = None
     """Level on a tower, 0 the lowest; None in the clutter."""
     id: str | None = None
@@ -124,14 +124,14 @@ def state_from_names(
         objects: Positions of the objects.
         goal: Colour (None: the tower's own) and size by level, from the bottom, by tower.
             Towers that are not named are empty.
-        fail: Failure probability of a pick from each clutter cell, shape (K,).
+        fail: Failure probability of a pick from each clutter slot, shape (K,).
 
     Raises:
         InvalidInput: It cannot be; names the field as the caller wrote it.
     """
     n_cells = names.shape.n_cells
     if len(objects) > n_cells:
-        rule = f"must be at most {n_cells}, as many as there are clutter cells"
+        rule = f"must be at most {n_cells}, as many as there are clutter slots"
         raise InvalidInput("objects", len(objects), rule)
     state = empty_state(names.shape)
     state.fail[:] = fail
@@ -152,16 +152,16 @@ def fail_with(names: SortingNames, own: Vec, changes: Mapping[str, float]) -> Ve
     Args:
         names: The words of the task.
         own: The cell's own, shape (K,).
-        changes: By clutter cell.
+        changes: By clutter slot.
 
     Raises:
-        InvalidInput: No such clutter cell, or no probability below 1.
+        InvalidInput: No such clutter slot, or no probability below 1.
     """
     fail = own.copy()
     for cell, chance in changes.items():
         field = f"failure_map.{cell}"
         if cell not in names.cells:
-            raise InvalidInput(field, chance, "is of no clutter cell", names.cells)
+            raise InvalidInput(field, chance, "is of no clutter slot", names.cells)
         if not 0.0 <= chance <= MAX_FAILURE:
             rule = f"must lie in [0, {MAX_FAILURE}]: a pick that always fails has no plan"
             raise InvalidInput(field, chance, rule)
@@ -197,7 +197,7 @@ def _put(state: SortingState, names: SortingNames, one: NamedObject, place: str)
     position = _index(f"{place}.at", one.at, names.stations, "place of this task")
     if position < names.shape.n_cells:
         if one.level is not None:
-            raise InvalidInput(f"{place}.level", one.level, "must be null in a clutter cell")
+            raise InvalidInput(f"{place}.level", one.level, "must be null in a clutter slot")
         if state.clutter[position] != NULL:
             rule = f"is taken: {_other(names, int(state.clutter[position]))} is there already"
             raise InvalidInput(f"{place}.at", one.at, rule)

@@ -1,16 +1,16 @@
 """State of the sorting task as integers, and its moves (docs/method.md 1.1 and 1.2).
 
 An object is a *code*: 0 for a free place, others ``1 + colour * n_sizes + size``, with sizes
-from the smallest. Objects of one code are duplicates. There are ``K`` clutter cells and one
+from the smallest. Objects of one code are duplicates. There are ``K`` clutter slots and one
 tower per colour with ``K`` levels and no gaps, for any objects.
 
-Position ``k`` is a clutter cell, ``K + c`` the top of tower ``c``. Moves are numbered as the
+Position ``k`` is a clutter slot, ``K + c`` the top of tower ``c``. Moves are numbered as the
 outputs of a network:
 
 | action | move |
 |---|---|
-| ``k * C + c`` | clutter cell ``k`` to tower ``c`` |
-| ``K * C + c * K + k`` | top of tower ``c`` to clutter cell ``k`` |
+| ``k * C + c`` | clutter slot ``k`` to tower ``c`` |
+| ``K * C + c * K + k`` | top of tower ``c`` to clutter slot ``k`` |
 | ``2 * K * C + c * C + d`` | top of tower ``c`` to ``d``; ``c == d`` is the *stuck* move |
 
 Source: thesis eq. (3.7)-(3.17). Deviates: tower to tower is a move (docs/method.md 1.2), and
@@ -30,7 +30,7 @@ Codes = NDArray[np.int8]
 """Objects by code."""
 
 MAX_CELLS = 40
-"""Largest number of clutter cells and of objects."""
+"""Largest number of clutter slots and of objects."""
 MAX_COLOURS = 5
 """Largest number of colours and of towers."""
 MAX_SIZES = 5
@@ -66,7 +66,7 @@ class SortingShape:
     """
 
     n_cells: int
-    """Number ``K`` of clutter cells, of levels of a tower, and largest number of objects."""
+    """Number ``K`` of clutter slots, of levels of a tower, and largest number of objects."""
     n_colours: int
     """Number ``C`` of colours and towers."""
     n_sizes: int = 3
@@ -123,7 +123,7 @@ class SortingShape:
         """Return the action of a move.
 
         Raises:
-            InvalidInput: No such positions, or from one clutter cell to another.
+            InvalidInput: No such positions, or from one clutter slot to another.
         """
         k, c = self.n_cells, self.n_colours
         for name, position in (("pick", move.pick), ("place", move.place)):
@@ -131,7 +131,7 @@ class SortingShape:
                 raise InvalidInput(name, position, f"must lie in [0, {k + c})")
         if move.pick < k:
             if move.place < k:
-                raise InvalidInput("place", move.place, "must be a tower for a clutter cell")
+                raise InvalidInput("place", move.place, "must be a tower for a clutter slot")
             return move.pick * c + move.place - k
         if move.place < k:
             return k * c + (move.pick - k) * k + move.place
@@ -143,13 +143,13 @@ class SortingState:
     """One sorting task at one moment."""
 
     clutter: Codes
-    """Objects in the clutter cells, shape (K,)."""
+    """Objects in the clutter slots, shape (K,)."""
     towers: Codes
     """Objects on the towers, lowest level first, shape (C, K)."""
     goal: Codes
     """Goal of the towers, shape (C, K)."""
     fail: Vec
-    """Failure probability of a pick from each clutter cell, shape (K,)."""
+    """Failure probability of a pick from each clutter slot, shape (K,)."""
 
     @property
     def heights(self) -> NDArray[np.int64]:

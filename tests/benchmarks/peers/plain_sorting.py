@@ -19,20 +19,20 @@ STUCK = -0.3
 FAIL = -0.05
 BACK = -0.05
 DISTANCE = -0.1
-"""Per level of a tower that is not as the goal asks, divided by the number of cells."""
+"""Per level of a tower that is not as the goal asks, divided by the number of slots."""
 SUCCESS = 1.0
 HORIZON = 4
-"""An episode is cut off after this many attempts per clutter cell."""
+"""An episode is cut off after this many attempts per clutter slot."""
 
 
 class PlainSorting(gymnasium.Env[NDArray[np.float32], np.int64]):
     """Bring the objects of a goal onto their towers.
 
-    The observation is the code of every place one-hot: clutter cells, levels of the towers,
+    The observation is the code of every place one-hot: clutter slots, levels of the towers,
     levels of the goal's towers. The action is the number of a move.
 
     Args:
-        fail: Failure probability of a pick from each clutter cell, shape (K,).
+        fail: Failure probability of a pick from each clutter slot, shape (K,).
         n_colours: Colours, and towers.
         n_sizes: Sizes.
         pair: Objects in the cell and in the goal; None draws both from triangles.
@@ -95,7 +95,7 @@ class PlainSorting(gymnasium.Env[NDArray[np.float32], np.int64]):
         return self._obs(), rew + SUCCESS * solved, solved, late, {"success": solved}
 
     def positions(self, action: int) -> tuple[int, int]:
-        """Return where a move picks and places: a clutter cell, or K + number of a tower."""
+        """Return where a move picks and places: a clutter slot, or K + number of a tower."""
         k, c = self.k, self.c
         if action < k * c:
             return action // c, k + action % c

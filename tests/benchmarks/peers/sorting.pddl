@@ -1,7 +1,7 @@
 ; The sorting task of docs/method.md 1.1 and 1.2 for classical planners.
 ;
 ; Identical objects are counted, not named. A move is two actions (take, put), which kept problems
-; of ten objects smallest among the encodings tried. Clutter cells are omitted: there are as many
+; of ten objects smallest among the encodings tried. Clutter slots are omitted: there are as many
 ; as objects, so that one is always free. Failed picks change nothing and are omitted as well;
 ; plans do not consider risk. Levels serve as numbers; ``number`` is a word of PDDL.
 (define (domain sorting)

@@ -94,7 +94,7 @@ def test_contact_or_a_riskier_duplicate_is_not_as_expected() -> None:
     duplicates.note_pick(riskier=True)
     found = duplicates.verdict(solved=True, moves=5)
     assert found.as_expected is False
-    assert "1 of 2 grasps in a riskier cell" in found.observed
+    assert "1 of 2 grasps in a riskier slot" in found.observed
     elsewhere = begun("test-2")
     elsewhere.note_pick(riskier=True)
     assert elsewhere.verdict(solved=True, moves=5).as_expected is True

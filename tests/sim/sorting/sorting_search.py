@@ -174,7 +174,7 @@ def attempts_of(moves: list[Move], fail: Vec) -> float:
 
     Args:
         moves: The plan.
-        fail: Failure probabilities of the clutter cells, shape (K,); other picks do not fail.
+        fail: Failure probabilities of the clutter slots, shape (K,); other picks do not fail.
     """
     risks = [fail[move.pick] if move.pick < len(fail) else 0.0 for move in moves]
     return float(sum(1.0 / (1.0 - risk) for risk in risks))

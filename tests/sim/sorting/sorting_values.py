@@ -192,7 +192,7 @@ def _attempts_of(model: Model, policy: Ints) -> Floats:
 
 
 def _has_safer_duplicate(model: Model, shape: SortingShape, fail: Floats) -> NDArray[np.bool_]:
-    """Return which actions pick an object with a duplicate in a safer cell, shape (n, A)."""
+    """Return which actions pick an object with a duplicate in a safer slot, shape (n, A)."""
     risky = np.zeros(model.after.shape, dtype=np.bool_)
     clutter = model.codes[:, : shape.n_cells]
     for action in range(shape.n_cells * shape.n_colours):

@@ -50,7 +50,7 @@ def curve_point(
     Args:
         values: Q of every move, from observations.
         shape: Size of the task.
-        fail: Failure probabilities of the clutter cells, shape (K,).
+        fail: Failure probabilities of the clutter slots, shape (K,).
         episodes_per_pair: Episodes of each pair; :func:`curve_episodes` gives the thesis'.
         seed: Seed of the episodes.
     """

@@ -76,7 +76,7 @@ def captions(states: list[SortingState]) -> list[str]:
 
 
 def draw(axis: Axes, state: SortingState, shape: SortingShape, cell: Cell, title: str) -> None:
-    """Draw one state: clutter cells with failure probabilities, towers with their goals."""
+    """Draw one state: clutter slots with failure probabilities, towers with their goals."""
     axis.clear()
     axis.set(xlim=(-0.85, 0.85), ylim=(-0.06, 0.34), aspect="equal")
     axis.set_title(title, loc="center")

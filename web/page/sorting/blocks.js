@@ -30,7 +30,7 @@ const inCell = (sorting, id) => sorting.blocks.find((one) => one.place === id &&
 function Plan({ cells, sorting, picked, onPick }) {
   const columns = places(cells, 0);
   const rows = places(cells, 1).reverse();
-  return html`<div class="plan" role="group" aria-label="Clutter cells from above"
+  return html`<div class="plan" role="group" aria-label="Clutter slots from above"
     style=${{ "--columns": columns.length }}>
     ${cells.map((one, index) => {
       const block = inCell(sorting, one.id);

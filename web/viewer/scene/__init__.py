@@ -3,7 +3,7 @@
 arc             A dashed arc in the scene, from where something is to where it goes
 blocks_view     The blocks in the scene: each is made once, moved while it lives, and clickable
 cell_scene      The live cell as a picture: everything that moves, drawn from one snapshot
-clutter_view    The clutter cells in the scene: a map of where grasps fail, as tiles on a tray
+clutter_view    The clutter slots in the scene: a map of where grasps fail, as tiles on a tray
 goal_gizmo      The goal of a reach cell in the scene: a point, its tolerance, and a handle to
                 drag it with
 reach_scene     A reach cell in the scene: goal, targets, the way of the tool, the separation
@@ -11,7 +11,7 @@ reach_scene     A reach cell in the scene: goal, targets, the way of the tool, t
 risk_view       Risk map in the scene: the probability of a contact by the place where the
                 person stands
 solid_meshes    Plain solids with soft edges, painted with physical materials, as binary glTF
-sorting_bodies  What blocks, towers and clutter cells look like, and the colours of the failure
+sorting_bodies  What blocks, towers and clutter slots look like, and the colours of the failure
                 map
 sorting_scene   A sorting cell in the scene: clutter, towers, blocks, and the move that is
                 carried out

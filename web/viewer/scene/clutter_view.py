@@ -1,4 +1,4 @@
-"""The clutter cells in the scene: a map of where grasps fail, as tiles on a tray."""
+"""The clutter slots in the scene: a map of where grasps fail, as tiles on a tray."""
 
 import numpy as np
 import viser
@@ -26,7 +26,7 @@ def tray_height(cell: Cell) -> float:
 
 
 class ClutterView:
-    """Draws the clutter cells; used by the live cell's thread only.
+    """Draws the clutter slots; used by the live cell's thread only.
 
     Args:
         server: Where to draw.

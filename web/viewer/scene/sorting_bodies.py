@@ -1,4 +1,4 @@
-"""What blocks, towers and clutter cells look like, and the colours of the failure map.
+"""What blocks, towers and clutter slots look like, and the colours of the failure map.
 
 Colours are the same as in ``web/page/palette.js``. The map of failures runs in one hue from
 light to dark, so that it reads without seeing colours, and none of its shades is a block's.
@@ -22,7 +22,7 @@ FAILURES: tuple[tuple[float, Rgb], ...] = (
     (0.7, (176, 108, 48)),
     (1.0, (112, 62, 24)),
 )
-"""Colour of a clutter cell by the chance that a grasp in it fails."""
+"""Colour of a clutter slot by the chance that a grasp in it fails."""
 TRAY = material((206, 210, 214), roughness=0.6)
 RIM = material((160, 167, 175), metallic=0.3, roughness=0.45)
 PLATE_SIDE = 0.16
@@ -32,7 +32,7 @@ GHOST_GROWTH = 1.02
 
 
 def failure_color(chance: float) -> Rgb:
-    """Return the colour of a clutter cell where a grasp fails with this chance."""
+    """Return the colour of a clutter slot where a grasp fails with this chance."""
     channels = [
         np.interp(chance, [x for x, _ in FAILURES], [color[k] for _, color in FAILURES])
         for k in range(3)
@@ -95,7 +95,7 @@ def tower_plate(color: Rgb, height: float) -> bytes:
 
 
 def tray(points: Vec, height: float, margin: float) -> bytes:
-    """Return the plate under all clutter cells as binary glTF.
+    """Return the plate under all clutter slots as binary glTF.
 
     Args:
         points: Places of the cells [m], shape (n, 2).
@@ -109,5 +109,5 @@ def tray(points: Vec, height: float, margin: float) -> bytes:
 
 
 def tile(width: float, depth: float) -> trimesh.Trimesh:
-    """Return a clutter cell as a thin plate on z = 0, sizes in [m]."""
+    """Return a clutter slot as a thin plate on z = 0, sizes in [m]."""
     return slab((width, depth, 0.002), (0.0, 0.0, 0.001), 0.012, 0.0006, sections=32)

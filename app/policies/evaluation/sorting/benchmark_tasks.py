@@ -119,7 +119,7 @@ def trials(values: Values, shape: SortingShape, fail: Vec, request: EvaluationRe
     Args:
         values: Q of every move, from observations.
         shape: Size of the task.
-        fail: Failure probabilities of the clutter cells, shape (K,).
+        fail: Failure probabilities of the clutter slots, shape (K,).
         request: Its episodes are those of each test, by default 1000.
 
     Raises:

@@ -8,7 +8,7 @@ The full tasks of ``sorting-people``: ten objects, each picked and set down in i
     Motion of the policy; the nearest object first.
 ``planner``
     Straight joint moves to the nearest object, planned without regard to the person, under the
-    safety layer. Nothing but the person stands in their way: blocks are no obstacles.
+    safety layer. The person is the only obstacle: blocks are none.
 ``policy-distance``, ``planner-distance``
     ``policy-nearest`` and ``planner`` with the protective distance of thesis 4.4.6, 0.3 m.
 ``alone``

@@ -5,7 +5,7 @@ Episode ``k`` of a seed has the same start for every policy. Episodes that trigg
 fallback are run a second time with it; a policy is deterministic, so that all others are the
 same with and without it.
 
-A pick is *riskier* if a cell with a lower failure probability holds an identical object. The
+A pick is *riskier* if a slot with a lower failure probability holds an identical object. The
 fewest moves are those of the exact planner; failed picks are attempts, not moves.
 
 Source: docs/method.md 1.2, 1.5.
@@ -30,7 +30,7 @@ Values = Callable[[NDArray[np.uint8]], NDArray[np.float32]]
 Chooser = Callable[[SortingBatch, Index], Index]
 """Selects the moves of some environments of a batch."""
 HORIZON_FACTOR = SortingSettings().horizon_factor
-"""Attempts per clutter cell until an episode ends; the count restarts at an interference and at
+"""Attempts per clutter slot until an episode ends; the count restarts at an interference and at
 a planner fallback."""
 ENDLESS = 1e6
 """Horizon factor of the batch itself; this module ends the episodes."""

@@ -4,7 +4,7 @@ For every pair ``1 <= K_G <= K_E <= K``, with the same episodes in all rows of o
 
 ==============================  ============================================================
 ``clean``                       the policy alone, from starts with everything in the clutter
-``disturbed``                   the same from starts with junk on towers and partly built goals
+``disturbed``                   the same with objects on towers and partly built goals
 ``clean-planner-fallback``      the policy until it cycles, then the exact planner
 ``disturbed-planner-fallback``  the same from disturbed starts
 ``clean-planner``               the exact planner alone: the optimal baseline
@@ -140,7 +140,7 @@ def grid(values: Values, shape: SortingShape, fail: Vec, request: EvaluationRequ
     Args:
         values: Q of every move, from observations.
         shape: Size of the task.
-        fail: Failure probabilities of the clutter cells, shape (K,).
+        fail: Failure probabilities of the clutter slots, shape (K,).
         request: Its episodes are those of each pair and row; by default 1000 for up to 10
             cells and 300 for more.
     """

@@ -39,7 +39,12 @@ def measure(batch: SortingBatch, which: Index) -> tuple[Index, NDArray[np.float6
 
 
 def choose_by_planner(batch: SortingBatch, which: Index) -> Index:
-    """Select the moves of the exact planner in environments that are not at their goals."""
+    """Return the exact planner's moves in environments that are not at their goals, (m,).
+
+    Args:
+        batch: Tasks.
+        which: Environments, shape (m,).
+    """
     rows, best = batch.rows, np.zeros(len(which), dtype=np.int64)
     tasks = TaskBatch(
         clutter=rows.clutter[which],

@@ -21,8 +21,8 @@ class OrderView:
     """Input of an order rule: the targets of n tasks at one step, the planner's own first."""
 
     values: NDArray[np.float32]
-    """Critic's value of each target, with that of the way to its place while nothing is held;
-    -inf where there are fewer, shape (n, k)."""
+    """Critic's value of each target, plus that of the motion to its place while nothing is
+    held; -inf where there are fewer, shape (n, k)."""
     distances: NDArray[np.float64]
     """Distance from the tcp to each target [m], inf where there are fewer, shape (n, k)."""
     chosen: Index

@@ -15,7 +15,7 @@ from app.sim.sorting.state import SortingShape
 CHUNK = 4000
 """Maximum number of environments of a batch."""
 SMALL = 10
-"""Maximum number of clutter cells of the smaller task."""
+"""Maximum number of clutter slots of the smaller task."""
 
 
 def pairs_of(shape: SortingShape) -> Index:

@@ -2,7 +2,7 @@
 
 Ten objects are sorted in ``sorting-e0`` by the pick policy, which executes every grasp and
 every placement as a whole pick (approach, descent, closing or opening gripper, lift). The cell
-differs from that of the policy only in its stations; clutter cells and towers are its cubes and
+differs from that of the policy only in its stations; clutter slots and towers are its cubes and
 docks. Blocks are no obstacles, as in the live cell. All tasks run side by side in one batch;
 the person works on and does not avoid the robot.
 

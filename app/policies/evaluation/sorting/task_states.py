@@ -1,8 +1,8 @@
 """Symbolic states of many sorting tasks that are executed side by side.
 
 A task alternates between two motions: to an object of a near-optimal move, and with that object
-to the place of such a move. A grasp fails with the probability of its cell; the draws belong to
-task and attempt, so that every order rule meets the same luck.
+to the place of such a move. A grasp fails with the probability of its slot; the draw is
+determined by task and attempt, so that all order rules have the same failures.
 
 Source: docs/method.md 1.2, 3.1.
 """
