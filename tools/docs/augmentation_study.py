@@ -29,7 +29,7 @@ from app.cli.recordings import clean_runs
 from app.errors import InvalidInput
 from app.policies.checkpoints.checkpoint import Checkpoint, load
 from app.policies.checkpoints.trained_cell import cell_of
-from app.policies.evaluation.pick import selection_rules as choice_rules
+from app.policies.evaluation.pick import selection_rules
 from app.policies.evaluation.pick.episodes import Evaluator, settings_for
 from app.policies.inference.task_selection import HYSTERESIS
 from app.policies.inference.value_networks import ValueNetworks, pick_preset_of
@@ -101,7 +101,7 @@ def successes(checkpoint: Checkpoint, motions: Sequence[Motion], episodes: int) 
     for name, settings in tests(usual, recorded).items():
         evaluator = Evaluator(networks, cell, episodes, SEED, settings)
         one = settings.n_candidates == (1, 1)
-        rule = choice_rules.fixed(0) if one else choice_rules.critic(HYSTERESIS)
+        rule = selection_rules.fixed(0) if one else selection_rules.critic(HYSTERESIS)
         rates[name] = evaluator.run(rule).row(name)["success"]["mean"]  # type: ignore[index]
     return rates
 

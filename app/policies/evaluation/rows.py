@@ -1,4 +1,4 @@
-"""What a protocol is run with, and rows that are reported as soon as they are measured."""
+"""Input of a protocol, and rows that are reported as soon as they are measured."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -36,7 +36,7 @@ class ReportedRows(list[Json]):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class EvaluationRequest:
-    """What a protocol is run with, beside the checkpoint."""
+    """Input of a protocol besides the checkpoint."""
 
     episodes: int | None = None
     """Number of episodes of each row; None for the usual one."""

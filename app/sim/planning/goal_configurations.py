@@ -50,11 +50,11 @@ def goal_configurations(
         if k > 0 and spread > 0.0:
             offset = rng.normal(size=3)
             point += spread * rng.uniform() ** (1.0 / 3.0) * offset / np.linalg.norm(offset)
-        posture = _descend(robot, arm, point, q)
-        if posture is None:
+        reached = _descend(robot, arm, point, q)
+        if reached is None:
             continue
-        if all(np.abs(posture - other).max() > APART for other in found):
-            found.append(posture)
+        if all(np.abs(reached - other).max() > APART for other in found):
+            found.append(reached)
     return np.array(found).reshape(-1, 6)
 
 

@@ -3,15 +3,15 @@
 Each row has people of one kind. In every episode one random target is pursued; at the start and
 at one random step the probabilities of success and contact are compared with the outcome. The
 expected calibration error (ECE) is the mean absolute difference of probability and rate over
-ten bins of equal counts; ``ece_floor`` is what calibrated predictions show by chance with these
-counts, if the two of an episode come true together as often as they can. The Brier score stands
-beside that of a constant, and AUC tells how well the probability ranks episodes.
+ten bins of equal counts; ``ece_floor`` is the ECE of perfectly calibrated predictions with
+these counts, if the two predictions of an episode come true together as often as possible. The
+Brier score is compared with that of a constant; AUC measures how well the probability ranks
+episodes.
 
-The probabilities are those of the people of the training, a mixture; an observation does not
-tell which kind a person is. ``recalibrated`` states ECE and Brier score after a recalibration
-(``recalibration.py``) by few and by many predictions beside the same kind of people: what
-outcomes observed in one cell correct. It is measured on the half of the episodes that the fit
-did not see.
+The probabilities were fitted to the mixture of people of the training; an observation does not
+reveal the kind of a person. ``recalibrated`` states ECE and Brier score after a recalibration
+(``recalibration.py``) by few and by many predictions beside the same kind of people, measured
+on the half of the episodes that the fit did not use.
 
 Source: Guo et al., *On calibration of modern neural networks* (2017); Brier (1950).
 """
@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from app.errors import InvalidInput
 from app.policies.checkpoints.checkpoint import Checkpoint
 from app.policies.checkpoints.trained_cell import cell_of
-from app.policies.evaluation.pick.episodes import Evaluator, View, settings_for
+from app.policies.evaluation.pick.episodes import Evaluator, SelectionInput, settings_for
 from app.policies.evaluation.pick.people import beside_recordings
 from app.policies.evaluation.pick.tasks import FASTER, PAIR, settings_of
 from app.policies.evaluation.rows import EvaluationRequest, Json
@@ -55,7 +55,7 @@ class _Predictions:
         self.predictions: list[Float] = []
         """Probabilities of success and contact, half widths of their intervals, (k, 4)."""
 
-    def __call__(self, view: View) -> NDArray[np.int64]:
+    def __call__(self, view: SelectionInput) -> NDArray[np.int64]:
         wanted = (
             np.ones(len(view.rows), dtype=bool)
             if view.first

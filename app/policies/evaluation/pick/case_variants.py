@@ -3,7 +3,7 @@
 The variants are all layouts of the cell that agree with the description of a case
 (``sim/pick/case_variants.py``). Each runs from jittered starts and is judged as in
 ``pick-cases``. Rates are means over variants with 95 % intervals of Student's t, because runs
-of one variant depend on each other. Beside the critic's choice stand the nearest candidate, and
+of one variant depend on each other. The same starts are run with the nearest candidate and with
 each goal alone: where the expected goal alone cannot be picked, no choice is as expected.
 """
 

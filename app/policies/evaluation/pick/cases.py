@@ -3,7 +3,7 @@
 Each case runs from many starts: the robot's joints, the person's palm and the time at which the
 person moves are jittered. A run is as expected where first choice, target switches and end are
 those of the case (``sim/pick/case_verdict.py``); each of these clauses is counted by itself,
-too. Beside the critic's choice stand the nearest candidate, and each goal alone.
+too. The same starts are run with the nearest candidate and with each goal alone.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -15,8 +15,14 @@ from numpy.typing import NDArray
 
 from app.policies.checkpoints.checkpoint import Checkpoint
 from app.policies.checkpoints.trained_cell import cell_of
-from app.policies.evaluation.pick import selection_rules as choice_rules
-from app.policies.evaluation.pick.episodes import Episodes, Evaluator, Rule, View, settings_for
+from app.policies.evaluation.pick import selection_rules
+from app.policies.evaluation.pick.episodes import (
+    Episodes,
+    Evaluator,
+    Rule,
+    SelectionInput,
+    settings_for,
+)
 from app.policies.evaluation.rows import EvaluationRequest, Json
 from app.policies.evaluation.statistics import wilson
 from app.policies.inference.task_selection import HYSTERESIS
@@ -59,7 +65,7 @@ class _Recorder:
     values: list[tuple[NDArray[np.int64], NDArray[np.float32]]]
     """Running episodes and values of their candidates, by step."""
 
-    def __call__(self, view: View) -> NDArray[np.int64]:
+    def __call__(self, view: SelectionInput) -> NDArray[np.int64]:
         choice = self.rule(view)
         t = self.dt * len(self.values)
         for row, place in zip(view.rows.tolist(), choice.tolist(), strict=True):
@@ -119,11 +125,11 @@ class CaseBench:
         """
         evaluator, start = self._evaluator(cases, n)
         dt = evaluator.batch.arm.dt
-        critic = _Recorder(choice_rules.critic(HYSTERESIS), dt, {}, [])
-        nearest = _Recorder(choice_rules.nearest, dt, {}, [])
+        critic = _Recorder(selection_rules.critic(HYSTERESIS), dt, {}, [])
+        nearest = _Recorder(selection_rules.nearest, dt, {}, [])
         run, near, *alone = (
             evaluator.run(rule, start=start)
-            for rule in (critic, nearest, choice_rules.fixed(0), choice_rules.fixed(1))
+            for rule in (critic, nearest, selection_rules.fixed(0), selection_rules.fixed(1))
         )
         found = []
         for k, (case, _) in enumerate(cases):

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.policies.configs.pick import PickPreset
-from app.policies.evaluation.pick.recorded_people import Trace
+from app.policies.evaluation.contact_recheck import Trace
 from app.policies.evaluation.statistics import outcome_intervals
 from app.policies.inference.value_networks import ValueNetworks
 from app.sim.cells.cell import Cell
@@ -42,7 +42,7 @@ EVALUATION_LIBRARY = 1_000_003
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class View:
+class SelectionInput:
     """Input of a selection rule: all running environments at one step."""
 
     values: NDArray[np.float32]
@@ -63,7 +63,7 @@ class View:
     """Indices of the environments, shape (n,)."""
 
 
-Rule = Callable[[View], Index]
+Rule = Callable[[SelectionInput], Index]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -258,8 +258,11 @@ class Evaluator:
         return found
 
     def _without_blocked(
-        self, view: View, resting: dict[int, Shapes], planners: list[RestingPeoplePlanner]
-    ) -> View:
+        self,
+        view: SelectionInput,
+        resting: dict[int, Shapes],
+        planners: list[RestingPeoplePlanner],
+    ) -> SelectionInput:
         """Return the view without candidates that resting people block, where one is free."""
         values, distances = view.values.copy(), view.distances.copy()
         for k, people in resting.items():
@@ -293,7 +296,7 @@ class Evaluator:
 
     def _view(
         self, rows: Index, chosen: Index, first: bool, observed: ObservedPeople, predicts: bool
-    ) -> tuple[NDArray[np.float32], View]:
+    ) -> tuple[NDArray[np.float32], SelectionInput]:
         """Return the policy's action for each candidate, (n, k, 5), and the rule's input."""
         batch, state = self.batch, self.batch.state
         width = batch.settings.n_candidates[1]
@@ -327,7 +330,7 @@ class Evaluator:
             outcomes = np.zeros((len(rows), width, 4))
             both = np.hstack([predicted.probability[:, :2], predicted.spread[:, :2]])
             outcomes[owner, place] = both
-        view = View(
+        view = SelectionInput(
             values=values,
             outcomes=outcomes,
             distances=distances,

@@ -1,15 +1,18 @@
-"""Protocols ``pick-people``, ``pick-mocap``, ``pick-yielding``: other people in the cell.
+"""Protocols ``pick-people``, ``pick-mocap``, ``pick-yielding``, ``pick-rest``: other people.
 
-All protocols select among 2-3 random targets by the critic with hysteresis, as ``pick-choice``
-does, and differ in the people. A policy for one person observes the nearest. Several workers
-share the table and do not avoid one another, so they may overlap.
+``pick-rest`` has one random target. The others select among 2-3 random targets by the critic
+with hysteresis, as ``pick-choice`` does. They differ in the people. A policy for one person
+observes the nearest. Several workers share the table and do not avoid each other, so that they
+may overlap.
 
 ``pick-people``: no person; one to four people of the library's sizes; one and three people of
 the 5th and of the 95th percentile; a worker and a pedestrian; synthetic reaches.
 ``pick-mocap``: recorded motion placed at the table, each recording alone and all together.
 ``pick-yielding``: people that yield to the arm, from strength 0 (the thesis' people) to 1.
+``pick-rest``: people who stand still, with the policy alone and with a planner.
 
-Each row also states how often the same people touch a robot that never moves.
+Except in ``pick-rest``, each row also states how often the same people touch a robot that never
+moves.
 
 Source: docs/method.md 3.4 and 4 (several people; a model whose dimensions are known; a human
 that reacts).
@@ -24,7 +27,7 @@ import numpy as np
 from app.errors import InvalidInput
 from app.policies.checkpoints.checkpoint import Checkpoint
 from app.policies.checkpoints.trained_cell import cell_of
-from app.policies.evaluation.pick import selection_rules as choice_rules
+from app.policies.evaluation.pick import selection_rules
 from app.policies.evaluation.pick.episodes import Episodes, Evaluator, settings_for
 from app.policies.evaluation.pick.tasks import settings_of
 from app.policies.evaluation.rows import EvaluationRequest, Json
@@ -78,7 +81,7 @@ class ChoiceBench:
             evaluator = Evaluator(self._networks, self.cell, self._n, seed, settings)
             touched = _touched_at_rest(evaluator.batch)
             for planned in planners:
-                run = evaluator.run(choice_rules.critic(HYSTERESIS), planned=planned)
+                run = evaluator.run(selection_rules.critic(HYSTERESIS), planned=planned)
                 row = run.row(_with_planner(name) if planned else name)
                 results.append(row | {"touched_at_rest": touched})
             stated[name] = settings_of(evaluator)
@@ -100,7 +103,7 @@ def _with_planner(name: str) -> str:
 
 
 def _touched_at_rest(batch: PickBatch) -> dict[str, float]:
-    """Return the rate of contacts with a robot that stays at its start."""
+    """Return the rate of episodes in which people touch a robot that stays at its start."""
     batch.reset()
     rest = np.zeros((batch.n_envs, CONTROLLED), dtype=np.float32)
     while (batch.state.outcome == RUNNING).any():
@@ -157,7 +160,7 @@ def run_rest(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
         settings = replace(usual, work=work)
         evaluator = Evaluator(networks, cell, n, request.seed, settings)
         for planned in planners:
-            run = evaluator.run(choice_rules.fixed(0), planned=planned)
+            run = evaluator.run(selection_rules.fixed(0), planned=planned)
             row = run.row(_with_planner(name) if planned else name)
             results.append(row | _timeouts(evaluator.batch, run))
     return {"settings": settings_of(evaluator), "results": results}

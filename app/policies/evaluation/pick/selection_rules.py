@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from app.policies.evaluation.pick.episodes import Index, Rule, View
+from app.policies.evaluation.pick.episodes import Index, Rule, SelectionInput
 from app.policies.inference.task_selection import select
 
 
-def _n_candidates(view: View) -> Index:
+def _n_candidates(view: SelectionInput) -> Index:
     count: Index = np.isfinite(view.distances).sum(axis=1)
     return count
 
@@ -14,26 +14,26 @@ def _n_candidates(view: View) -> Index:
 def critic(hysteresis: float) -> Rule:
     """Return the critic's rule, applied at every step."""
 
-    def rule(view: View) -> Index:
+    def rule(view: SelectionInput) -> Index:
         return select(view.values, None if view.first else view.chosen, hysteresis)
 
     return rule
 
 
-def nearest(view: View) -> Index:
-    """Select the candidate nearest to the TCP at every step."""
+def nearest(view: SelectionInput) -> Index:
+    """Return the candidate nearest to the TCP, shape (n,), at every step."""
     choice: Index = view.distances.argmin(axis=1)
     return choice
 
 
-def clearest(view: View) -> Index:
-    """Choose, at every step, the candidate with the most clearance to the observed people."""
+def clearest(view: SelectionInput) -> Index:
+    """Return the candidate with the largest clearance to people, shape (n,), at every step."""
     choice: Index = view.clearances.argmax(axis=1)
     return choice
 
 
-def critic_once(view: View) -> Index:
-    """Choose by the critic at the start and keep that choice."""
+def critic_once(view: SelectionInput) -> Index:
+    """Return the critic's choice at the start, shape (n,), and keep it."""
     best: Index = view.values.argmax(axis=1)
     return best if view.first else view.chosen
 
@@ -42,7 +42,7 @@ def at_random(seed: int, n_episodes: int) -> Rule:
     """Return the rule that selects a random candidate at the start and keeps it."""
     draw = np.random.default_rng(seed).random(n_episodes)
 
-    def rule(view: View) -> Index:
+    def rule(view: SelectionInput) -> Index:
         if not view.first:
             return view.chosen
         return (draw[view.rows] * _n_candidates(view)).astype(np.int64)
@@ -53,7 +53,7 @@ def at_random(seed: int, n_episodes: int) -> Rule:
 def fixed(place: int) -> Rule:
     """Return the rule that keeps the candidate at ``place``, or the last one there is."""
 
-    def rule(view: View) -> Index:
+    def rule(view: SelectionInput) -> Index:
         return np.minimum(place, _n_candidates(view) - 1)
 
     return rule

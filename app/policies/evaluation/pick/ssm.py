@@ -28,7 +28,7 @@ from dataclasses import dataclass, replace
 
 from app.policies.checkpoints.checkpoint import Checkpoint
 from app.policies.checkpoints.trained_cell import cell_of
-from app.policies.evaluation.pick import selection_rules as choice_rules
+from app.policies.evaluation.pick import selection_rules
 from app.policies.evaluation.pick.episodes import Evaluator, settings_for
 from app.policies.evaluation.pick.tasks import settings_of
 from app.policies.evaluation.rows import EvaluationRequest, Json
@@ -61,7 +61,7 @@ class Condition:
     choice: bool = False
     """Whether the critic chooses among 2 or 3 targets."""
     against: str | None = None
-    """Row of the same episodes without the layer."""
+    """Row of the same episodes without the layer; None for those themselves."""
 
 
 CONDITIONS: Mapping[str, Condition] = {
@@ -100,7 +100,9 @@ class MonitoredPicks:
 
     def run(self, condition: Condition) -> MonitoredEpisodes:
         """Run all episodes under a condition."""
-        rule = choice_rules.critic(HYSTERESIS) if condition.choice else choice_rules.fixed(0)
+        rule = (
+            selection_rules.critic(HYSTERESIS) if condition.choice else selection_rules.fixed(0)
+        )
         parts = []
         for first in range(0, self._n, CHUNK):
             evaluator = self.evaluator(condition, first)
@@ -110,12 +112,12 @@ class MonitoredPicks:
         return joined(parts)
 
 
-def row_of(name: str, runs: MonitoredEpisodes, bare: MonitoredEpisodes | None) -> Json:
+def row_of(name: str, runs: MonitoredEpisodes, without: MonitoredEpisodes | None) -> Json:
     """Return the result row of a condition.
 
     Args:
         runs: Episodes of the condition.
-        bare: The same episodes without the layer; None for those themselves.
+        without: The same episodes without the layer; None for those themselves.
     """
     n, won = len(runs.arrived), runs.arrived
     admissible = runs.touched_moving & (runs.link_speed <= runs.allowed_speed)
@@ -129,8 +131,8 @@ def row_of(name: str, runs: MonitoredEpisodes, bare: MonitoredEpisodes | None) -
         "contact_cell": runs.touched_cell,
         "timeout": ~ended,
     }
-    both = won if bare is None else won & bare.arrived
-    lost = None if bare is None else mean_of((runs.seconds - bare.seconds)[both])
+    both = won if without is None else won & without.arrived
+    lost = None if without is None else mean_of((runs.seconds - without.seconds)[both])
     periods = float(runs.seconds.sum())
     return {
         "name": name,
@@ -153,8 +155,8 @@ def run_ssm(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
     rows = request.rows(len(CONDITIONS))
     for name, condition in CONDITIONS.items():
         runs[name] = picks.run(condition)
-        bare = None if condition.against is None else runs[condition.against]
-        rows.append(row_of(name, runs[name], bare))
+        without = None if condition.against is None else runs[condition.against]
+        rows.append(row_of(name, runs[name], without))
     stated = {name: one.safety.describe() for name, one in CONDITIONS.items() if one.active}
     return {
         "settings": {

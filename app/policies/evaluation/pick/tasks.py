@@ -1,8 +1,8 @@
-"""Protocols ``pick-single`` and ``pick-choice`` (docs/method.md 3.6).
+"""Protocols ``pick-single``, ``pick-choice`` and ``pick-choice-hard`` (docs/method.md 3.6).
 
-Timeout 12 s for picks; 10 s and 20 s where a target is only reached, whose rows are named
-``20 s ...``. Start clearance 0.05 m, starts mixed evenly over home, cubes and docks, person
-with postures that do not occur in training. The result states the hand speeds of the person.
+The time limit is 12 s for picks; 10 s and 20 s where a target is only reached (rows ``20 s
+...``). The start clearance is 0.05 m, starts are drawn uniformly from home, cubes and docks,
+and the person has postures that do not occur in training. The result states the hand speeds.
 FCL checks the poses of the first 200 episodes on the raw meshes for missed contacts.
 """
 
@@ -13,7 +13,8 @@ import numpy as np
 
 from app.policies.checkpoints.checkpoint import Checkpoint
 from app.policies.checkpoints.trained_cell import cell_of
-from app.policies.evaluation.pick import selection_rules as choice_rules
+from app.policies.evaluation.contact_recheck import recheck
+from app.policies.evaluation.pick import selection_rules
 from app.policies.evaluation.pick.episodes import (
     Episodes,
     Evaluator,
@@ -21,7 +22,6 @@ from app.policies.evaluation.pick.episodes import (
     settings_for,
     time_limits,
 )
-from app.policies.evaluation.pick.recorded_people import recheck
 from app.policies.evaluation.rows import EvaluationRequest, Json
 from app.policies.evaluation.statistics import mcnemar
 from app.policies.inference.task_selection import HYSTERESIS
@@ -36,11 +36,11 @@ N_RECHECKED = 200
 """Number of episodes checked again with FCL."""
 CRITIC = "critic"
 OTHER_RULES: Mapping[str, Callable[[int, int], Rule]] = {
-    "critic-each-step": lambda _seed, _n: choice_rules.critic(0.0),
-    "critic-once": lambda _seed, _n: choice_rules.critic_once,
-    "nearest": lambda _seed, _n: choice_rules.nearest,
-    "clearest": lambda _seed, _n: choice_rules.clearest,
-    "random": choice_rules.at_random,
+    "critic-each-step": lambda _seed, _n: selection_rules.critic(0.0),
+    "critic-once": lambda _seed, _n: selection_rules.critic_once,
+    "nearest": lambda _seed, _n: selection_rules.nearest,
+    "clearest": lambda _seed, _n: selection_rules.clearest,
+    "random": selection_rules.at_random,
 }
 """Rules compared with the critic's, made from seed and number of episodes."""
 ORACLE = "oracle"
@@ -92,7 +92,7 @@ def run_single(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
     trajectories: tuple[Trajectory, ...] = ()
     for name, evaluator in evaluators.items():
         n_recorded = 0 if trajectories else min(N_RECHECKED, evaluator.batch.n_envs)
-        outcome = evaluator.run(choice_rules.fixed(0), n_recorded)
+        outcome = evaluator.run(selection_rules.fixed(0), n_recorded)
         trajectories = trajectories or outcome.trajectories
         rows.append(outcome.row(f"{name} policy".lstrip()))
     usual = evaluators[""]
@@ -119,14 +119,14 @@ class ChoiceRun:
     def rows(self, n_recorded: int = 0) -> Iterator[dict[str, object]]:
         """Run the rules and yield their rows, the oracle's last."""
         n = self._evaluator.batch.n_envs
-        rules = {CRITIC: choice_rules.critic(HYSTERESIS)}
+        rules = {CRITIC: selection_rules.critic(HYSTERESIS)}
         rules |= {name: rule(self._seed, n) for name, rule in OTHER_RULES.items()}
         for name, rule in rules.items():
             recorded = n_recorded if name == CRITIC else 0
             self._runs[name] = self._evaluator.run(rule, recorded)
             yield self._runs[name].row(self._prefix + name)
         most = self._evaluator.batch.settings.n_candidates[1]
-        runs = [self._evaluator.run(choice_rules.fixed(k)) for k in range(most)]
+        runs = [self._evaluator.run(selection_rules.fixed(k)) for k in range(most)]
         self._runs[ORACLE] = _oracle(runs)
         yield self._runs[ORACLE].row(self._prefix + ORACLE)
 
@@ -171,7 +171,7 @@ def run_choice(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
 
 
 def run_choice_hard(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
-    """Evaluate the selection beside two or faster people, or both, and among more targets."""
+    """Evaluate the selection beside two people, faster people, both, and among more targets."""
     usual = settings_for((2, 3), pick_preset_of(checkpoint))
     fast = replace(usual, work=replace(usual.work, pace=FASTER))
     settings = {

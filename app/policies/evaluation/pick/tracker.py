@@ -23,7 +23,7 @@ from dataclasses import asdict, dataclass
 import numpy as np
 
 from app.policies.checkpoints.checkpoint import Checkpoint
-from app.policies.evaluation.pick import selection_rules as choice_rules
+from app.policies.evaluation.pick import selection_rules
 from app.policies.evaluation.pick.episodes import (
     Index,
     ObservedPeople,
@@ -41,7 +41,7 @@ from app.sim.pick.batch import PickBatch
 
 DEFAULT_EPISODES = 300
 RATE_HZ = 30.0
-LOOKED_S = 0.4
+WARM_UP_S = 0.4
 """Time for which the tracker runs before the episode [s]; the person moves at the initial speed
 until then."""
 
@@ -138,7 +138,7 @@ class KeypointObserver:
                 (self._seed, e),
                 size,
                 batch.world.people.floor_z,
-                start=-settings.latency_s - LOOKED_S + float(phases[e]),
+                start=-settings.latency_s - WARM_UP_S + float(phases[e]),
             )
             self._estimators[e] = PersonEstimator(size)
 
@@ -167,7 +167,7 @@ def run_tracker(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
     """Evaluate task selection among 2-3 random targets with people observed by a tracker."""
     n = request.episodes or DEFAULT_EPISODES
     evaluator = evaluators_of(checkpoint, (2, 3), n, request.seed)[""]
-    rule = choice_rules.critic(HYSTERESIS)
+    rule = selection_rules.critic(HYSTERESIS)
     observers: dict[str, PeopleObserver] = {"exact": observe_exactly}
     observers |= {name: KeypointObserver(row, request.seed) for name, row in ROWS.items()}
     results = request.rows(len(observers))

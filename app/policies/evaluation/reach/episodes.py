@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from app.policies.evaluation.pick.recorded_people import Trace, recheck
+from app.policies.evaluation.contact_recheck import Trace, recheck
 from app.policies.evaluation.statistics import mean_of, outcome_intervals, wilson
 from app.policies.inference.controllers import Controller
 from app.sim.cells.cell import Cell

@@ -4,10 +4,10 @@ The episodes are those of ``reach-targets`` (54 targets x 100, start clearance 0
 the same people. Episodes that the policy does not solve are resimulated with other robot
 motions (``app/sim/reach/oracle_search.py``) until one reaches the goal or the search ends.
 ``solvable`` is a lower bound on the share of solvable episodes; a causal policy cannot be
-expected to reach it, because a resimulation knows the future motion of people. ``never`` are
-episodes that are presumed unsolvable; the rest is ``undecided``. ``doomed`` are episodes in
-which every resimulation, including retreats, ended in a collision: an upper bound on the share
-of unavoidable collisions.
+expected to reach it, because a resimulation knows the future motion of people. ``never`` is the
+share of episodes that are presumed unsolvable; the rest is ``undecided``. ``doomed`` is the
+share of episodes in which every resimulation, including retreats, ended in a collision: an
+upper bound on the share of unavoidable collisions.
 
 ==============  ==============================================================================
 stage           resimulations of each unsolved episode
@@ -18,7 +18,7 @@ stage           resimulations of each unsolved episode
 ``long``        scripted again: 2048
 ==============  ==============================================================================
 
-Source: docs/method.md 2.6; the trials' figure is 98.7 %.
+Source: ours, on the episodes of docs/method.md 2.6.
 """
 
 from collections.abc import Callable
@@ -77,7 +77,12 @@ def started(cell: Cell, settings: ReachSettings, goals: Vec, seed: int) -> Reach
 
 
 def soonest_arrivals(cell: Cell, settings: ReachSettings, goals: Vec, seed: int) -> Vec:
-    """Return the earliest time of the TCP at each goal without people [s]."""
+    """Return the earliest time of the TCP at each goal without people [s], shape (n,).
+
+    Args:
+        settings: Rules; people and goals are replaced.
+        goals: Goal of each episode [m], shape (n, 3).
+    """
     different, which = np.unique(goals, axis=0, return_inverse=True)
     rules = ReachSettings(people=(), action=settings.action, time_limit_s=settings.time_limit_s)
     alone = ReachBatch(cell, len(different), seed, rules)
@@ -128,7 +133,14 @@ class StagedSearch:
 
 
 def verdict(search: OracleSearch, never: Any, targets: Vec, goals: Vec) -> Json:
-    """Return the shares of solvable, unsolvable and undecided episodes with intervals."""
+    """Return the shares of solvable, unsolvable and undecided episodes with intervals.
+
+    Args:
+        search: The search after all stages.
+        never: Whether each episode is presumed unsolvable, shape (n,).
+        targets: All targets [m], shape (k, 3).
+        goals: Goal of each episode, one of the targets [m], shape (n, 3).
+    """
     n, solved = search.n, search.resimulations.reached > 0
     undecided = ~solved & ~never
     worst = []

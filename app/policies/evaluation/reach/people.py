@@ -96,7 +96,7 @@ def run_speeds(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
 
 
 def at_speed(cell: Cell, speed: float) -> Cell:
-    """Return a cell with one pedestrian of a given speed [m/s], otherwise like the cell's own.
+    """Return a cell whose only pedestrian has a given speed [m/s], by the rules of its first.
 
     Raises:
         InvalidInput: The cell has no pedestrian.

@@ -38,7 +38,11 @@ RINGS = (0.0, 0.06, 0.09, 0.11, 0.13, 0.18)
 
 
 def between(episodes: ReachEpisodes, targets: Vec) -> list[dict[str, Any]]:
-    """Return the rates of outcomes by the distance of goals to the nearest target."""
+    """Return the rates of outcomes by the distance of goals to the nearest target.
+
+    Args:
+        targets: Targets [m], shape (k, 3).
+    """
     distances = np.linalg.norm(episodes.goals[:, None] - targets, axis=2).min(axis=1)
     groups = [
         (low, high, (low <= distances) & (distances < high)) for low, high in pairwise(RINGS)

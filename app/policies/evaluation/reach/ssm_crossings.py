@@ -17,7 +17,7 @@ from app.sim.planning.replanning import ReplanningSettings
 from app.sim.reach.batch import ReachBatch, ReachSettings
 from app.sim.reach.crossings import CrossingSet
 from app.sim.reach.monitored.batch import MonitoredReachBatch
-from app.sim.reach.monitored.planners import drive_planner, postures_of
+from app.sim.reach.monitored.planners import drive_planner, goal_configurations_of
 from app.sim.reach.oracle_search import Acts, sample_detours, toward
 from app.sim.robot.actions import ActionSettings
 from app.sim.robot.kernels.arm import Arm
@@ -144,10 +144,10 @@ class Comparison:
         return batch
 
     def configurations(self) -> list[Vec]:
-        """Return the configurations at each goal for planners and resimulations [rad]."""
+        """Return the configurations at each goal [rad], shape (k, 6) each."""
         if self._configurations is None:
             arm = arm_of(self.cell)
-            self._configurations = postures_of(arm, self.crossed.goals, self.seed)
+            self._configurations = goal_configurations_of(arm, self.crossed.goals, self.seed)
         return self._configurations
 
     def policy(self, controller: Controller, *, no_person: bool = False) -> CrossingRuns:

@@ -21,13 +21,13 @@ GOAL_SPREAD = 0.08
 """Largest distance of the tcp from the goal at a planner's goal configurations [m]."""
 
 
-def postures_of(arm: Arm, goals: Vec, seed: int) -> list[Vec]:
-    """Return the postures that planners may choose among for each goal [rad], (k, 6) each.
+def goal_configurations_of(arm: Arm, goals: Vec, seed: int) -> list[Vec]:
+    """Return the configurations at each goal that a planner may choose [rad], (k, 6) each.
 
     Args:
         arm: From ``scene.arm_of``.
         goals: Goals [m], shape (n, 3).
-        seed: Seed of the search; each goal's postures are fixed by (seed, number).
+        seed: Seed of the search; (seed, index) determines those of a goal.
     """
     return [
         goal_configurations(arm, goal, np.random.default_rng([seed, k]), spread=GOAL_SPREAD)
@@ -37,40 +37,40 @@ def postures_of(arm: Arm, goals: Vec, seed: int) -> list[Vec]:
 
 def drive_planner(
     batch: MonitoredReachBatch,
-    postures: Sequence[Vec],
+    q_goals: Sequence[Vec],
     settings: ReplanningSettings,
     seed: int,
     *,
     blind: bool = False,
 ) -> tuple[list[Vec], list[ReplanningReport]]:
-    """Drive every row of a batch that was just reset until its episode ends.
+    """Drive every environment of a batch that was just reset to the end of its episode.
 
     Args:
-        batch: Rows at the start of their episodes.
-        postures: Postures each row's planner may choose among [rad], shape (k, 6) each.
+        batch: Environments at the start of their episodes.
+        q_goals: Goal configurations of each environment [rad], shape (k, 6) each.
         settings: Planner, role and margins.
         blind: Whether the planner ignores people.
 
     Returns:
-        Override of each row's periods, in [0, 1], and what each planner reports.
+        Override of each period of each environment, in [0, 1], and the planners' reports.
     """
     overrides, reports = [], []
     for row in range(batch.n_envs):
-        follower = ReplanningExecutor(batch.arm, postures[row], settings, seed + 1000 * row)
-        overrides.append(_drive(batch, row, follower, blind))
-        reports.append(follower.report)
+        executor = ReplanningExecutor(batch.arm, q_goals[row], settings, seed + 1000 * row)
+        overrides.append(_drive(batch, row, executor, blind))
+        reports.append(executor.report)
     return overrides, reports
 
 
 def _drive(
-    batch: MonitoredReachBatch, row: int, follower: ReplanningExecutor, blind: bool
+    batch: MonitoredReachBatch, row: int, executor: ReplanningExecutor, blind: bool
 ) -> Vec:
-    """Drive one row to the end of its episode; return its overrides."""
+    """Drive environment ``row`` to the end of its episode; return its overrides in [0, 1]."""
     state, found = batch.state, []
     while state.outcome[row] == RUNNING:
         people: Shapes = no_people() if blind else batch.people_shapes(row)
         q, qd = state.q[row].copy(), state.qd[row].copy()
-        wanted = follower.act(q, qd, people, float(state.elapsed[row]))
+        wanted = executor.act(q, qd, people, float(state.elapsed[row]))
         batch.step_speeds(row, wanted)
         found.append(float(batch.override[row]))
     return np.array(found)

@@ -7,7 +7,7 @@ import pytest
 
 from app.policies.checkpoints import pretrained
 from app.policies.configs.pick import PickPreset
-from app.policies.evaluation.pick import selection_rules as choice_rules
+from app.policies.evaluation.pick import selection_rules
 from app.policies.evaluation.pick.episodes import Evaluator, observe_exactly, settings_for
 from app.policies.inference.task_selection import TaskChooser
 from app.policies.inference.value_networks import ValueNetworks
@@ -73,7 +73,7 @@ def test_batch_evaluation_and_service_value_people_alike(workers):
 
     def recorded(view):
         views.append(view.values)
-        return choice_rules.fixed(0)(view)
+        return selection_rules.fixed(0)(view)
 
     evaluator.run(recorded, start=move_away)
     batch = evaluator.batch
@@ -124,7 +124,7 @@ def two_sizes():
     )
     networks = ValueNetworks(pretrained.load("pick"))
     evaluator = Evaluator(networks, load_cell(), 8, 3, settings)
-    return evaluator, evaluator.run(choice_rules.fixed(0), n_recorded=6)
+    return evaluator, evaluator.run(selection_rules.fixed(0), n_recorded=6)
 
 
 def test_each_worker_of_each_recorded_row_is_a_trajectory_in_their_size(two_sizes):

@@ -8,8 +8,13 @@ import pytest
 from app.errors import InvalidInput, NotFound
 from app.policies.checkpoints import pretrained
 from app.policies.configs.pick import THESIS, PickPreset
-from app.policies.evaluation.pick import selection_rules as choice_rules
-from app.policies.evaluation.pick.episodes import Evaluator, View, observe_exactly, settings_for
+from app.policies.evaluation.pick import selection_rules
+from app.policies.evaluation.pick.episodes import (
+    Evaluator,
+    SelectionInput,
+    observe_exactly,
+    settings_for,
+)
 from app.policies.evaluation.registry import evaluate
 from app.policies.inference.value_networks import ValueNetworks
 from app.policies.training.pick import start
@@ -27,7 +32,7 @@ def evaluator():
 def view(values, chosen, first=False):
     values = np.array(values, dtype=np.float32)
     n = len(values)
-    return View(
+    return SelectionInput(
         values=values,
         distances=np.where(np.isfinite(values), np.arange(values.shape[1])[None] + 1.0, np.inf),
         outcomes=None,
@@ -39,31 +44,31 @@ def view(values, chosen, first=False):
 
 
 def test_every_episode_ends_and_rates_sum_to_one(evaluator):
-    row = evaluator.run(choice_rules.critic(0.2)).row("critic")
+    row = evaluator.run(selection_rules.critic(0.2)).row("critic")
     total = sum(row[end]["mean"] for end in ("success", "collision", "timeout"))
     assert total == pytest.approx(1.0)
     assert row["n"] == 24
 
 
 def test_the_same_rule_twice_gives_the_same_episodes(evaluator):
-    one, two = (evaluator.run(choice_rules.critic(0.2)) for _ in range(2))
+    one, two = (evaluator.run(selection_rules.critic(0.2)) for _ in range(2))
     assert np.array_equal(one.outcome, two.outcome)
     assert np.array_equal(one.duration_s, two.duration_s)
 
 
 def test_a_fixed_choice_never_switches(evaluator):
-    assert evaluator.run(choice_rules.fixed(1)).switches.sum() == 0
+    assert evaluator.run(selection_rules.fixed(1)).switches.sum() == 0
 
 
 def test_hysteresis_keeps_and_zero_follows_the_best():
     seen = view([[1.0, 1.1, -np.inf]], [0])
-    assert choice_rules.critic(0.2)(seen).tolist() == [0]
-    assert choice_rules.critic(0.0)(seen).tolist() == [1]
+    assert selection_rules.critic(0.2)(seen).tolist() == [0]
+    assert selection_rules.critic(0.0)(seen).tolist() == [1]
 
 
 def test_random_draws_only_candidates_that_exist():
     seen = view([[0.0, 0.0, -np.inf]] * 500, [0] * 500, first=True)
-    drawn = choice_rules.at_random(3, 500)(seen)
+    drawn = selection_rules.at_random(3, 500)(seen)
     assert set(drawn.tolist()) == {0, 1}
 
 
@@ -96,20 +101,20 @@ def test_the_observation_model_sees_running_rows_only_and_changes_episodes(evalu
         q[:, :2] = 100.0
         return replace(observed, q=q, qd=np.zeros_like(q))
 
-    blind = evaluator.run(choice_rules.critic(0.2), observe=no_person)
+    blind = evaluator.run(selection_rules.critic(0.2), observe=no_person)
     assert not np.concatenate(running).any()
     assert not np.array_equal(
-        blind.duration_s, evaluator.run(choice_rules.critic(0.2)).duration_s
+        blind.duration_s, evaluator.run(selection_rules.critic(0.2)).duration_s
     )
 
 
 def test_clearest_and_once_follow_clearances_and_the_first_choice():
     seen = view([[1.0, 2.0, -np.inf]], [0])
-    assert choice_rules.clearest(seen).tolist() == [0]
-    assert choice_rules.critic_once(seen).tolist() == [0]
-    assert choice_rules.critic_once(view([[1.0, 2.0, -np.inf]], [0], first=True)).tolist() == [
-        1
-    ]
+    assert selection_rules.clearest(seen).tolist() == [0]
+    assert selection_rules.critic_once(seen).tolist() == [0]
+    assert selection_rules.critic_once(
+        view([[1.0, 2.0, -np.inf]], [0], first=True)
+    ).tolist() == [1]
 
 
 def test_choices_are_compared_on_the_same_episodes():

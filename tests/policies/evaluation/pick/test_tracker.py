@@ -7,7 +7,7 @@ import pytest
 
 from app.policies.checkpoints import pretrained
 from app.policies.configs.pick import PickPreset
-from app.policies.evaluation.pick import selection_rules as choice_rules
+from app.policies.evaluation.pick import selection_rules
 from app.policies.evaluation.pick.episodes import Evaluator, observe_exactly, settings_for
 from app.policies.evaluation.pick.tracker import (
     ROWS,
@@ -42,7 +42,7 @@ def misses(evaluator, row, seed=1):
         np.testing.assert_array_equal(observed.size, true.size)
         return observed
 
-    episodes = evaluator.run(choice_rules.critic(0.2), observe=compared)
+    episodes = evaluator.run(selection_rules.critic(0.2), observe=compared)
     return np.array(found), episodes
 
 

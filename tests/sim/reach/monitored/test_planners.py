@@ -10,7 +10,7 @@ from app.sim.planning.ompl_planners import PlanSettings
 from app.sim.planning.replanning import ReplanningSettings
 from app.sim.reach.batch import ReachSettings
 from app.sim.reach.monitored.batch import MonitoredReachBatch
-from app.sim.reach.monitored.planners import GOAL_SPREAD, drive_planner, postures_of
+from app.sim.reach.monitored.planners import GOAL_SPREAD, drive_planner, goal_configurations_of
 from app.sim.robot.ur10 import Robot
 from app.sim.safety.layer import safety_settings
 from app.sim.scenario.monitoring import MonitoringSettings
@@ -21,7 +21,7 @@ pytestmark = pytest.mark.xdist_group("monitored-reaching")
 CELL = load_cell("shared-workspace")
 ARM = arm_of(CELL)
 GOALS = np.array([[0.2, 0.9, 0.3], [-0.2, 0.85, 0.25]])
-POSTURES = postures_of(ARM, GOALS, 3)
+Q_GOALS = goal_configurations_of(ARM, GOALS, 3)
 PLANNED = PlanSettings(planner="rrt-connect", max_poses=6_000)
 RULES = ReachSettings(goals="box", people=("walker",), time_limit_s=15.0)
 
@@ -49,18 +49,18 @@ def run(role: str, tracks: np.ndarray | None, **more: bool) -> MonitoredReachBat
     batch.reset()
     batch.set_goals(np.arange(2), GOALS)
     overrides, _ = drive_planner(
-        batch, POSTURES, ReplanningSettings(role=role, plan=PLANNED), 5, **more
+        batch, Q_GOALS, ReplanningSettings(role=role, plan=PLANNED), 5, **more
     )
     for row, course in enumerate(overrides):
         assert len(course) == round(batch.runs().seconds[row] / ARM.dt)
     return batch
 
 
-def test_postures_lie_where_success_counts():
+def test_goal_configurations_lie_where_success_counts():
     robot = Robot(CELL.robot.tool_length)
-    for goal, postures in zip(GOALS, POSTURES, strict=True):
-        assert len(postures) >= 2
-        for q in postures:
+    for goal, configurations in zip(GOALS, Q_GOALS, strict=True):
+        assert len(configurations) >= 2
+        for q in configurations:
             assert np.linalg.norm(robot.tcp_pose(q)[:3, 3] - goal) <= GOAL_SPREAD + 1e-3
 
 

@@ -1,4 +1,4 @@
-"""Record poses of robot and people, and check them again with FCL.
+"""Poses of robot and people, recorded and checked again with FCL.
 
 Evaluations of both scenarios keep the poses of some episodes and test with FCL on the raw
 meshes whether the kernels missed a contact.
@@ -60,7 +60,7 @@ class Trace:
         self._people: list[list[tuple[Vec, ...]]] = [[] for _ in range(n_recorded)]
 
     def before(self, rows: Index) -> None:
-        """Store the states before a step of the environments ``rows``."""
+        """Store the states before a step of the environments ``rows``, shape (k,)."""
         state, n = self._batch.state, self._n
         self._rows = rows[rows < n]
         self._q0, self._qd0 = state.q[:n].copy(), state.qd[:n].copy()
