@@ -182,7 +182,7 @@ def _reach(graph: Graph, checkpoint: Checkpoint, obs: str) -> list[onnx.ValueInf
     """Add the actor of a reach policy."""
     policy, seen = ReachPolicy(checkpoint), obs
     if policy.view == "people-set":
-        seen = _with_crowd(graph, obs, policy.n_obs)
+        seen = _with_encoded_set(graph, obs, policy.n_obs)
     if policy.moments is not None:
         mean, spread = (graph.constant(one) for one in policy.moments)
         seen = graph.clip(graph.add("Div", graph.add("Sub", obs, mean), spread), -CLIP, CLIP)
@@ -196,7 +196,7 @@ def _reach(graph: Graph, checkpoint: Checkpoint, obs: str) -> list[onnx.ValueInf
     return [_tensor("action", N_ACT, "joint actions in [-1, 1] (docs/method.md 2.2)")]
 
 
-def _with_crowd(graph: Graph, obs: str, n_obs: int) -> str:
+def _with_encoded_set(graph: Graph, obs: str, n_obs: int) -> str:
     """Return observations with the set encoding of the people."""
     first, n_people, n_block = PEOPLE_SET
     shape = graph.constant([-1, n_people, n_block], np.int64)

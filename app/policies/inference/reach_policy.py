@@ -23,7 +23,7 @@ from app.policies.checkpoints.model_state import under
 from app.policies.configs.fields import read_config
 from app.policies.configs.reach import ReachPreset
 from app.policies.inference.trained_policy import TrainedPolicy
-from app.policies.networks.actor_critic import BASE_WEIGHT, CROWD_WIDTH, CrowdShape
+from app.policies.networks.actor_critic import BASE_WEIGHT, SET_WIDTH, PeopleSetShape
 from app.policies.networks.ddpg import CLIP, RunningNormalisation
 from app.sim.core.arrays import Vec
 from app.sim.core.jit import direct
@@ -51,14 +51,14 @@ LAYOUTS = {
     ],
 }
 """Names and sizes of the groups of each kind of observation, as manifests carry them."""
-PEOPLE_SET = CrowdShape(
+PEOPLE_SET = PeopleSetShape(
     N_FEATURES + option_features.N_OPTION_FEATURES, MAX_PEOPLE, people_set.N_BLOCK
 )
 """Position of the people set in the observation of that name."""
 MAX_LAYERS = 16
 """Most layers of a network taken from a checkpoint."""
 
-ACTOR_LAYERS, CROWD_LAYERS = "actor.net", "actor.crowd.0.block"
+ACTOR_LAYERS, SET_LAYERS = "actor.net", "actor.crowd.0.block"
 """Prefix of the names of an actor's tensors."""
 NORMALISATION = "actor.norm"
 """Prefix of the names of the tensors that normalise observations."""
@@ -113,10 +113,10 @@ class ReachPolicy(TrainedPolicy):
         self.n_obs = sum(size for _, size in manifest["layout"])
         """Length of an observation."""
         arrays, n_seen = checkpoint.arrays(), self.n_obs
-        self._crowd: tuple[Layer, ...] = ()
+        self._set_layers: tuple[Layer, ...] = ()
         if self.view == "people-set":
-            self._crowd = _layers_of(arrays, CROWD_LAYERS, PEOPLE_SET.n_block, CROWD_WIDTH)
-            n_seen = PEOPLE_SET.first + CROWD_WIDTH
+            self._set_layers = _layers_of(arrays, SET_LAYERS, PEOPLE_SET.n_block, SET_WIDTH)
+            n_seen = PEOPLE_SET.first + SET_WIDTH
         self._layers = _layers_of(arrays, ACTOR_LAYERS, n_seen, N_ACT)
         self.moments: tuple[Floats, Floats] | None = None
         """Mean and deviation that normalise observations, shape (n_obs,) each; None: none."""
@@ -149,7 +149,7 @@ class ReachPolicy(TrainedPolicy):
             )
         if self._few is not None and len(obs) <= FEW:
             return self._compiled_acts(self._few, obs)
-        seen = self._with_crowd(obs)
+        seen = self._with_encoded_set(obs)
         if self.moments is not None:
             mean, spread = self.moments
             seen = ((obs - mean) / spread).clip(-CLIP, CLIP)
@@ -174,12 +174,12 @@ class ReachPolicy(TrainedPolicy):
         self._answers(*arguments)
         return acts
 
-    def _with_crowd(self, obs: Floats) -> Floats:
+    def _with_encoded_set(self, obs: Floats) -> Floats:
         """Return the input of the first layer, with encoded people."""
-        if not self._crowd:
+        if not self._set_layers:
             return obs
         blocks = obs[:, PEOPLE_SET.first :].reshape(-1, PEOPLE_SET.n_people, PEOPLE_SET.n_block)
-        found = _hidden(blocks, self._crowd) * blocks[:, :, :1]
+        found = _hidden(blocks, self._set_layers) * blocks[:, :, :1]
         return np.concatenate([obs[:, : PEOPLE_SET.first], found.max(axis=1)], axis=1)
 
 

@@ -23,11 +23,11 @@ BASE_WEIGHT = 0.9
 """Factor on the nominal action, which keeps atanh finite."""
 FIRST_RESIDUAL = 0.05
 """Factor on the initial weights of the actor's last layer."""
-CROWD_WIDTH = 64
+SET_WIDTH = 64
 """Number of features of the set encoding."""
 
 
-class CrowdShape(NamedTuple):
+class PeopleSetShape(NamedTuple):
     """Position of the people set in an observation (``reach/kernels/people_set.py``)."""
 
     first: int
@@ -49,8 +49,8 @@ class ResidualFading(NamedTuple):
     """Distance beyond which the base motion acts alone."""
 
 
-class CrowdEncoder(nn.Module):
-    """Set encoding: replaces the blocks of all people in an observation by CROWD_WIDTH numbers.
+class PeopleSetEncoder(nn.Module):
+    """Set encoding: replaces the blocks of all people in an observation by SET_WIDTH numbers.
 
     Each block passes through the same layers; the maximum over present people is invariant to
     their order and number.
@@ -58,13 +58,13 @@ class CrowdEncoder(nn.Module):
     Source: Zaheer et al., *Deep sets* (2017); the maximum as in Qi et al., *PointNet* (2017).
     """
 
-    def __init__(self, shape: CrowdShape) -> None:
+    def __init__(self, shape: PeopleSetShape) -> None:
         super().__init__()
         self._shape = shape
-        self.block = nn.Sequential(*hidden(shape.n_block, CROWD_WIDTH, 2))
+        self.block = nn.Sequential(*hidden(shape.n_block, SET_WIDTH, 2))
 
     def forward(self, rows: torch.Tensor) -> torch.Tensor:
-        """Return observations with encoded people, shape (n, first + CROWD_WIDTH + rest)."""
+        """Return observations with encoded people, shape (n, first + SET_WIDTH + rest)."""
         first, n_people, n_block = self._shape
         last = first + n_people * n_block
         blocks = rows[:, first:last].reshape(-1, n_people, n_block)
@@ -72,11 +72,12 @@ class CrowdEncoder(nn.Module):
         return torch.cat([rows[:, :first], pooled, rows[:, last:]], dim=1)
 
 
-def _seen(crowd: CrowdShape | None, n_obs: int) -> tuple[int, list[nn.Module]]:
+def _first_layer(people_set: PeopleSetShape | None, n_obs: int) -> tuple[int, list[nn.Module]]:
     """Return the input size of the first layer, and the modules before it."""
-    if crowd is None:
+    if people_set is None:
         return n_obs, []
-    return n_obs - crowd.n_people * crowd.n_block + CROWD_WIDTH, [CrowdEncoder(crowd)]
+    n_blocks = people_set.n_people * people_set.n_block
+    return n_obs - n_blocks + SET_WIDTH, [PeopleSetEncoder(people_set)]
 
 
 class ResidualActor(nn.Module):
@@ -88,7 +89,7 @@ class ResidualActor(nn.Module):
         n_act: Length of an action.
         base: Index of the nominal action in an observation.
         layers: Number of hidden layers.
-        crowd: Position of the people set; None without one.
+        people_set: Position of the people set; None without one.
         fade: Fading of the residual away from people; None without one.
     """
 
@@ -99,11 +100,11 @@ class ResidualActor(nn.Module):
         n_act: int = CONTROLLED,
         base: int = BASE_START,
         layers: int = 2,
-        crowd: CrowdShape | None = None,
+        people_set: PeopleSetShape | None = None,
         fade: ResidualFading | None = None,
     ) -> None:
         super().__init__()
-        n_seen, before = _seen(crowd, n_obs)
+        n_seen, before = _first_layer(people_set, n_obs)
         last = nn.Linear(width, n_act)
         with torch.no_grad():
             last.weight.mul_(FIRST_RESIDUAL)
@@ -132,7 +133,7 @@ class PlainActor(nn.Module):
         n_obs: Input size: length of the observation's part that the actor uses.
         n_act: Length of an action.
         layers: Number of hidden layers.
-        crowd: Position of the people set; None without one.
+        people_set: Position of the people set; None without one.
     """
 
     def __init__(
@@ -141,10 +142,10 @@ class PlainActor(nn.Module):
         n_obs: int,
         n_act: int,
         layers: int = 2,
-        crowd: CrowdShape | None = None,
+        people_set: PeopleSetShape | None = None,
     ) -> None:
         super().__init__()
-        n_seen, before = _seen(crowd, n_obs)
+        n_seen, before = _first_layer(people_set, n_obs)
         self.n_obs = n_obs
         self.crowd = nn.Sequential(*before)
         self.net = nn.Sequential(*hidden(n_seen, width, layers), nn.Linear(width, n_act))
@@ -186,7 +187,7 @@ class QNetwork(nn.Sequential):
         layers: Number of hidden layers.
         normed: Whether hidden layers are normalised.
         n_values: Number of values: 1, or quantiles of one.
-        crowd: Position of the people set; None without one.
+        people_set: Position of the people set; None without one.
     """
 
     def __init__(
@@ -197,9 +198,9 @@ class QNetwork(nn.Sequential):
         layers: int = 2,
         normed: bool = True,
         n_values: int = 1,
-        crowd: CrowdShape | None = None,
+        people_set: PeopleSetShape | None = None,
     ) -> None:
-        n_seen, before = _seen(crowd, n_obs)
+        n_seen, before = _first_layer(people_set, n_obs)
         last = hidden(n_seen + n_act, width, layers, normed)
         super().__init__(*before, *last, nn.Linear(width, n_values))
 

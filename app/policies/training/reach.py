@@ -90,7 +90,7 @@ def networks_of(preset: ReachPreset, n_obs: int) -> Networks:
     """Return how actor and critics are made for observations of a length."""
     sizes = preset.networks
     width, layers, normed = sizes.width, sizes.layers, sizes.critic_norm == "layer"
-    crowd = PEOPLE_SET if preset.episode.observation == "people-set" else None
+    people_set = PEOPLE_SET if preset.episode.observation == "people-set" else None
 
     norm = RunningNormalisation(n_obs) if sizes.normalisation == "running" else None
 
@@ -98,16 +98,16 @@ def networks_of(preset: ReachPreset, n_obs: int) -> Networks:
         if sizes.actor == "ddpg":
             return DDPGActor(width, n_obs, N_ACT, layers, norm)
         if sizes.actor == "residual":
-            return ResidualActor(width, n_obs, N_ACT, BASE_START, layers, crowd)
-        return PlainActor(width, n_obs, N_ACT, layers, crowd)
+            return ResidualActor(width, n_obs, N_ACT, BASE_START, layers, people_set)
+        return PlainActor(width, n_obs, N_ACT, layers, people_set)
 
     def critic() -> Critics:
         shape, numbers = (width, n_obs, N_ACT, layers), range(sizes.n_critics)
         if sizes.critic == "ddpg":
             return Critics(*(LateActionQ(*shape, norm) for _ in numbers))
         if sizes.critic == "mean":
-            return Critics(*(QNetwork(*shape, normed, crowd=crowd) for _ in numbers))
-        networks = [QNetwork(*shape, normed, sizes.n_quantiles, crowd) for _ in numbers]
+            return Critics(*(QNetwork(*shape, normed, people_set=people_set) for _ in numbers))
+        networks = [QNetwork(*shape, normed, sizes.n_quantiles, people_set) for _ in numbers]
         return QuantileCritics(*networks, dropped=sizes.dropped_quantiles)
 
     return Networks(actor=actor, critic=critic, width=width, norm=norm)

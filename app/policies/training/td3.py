@@ -1,4 +1,4 @@
-"""The TD3 set-up of the pick and the reach scenario: model, checkpoints and monitored data."""
+"""TD3 trainings of the pick and reach scenarios: model, checkpoints and monitored data."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass

@@ -71,8 +71,8 @@ def clearance(
     """
     robot = arm_kernel.new_robot_pose(arm)
     arm_kernel.place_robot(arm, as_kernel_array(q), robot)
-    crowd = people_geometry_of(people, human_q, cylinders, sizes)
-    to_people, to_cell, to_self = kernel.clearances(arm, people, robot, crowd)
+    geometry = people_geometry_of(people, human_q, cylinders, sizes)
+    to_people, to_cell, to_self = kernel.clearances(arm, people, robot, geometry)
     return Clearance(people_m=to_people, cell_m=to_cell, self_m=to_self)
 
 
@@ -109,21 +109,21 @@ def contact(
     q0, qd0, c, d = path
     robot = arm_kernel.new_robot_pose(arm)
     arm_kernel.place_robot(arm, q0, robot)
-    crowd = people_geometry_of(people, human_q[0], cylinders[0], before)
-    crowd.pelvis_z[:] = crowd.size[:, PELVIS_Z]
-    crowd.q0[:], crowd.cylinders0[:] = human_q[0], cylinders[0]
-    clear = np.array(kernel.clearances(arm, people, robot, crowd))
-    columns0 = crowd.columns.copy()
+    geometry = people_geometry_of(people, human_q[0], cylinders[0], before)
+    geometry.pelvis_z[:] = geometry.size[:, PELVIS_Z]
+    geometry.q0[:], geometry.cylinders0[:] = human_q[0], cylinders[0]
+    clear = np.array(kernel.clearances(arm, people, robot, geometry))
+    columns0 = geometry.columns.copy()
     if after is not None:
-        crowd.size[:] = after
+        geometry.size[:] = after
     q1 = q0 + arm.dt * (qd0 + arm.dt * (c + arm.dt * d))
     motion = kernel.PeriodMotion(
         path, q1, as_kernel_array(human_q[1]), as_kernel_array(cylinders[1])
     )
     kind, x = kernel.sweep(
-        arm, people, motion, robot.columns.copy(), columns0, clear, robot, crowd
+        arm, people, motion, robot.columns.copy(), columns0, clear, robot, geometry
     )
-    link, part, worker, walker = _who(arm, people, kind, robot, crowd)
+    link, part, worker, walker = _who(arm, people, kind, robot, geometry)
     return Contact(
         kind=CONTACT_KINDS[kind],
         clearance_m=float(clear[0]),
@@ -149,9 +149,9 @@ def worker_distances(arm: Arm, people: People, q: Vec, human_q: Vec, sizes: Vec)
         return np.zeros(0)
     robot = arm_kernel.new_robot_pose(arm)
     arm_kernel.place_robot(arm, as_kernel_array(q), robot)
-    crowd = people_geometry_of(people, human_q, NO_CYLINDERS, sizes)
-    capsule_clearances(robot.columns, crowd.columns, crowd.gap)
-    parts = crowd.gap[: n_workers * N_CAPSULES].reshape(n_workers, N_CAPSULES)
+    geometry = people_geometry_of(people, human_q, NO_CYLINDERS, sizes)
+    capsule_clearances(robot.columns, geometry.columns, geometry.gap)
+    parts = geometry.gap[: n_workers * N_CAPSULES].reshape(n_workers, N_CAPSULES)
     return np.asarray(parts.min(axis=1))
 
 
@@ -174,7 +174,7 @@ def pedestrian_distances(arm: Arm, people: People, q: Vec, cylinders: Vec) -> Ve
 
 
 def _who(
-    arm: Arm, people: People, kind: int, robot: arm_kernel.RobotPose, crowd: PeopleGeometry
+    arm: Arm, people: People, kind: int, robot: arm_kernel.RobotPose, geometry: PeopleGeometry
 ) -> tuple[str, str, int | None, int | None]:
     """Return names of the robot capsule and the nearest part, and the worker or walker."""
     names = load_robot_capsules().name
@@ -184,18 +184,18 @@ def _who(
     if kind == kernel.CELL_CONTACT:
         _, link, box = arm_kernel.cell_clearance(arm, robot.columns)
         return names[link], "table" if box < 0 else "obstacle", None, None
-    who = people_kernel.nearest_person(people, robot.columns, crowd)
+    who = people_kernel.nearest_person(people, robot.columns, geometry)
     if who < 0:
         return names[-1], "no-person", None, None
-    if who >= len(crowd.q):
-        walker = who - len(crowd.q)
-        x, y, r = crowd.cylinders[walker]
+    if who >= len(geometry.q):
+        walker = who - len(geometry.q)
+        x, y, r = geometry.cylinders[walker]
         _, link = cylinder_clearance(robot.columns, 0, x, y, r, people.top_z)
         return names[link], "walker", None, walker
     best, link, part = np.inf, 0, 0
     for k in range(len(names)):
-        distances(robot.columns, k, crowd.columns, crowd.gap)
-        near = int(np.argmin(crowd.gap))
-        if crowd.gap[near] < best:
-            best, link, part = float(crowd.gap[near]), k, near
+        distances(robot.columns, k, geometry.columns, geometry.gap)
+        near = int(np.argmin(geometry.gap))
+        if geometry.gap[near] < best:
+            best, link, part = float(geometry.gap[near]), k, near
     return names[link], human.CAPSULE_NAMES[part % N_CAPSULES], part // N_CAPSULES, None

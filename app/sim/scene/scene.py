@@ -244,9 +244,9 @@ def people_geometry_of(
     """
     if len(human_q) * body.N_CAPSULES > shared.columns.shape[1]:  # more than the cell's own
         shared = shared._replace(columns=body.capsule_columns(len(human_q)))
-    crowd = people.new_people_geometry(shared, len(human_q), len(cylinders))
+    geometry = people.new_people_geometry(shared, len(human_q), len(cylinders))
     if sizes is not None:
-        crowd.size[:] = sizes
-    people.place_workers(shared, as_kernel_array(human_q), crowd)
-    crowd.cylinders[:] = cylinders
-    return crowd
+        geometry.size[:] = sizes
+    people.place_workers(shared, as_kernel_array(human_q), geometry)
+    geometry.cylinders[:] = cylinders
+    return geometry

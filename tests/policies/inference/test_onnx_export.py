@@ -54,7 +54,7 @@ def with_people_set() -> Checkpoint:
         "preset": {**shipped["preset"], "episode": episode},
     }
     n_obs = sum(size for _, size in layout)
-    actor = ResidualActor(32, n_obs, N_ACT, BASE_START, crowd=PEOPLE_SET)
+    actor = ResidualActor(32, n_obs, N_ACT, BASE_START, people_set=PEOPLE_SET)
     return pack(manifest, weights_of({"actor": actor}))
 
 

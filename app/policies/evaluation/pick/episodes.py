@@ -251,10 +251,10 @@ class Evaluator:
         found = {}
         for k, e in enumerate(rows):
             if planners[e].note(float(speeds[k])):
-                crowd = people_geometry_of(
+                geometry = people_geometry_of(
                     people, observed.q[k], NO_CYLINDERS, observed.size[k]
                 )
-                found[k] = Shapes(columns=crowd.columns, cylinders=np.zeros((0, 4)))
+                found[k] = Shapes(columns=geometry.columns, cylinders=np.zeros((0, 4)))
         return found
 
     def _without_blocked(

@@ -170,10 +170,10 @@ def _timeouts(batch: PickBatch, run: Episodes) -> dict[str, dict[str, float]]:
     """Return the rates of timeouts with a blocked target and with nobody near."""
     n, state = batch.n_envs, batch.state
     late = np.flatnonzero(run.outcome == TIMEOUT)
-    arm, shared, crowd = batch.arm, batch.world.people, state.people
+    arm, shared, people = batch.arm, batch.world.people, state.people
     blocked = sum(
         min(
-            clearance(arm, shared, q, crowd.q[e], crowd.cylinders[e], crowd.size[e]).people_m
+            clearance(arm, shared, q, people.q[e], people.cylinders[e], people.size[e]).people_m
             for q in (state.q_goal[e], state.q_grasp[e])
         )
         < batch.settings.grasp.start_clearance
