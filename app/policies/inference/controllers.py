@@ -73,14 +73,14 @@ Rows = NDArray[np.int64]
 
 
 class Controller(Protocol):
-    """Chooses actions for a batch."""
+    """Selects the actions of a batch."""
 
     def acts(self, batch: ReachBatch) -> Actions:
         """Return actions in [-1, 1], shape (n_envs, 6); 0 where the episode has ended."""
 
 
 class PolicyQuery(ABC):
-    """A controller that asks a policy, beside all people or beside one of them alone."""
+    """Controller that queries a policy, beside all people or beside one of them alone."""
 
     def acts(self, batch: ReachBatch) -> Actions:
         """Return actions; see :class:`Controller`.
@@ -95,12 +95,12 @@ class PolicyQuery(ABC):
         return act
 
     @abstractmethod
-    def query(self, batch: ReachBatch, rows: Rows, who: int | None) -> Actions:
-        """Return actions, shape (k, 6).
+    def query(self, batch: ReachBatch, rows: Rows, person: int | None) -> Actions:
+        """Return actions in [-1, 1], shape (k, 6).
 
         Args:
-            rows: Numbers of the queried ones, shape (k,).
-            who: Number of the only person; None for all people.
+            rows: Indices of the queried environments, shape (k,).
+            person: Index of the only person that is observed; None for all people.
         """
 
 
@@ -110,10 +110,10 @@ class Direct(PolicyQuery):
     def __init__(self, actor: ReachActor) -> None:
         self._actor = actor
 
-    def query(self, batch: ReachBatch, rows: Rows, who: int | None) -> Actions:
+    def query(self, batch: ReachBatch, rows: Rows, person: int | None) -> Actions:
         """Return actions; see :class:`PolicyQuery`."""
         _require_view(self._actor, batch)
-        obs = batch.observe_goals(rows, batch.state.goal[rows][:, None], who)
+        obs = batch.observe_goals(rows, batch.state.goal[rows][:, None], person)
         return self._actor.acts(obs[:, 0])
 
 
@@ -130,11 +130,11 @@ class Interpolated(PolicyQuery):
     def __init__(self, actor: ReachActor) -> None:
         self._between = Interpolation(actor)
 
-    def query(self, batch: ReachBatch, rows: Rows, who: int | None) -> Actions:
+    def query(self, batch: ReachBatch, rows: Rows, person: int | None) -> Actions:
         """Return actions; see :class:`PolicyQuery`."""
         _require_view(self._between.actor, batch)
         mix, places = self._between.around(batch.state.goal[rows], "goals")
-        return self._between.acts(batch.observe_goals(rows, places, who), mix)
+        return self._between.acts(batch.observe_goals(rows, places, person), mix)
 
 
 class DistanceWeighted(PolicyQuery):
@@ -146,33 +146,40 @@ class DistanceWeighted(PolicyQuery):
     def __init__(self, query: PolicyQuery) -> None:
         self._query = query
 
-    def query(self, batch: ReachBatch, rows: Rows, who: int | None) -> Actions:
+    def query(self, batch: ReachBatch, rows: Rows, person: int | None) -> Actions:
         """Return actions; see :class:`PolicyQuery`."""
-        if who is not None or batch.n_people < 2:
-            return self._query.query(batch, rows, who)
+        if person is not None or batch.n_people < 2:
+            return self._query.query(batch, rows, person)
         weights = person_weights(batch.person_distances(rows))
         mean = np.zeros((len(rows), 6))
-        for person in range(batch.n_people):
-            mean += weights[:, person, None] * self._query.query(batch, rows, person)
+        for k in range(batch.n_people):
+            mean += weights[:, k, None] * self._query.query(batch, rows, k)
         return mean.astype(np.float32)
 
 
 class RolloutController:
     """Rollout policy improvement of another controller.
 
+    Args:
+        base: Controller whose actions are improved.
+        actor: Policy that is simulated.
+        constraint: Separation that the safety layer requires.
+
     Raises:
         InvalidInput: The policy cannot be simulated by the kernels.
     """
 
     def __init__(
-        self, base: Controller, actor: ReachActor, layer: SsmConstraint = NO_CONSTRAINT
+        self, base: Controller, actor: ReachActor, constraint: SsmConstraint = NO_CONSTRAINT
     ) -> None:
-        self._base, self._improvement, self.layer = base, RolloutImprovement(actor), layer
+        self._base, self._improvement = base, RolloutImprovement(actor)
+        self.constraint = constraint
+        """Separation that the safety layer requires."""
 
     def acts(self, batch: ReachBatch) -> Actions:
         """Return actions; see :class:`Controller`."""
         act = self._base.acts(batch)
-        self._improvement.constraint = self.layer
+        self._improvement.constraint = self.constraint
         self._improvement.improve(batch, act)
         return act
 

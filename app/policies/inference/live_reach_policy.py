@@ -1,4 +1,4 @@
-"""A reach policy in the live cell, with all its inference modes."""
+"""Reach policy of a live cell, with all its inference modes."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,8 @@ from app.sim.safety.layer import SafetySettings
 class TrainedReachPolicy:
     """One policy and its controllers by inference mode; for one thread at a time.
 
-    Its other attributes are those of the policy.
+    Args:
+        actor: The policy, whose identity and training goals are attributes.
     """
 
     def __init__(self, actor: ReachActor) -> None:
@@ -44,5 +45,5 @@ class TrainedReachPolicy:
         """
         controller = self._controllers[inference_mode]
         if isinstance(controller, RolloutController):
-            controller.layer = ssm_constraint_of(safety, batch.arm.dt)
+            controller.constraint = ssm_constraint_of(safety, batch.arm.dt)
         return controller.acts(batch)

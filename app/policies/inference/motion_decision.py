@@ -85,8 +85,8 @@ class MotionDecider:
         self._advance: Callable[..., bool] | None = None
         self._limits = StateLimits(self.arm, limits_jerk=actor.action.degree == 3)
         self._trained = TrainedValues(actor.trained_range)
-        self._stages: dict[tuple[int, int], QueryState] = {}
-        self._last: dict[tuple[int, int], QueryState] = {}
+        self._states: dict[tuple[int, int], QueryState] = {}
+        self._last_observed: dict[tuple[int, int], QueryState] = {}
         self._improvements: dict[QueryState, RolloutImprovement] = {}
         self._layer = SafetyLayer(self.arm, SafetySettings())
         self._busy = threading.Lock()
@@ -114,28 +114,29 @@ class MotionDecider:
         order = _bodies_first(people)
         known, viewed = [people[i] for i in order], [known_people[i] for i in order]
         with self._busy:
-            stage = self._stage(known, self._stages)
+            query_state = self._state_of(known, self._states)
             time_left = min(max(0.0, query.time_left_s), HORIZON_S)
-            stage.load(robot.measured, known, time_left)
-            apart, clearance = stage.distances.tolist(), stage.clear.tolist()
+            query_state.load(robot.measured, known, time_left)
+            separations, clearance = query_state.distances.tolist(), query_state.clear.tolist()
             point, monitors = goal.tolist(), query.safety is not None
-            distance = math.dist(stage.tcp.tolist(), point)
-            shapes = stage.shapes if monitors else None
+            distance = math.dist(query_state.tcp.tolist(), point)
+            shapes = query_state.shapes if monitors else None
             if not monitors:
-                _require_apart(apart, order)
+                _require_no_overlap(separations, order)
             # Distances and monitoring use measured people, the policy clipped ones.
             if robot.outside or any(a is not b for a, b in zip(known, viewed, strict=True)):
-                stage.load(robot.clamped, viewed, time_left)
-            nearest = int(stage.distances.argmin()) if order else None
-            act, targets, weights, seen = self._act(stage, query, goal, mode)
-            candidate = self._improve(stage, query, goal, act) if rollout else None
+                query_state.load(robot.clamped, viewed, time_left)
+            nearest = int(query_state.distances.argmin()) if order else None
+            act, targets, weights, observed = self._act(query_state, query, goal, mode)
+            candidate = self._improve(query_state, query, goal, act) if rollout else None
             segment, unfeasible = self._segment(robot, act)
             last = self._observed(query.observed, robot) or (shapes, order)
             safe, terms_of, terms = self._monitored(query, robot, segment, *last)
             state = np.concatenate((robot.clamped.q, robot.clamped.qd, goal))
-            outside = self._trained.outside(state, as_given(seen, known, viewed), order)
+            outside = self._trained.outside(state, as_given(observed, known, viewed), order)
         people_weights = [
-            PersonWeight(separation=d, weight=w) for d, w in zip(apart, weights, strict=True)
+            PersonWeight(separation=d, weight=w)
+            for d, w in zip(separations, weights, strict=True)
         ]
         place = sorted(range(len(order)), key=order.__getitem__)
         return MotionDecision(
@@ -168,14 +169,14 @@ class MotionDecider:
             person_from_cylinder(-1.5, 2.0, 0.0, 0.0, 0.3),
         )
         qdd = np.zeros(6)
-        for seen in ((), people[:1], people[1:]):
+        for beside in ((), people[:1], people[1:]):
             self.decide(
                 MotionQuery(
                     q=q,
                     qd=np.zeros(6),
                     qdd=qdd,
                     goal=goal,
-                    people=seen,
+                    people=beside,
                     safety=SafetySettings(),
                 )
             )
@@ -215,18 +216,18 @@ class MotionDecider:
         return self._can_roll_out if asked is None else asked
 
     def _improve(
-        self, stage: QueryState, query: MotionQuery, goal: Vec, act: Vec
+        self, query_state: QueryState, query: MotionQuery, goal: Vec, act: Vec
     ) -> str | None:
         """Improve an action in place by rollouts; return the candidate, None for the policy."""
-        if stage not in self._improvements:
-            self._improvements[stage] = RolloutImprovement(self.actor)
-        improvement = self._improvements[stage]
+        if query_state not in self._improvements:
+            self._improvements[query_state] = RolloutImprovement(self.actor)
+        improvement = self._improvements[query_state]
         improvement.forget()
         improvement.constraint = ssm_constraint_of(query.safety, self.arm.dt, query.age_s)
-        state = stage.state
+        state = query_state.state
         state.goal[0], state.elapsed[0] = goal, query.elapsed_s
         improved = act[None].astype(np.float32)
-        chosen = int(improvement.improve(stage, improved)[0])
+        chosen = int(improvement.improve(query_state, improved)[0])
         if chosen == POLICY:
             return None
         act[:] = improved[0]
@@ -235,60 +236,69 @@ class MotionDecider:
     def _observed(
         self, observed: Sequence[Person] | None, robot: MeasuredState
     ) -> tuple[Shapes, list[int]] | None:
-        """Return people as last observed, bodies first, and their places; None if not given."""
+        """Return people as last observed, bodies first, and their indices; None: not given."""
         if observed is None:
             return None
         people = checked_people(observed)
         places = _bodies_first(people)
         last = [people[i] for i in places]
-        stage = self._stage(last, self._last)
-        stage.load(robot.measured, last, 0.0)
-        return stage.shapes, places
+        query_state = self._state_of(last, self._last_observed)
+        query_state.load(robot.measured, last, 0.0)
+        return query_state.shapes, places
 
-    def _stage(
-        self, people: Sequence[Person], stages: dict[tuple[int, int], QueryState]
+    def _state_of(
+        self, people: Sequence[Person], states: dict[tuple[int, int], QueryState]
     ) -> QueryState:
         n_bodies = sum(person.cylinder is None for person in people)
         kinds = (n_bodies, len(people) - n_bodies)
-        if kinds not in stages:
-            stages[kinds] = QueryState(self.cell, *kinds, self.actor.view)
-        return stages[kinds]
+        if kinds not in states:
+            states[kinds] = QueryState(self.cell, *kinds, self.actor.view)
+        return states[kinds]
 
     def _act(
-        self, stage: QueryState, query: MotionQuery, goal: Vec, mode: MotionMode
+        self, query_state: QueryState, query: MotionQuery, goal: Vec, mode: MotionMode
     ) -> tuple[Vec, tuple[TargetWeight, ...], list[float], list[PersonValues]]:
-        """Return action, targets, weights of the people, and the observed people."""
-        apart = stage.distances
-        nearest = int(apart.argmin()) if len(apart) else None
+        """Return action, targets, weights of the people, and the observed people.
+
+        Args:
+            query_state: State with the people of the query.
+            goal: Goal of the tcp [m], shape (3,).
+
+        Returns:
+            Action in [-1, 1], shape (6,); targets interpolated between, with weights; weight of
+            each person; and index and observed values of each observed person.
+        """
+        separations = query_state.distances
+        nearest = int(separations.argmin()) if len(separations) else None
         places, shares = goal[None], _WHOLE
         if mode == "interpolated":
             assert self._between is not None
             mix, around = self._between.around(goal[None])
             used = mix.weights[0] > 0.0
             places, shares = around[0][used], mix.weights[0][used]
-        weights = [float(who == nearest) for who in range(len(apart))]
-        if query.person_weighting == "distance-weighted" and len(apart) > 1:
+        weights = [float(person == nearest) for person in range(len(separations))]
+        if query.person_weighting == "distance-weighted" and len(separations) > 1:
             # The nearest first: rounding depends on the place in the batch.
-            counts = person_weights(apart[None])[0]
-            first, weights = apart.argsort(), counts.tolist()
-            obs = np.empty((len(first), len(places), stage.obs_size), dtype=np.float32)
-            seen: list[PersonValues] = []
-            for row, who in enumerate(first.tolist()):
-                obs[row] = stage.observe(places, who)
-                seen.append((who, stage.observed.copy()))
-            seen.sort(key=lambda one: one[0] or 0)
-            acts = self.actor.acts(obs.reshape(-1, stage.obs_size))
+            counts = person_weights(separations[None])[0]
+            first, weights = separations.argsort(), counts.tolist()
+            obs = np.empty((len(first), len(places), query_state.obs_size), dtype=np.float32)
+            observed: list[PersonValues] = []
+            for row, person in enumerate(first.tolist()):
+                obs[row] = query_state.observe(places, person)
+                observed.append((person, query_state.observed.copy()))
+            observed.sort(key=lambda one: one[0] or 0)
+            acts = self.actor.acts(obs.reshape(-1, query_state.obs_size))
             shares_of_acts = np.outer(counts[first], shares).ravel()
         else:
-            acts = self.actor.acts(stage.observe(places))
-            seen, shares_of_acts = [(nearest, stage.observed.copy())], shares
+            acts = self.actor.acts(query_state.observe(places))
+            observed, shares_of_acts = [(nearest, query_state.observed.copy())], shares
         targets: tuple[TargetWeight, ...] = ()
         if mode == "interpolated":
             targets = tuple(
                 TargetWeight(position=(x, y, z), weight=w)
                 for (x, y, z), w in zip(places.tolist(), shares.tolist(), strict=True)
             )
-        return shares_of_acts @ acts.astype(np.float64), targets, weights, seen
+        return shares_of_acts @ acts.astype(np.float64), targets, weights, observed
 
     def _segment(self, robot: MeasuredState, act: Vec) -> tuple[TrajectorySegment, bool]:
         """Return the commanded segment, and whether a joint had no admissible coefficient."""
@@ -330,16 +340,16 @@ def _bodies_first(people: Sequence[Person]) -> list[int]:
     return sorted(range(len(people)), key=lambda i: people[i].cylinder is not None)
 
 
-def _require_apart(apart: Sequence[float], order: Sequence[int]) -> None:
+def _require_no_overlap(separations: Sequence[float], order: Sequence[int]) -> None:
     """Check that no person overlaps the robot.
 
     Raises:
         InvalidInput: A person overlaps the robot.
     """
-    for who, distance in zip(order, apart, strict=True):
+    for index, distance in zip(order, separations, strict=True):
         if distance <= 0.0:
             rule = (
                 "is the distance to the robot in m: this person is inside it; with `safety` "
                 "the answer would be a stop"
             )
-            raise InvalidInput(f"people[{who}]", round(distance, 4), rule)
+            raise InvalidInput(f"people[{index}]", round(distance, 4), rule)

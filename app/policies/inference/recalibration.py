@@ -1,10 +1,10 @@
 """Recalibration of the outcome probabilities of a policy by outcomes observed in one cell.
 
-An observation does not tell what kind of people work in a cell, so that probabilities fitted to
-a mixture of people are off beside each kind by itself. A slope of the log-probabilities and an
+An observation does not reveal what kind of people work in a cell, so that probabilities fitted
+to a mixture of people are biased beside each kind. A slope of the log-probabilities and an
 offset of each outcome are fitted to predictions whose outcome is known. They become part of the
-last layers of the checkpoint's ensemble: a recalibrated policy acts and values as before, and
-nothing that uses it has to know.
+last layers of the checkpoint's ensemble: actions and values of a recalibrated policy are the
+same, and code that uses it does not change.
 
 Source: Guo et al., *On calibration of modern neural networks* (2017); Alexandari et al.,
 *Maximum likelihood with bias-corrected calibration* (2020). Deviates: normal priors around no
@@ -87,7 +87,7 @@ def recalibrated(
 
     Args:
         checkpoint: The policy that made the predictions.
-        probability: What it predicted, shape (n, 3), for picks that were then carried out.
+        probability: Its predictions for picks that were then executed, shape (n, 3).
         outcome: Index of the outcome of each in ``OUTCOMES``, shape (n,).
 
     Raises:

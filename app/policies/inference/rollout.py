@@ -1,8 +1,7 @@
 """Rollout policy improvement of a trained reach policy.
 
-``app/sim/reach/rollout/kernels/improvement.py`` simulates the candidates; here it is applied
-to a policy and a
-batch of environments, or to one queried state.
+``app/sim/reach/rollout/kernels/improvement.py`` simulates the candidates; this module applies
+it to a policy and a batch of environments, or to one queried state.
 """
 
 from collections.abc import Callable
@@ -27,7 +26,7 @@ from app.sim.safety.layer import SafetySettings
 from app.sim.scenario.kernels.episode import EpisodeState
 
 POLICY = candidates.POLICY
-"""In place of the number of a candidate: the policy's own action."""
+"""Index in place of a candidate's: the policy's own action."""
 _LETTERS = {1.0: "f", -1.0: "b", 0.0: "h"}
 CANDIDATES = (
     *(
@@ -59,8 +58,8 @@ class SsmConstraint(NamedTuple):
 
 
 NO_CONSTRAINT = SsmConstraint(0.0, 0.0)
-"""No layer, or one that assumes that people may come from anywhere: then their predicted motion
-does not tell where the layer would stop the robot."""
+"""No layer, or one in worst-case mode, in which the predicted motion of people does not
+determine where the layer stops the robot."""
 SPARE_DISTANCE = 0.04
 """Distance added for the stopping of a moving robot [m]. With 0.02 m instead, the time to goal
 fell from 4.29 to 4.20 s and the share of runs without a stop from 60 to 43 % (first 100
@@ -137,7 +136,7 @@ class RolloutImprovement:
             act: The policy's actions, shape (n_envs, 6); changed.
 
         Returns:
-            Number of the selected candidate in ``CANDIDATES``, or POLICY, shape (n_envs,).
+            Index of the selected candidate in ``CANDIDATES``, or POLICY, shape (n_envs,).
         """
         world, state, chosen = envs.world, envs.state, np.empty(len(act), dtype=np.int64)
         if self._work is None or self._envs is not envs:

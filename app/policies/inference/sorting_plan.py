@@ -1,10 +1,10 @@
 """Next move of a sorting task together with its motion (docs/method.md 3.1).
 
-The exact planner gives the moves that it expects to take about as many attempts as its own. The
-pick policy values the motion to each of their objects in the present state, and the motion with
-an object to its place from the configuration over the object, with the people as they are now.
-The move is chosen by both under the objective of task selection. A held object goes to a place
-of such a move, or back to where it was picked where it has none.
+The exact planner gives the near-optimal moves. For each of them the pick policy values the
+motion to the object from the present state, and the motion with the object to its place from
+the configuration over the object, with the people as they are now. The move is selected by both
+values under the objective of task selection. A held object is brought to the place of a
+near-optimal move, or back to where it was picked if there is none.
 
 Source: ours; the thesis leaves the critic's values for the symbolic choice to future work.
 """
@@ -143,8 +143,8 @@ class SortingPlanner:
         """Choose the next move and its motion.
 
         Raises:
-            InvalidInput: The goal cannot be met, no move can be reached, or a value that no
-                answer can be given for.
+            InvalidInput: The goal cannot be met, no move can be reached, or a value of the
+                query is invalid.
         """
         started, held = time.perf_counter(), query.held
         near = near_optimal_moves(query.state, self._names.shape, query.margin)
@@ -232,7 +232,7 @@ class SortingPlanner:
     def _present(
         self, query: PlanQuery, near: NearOptimalMoves
     ) -> tuple[Decision, dict[int, MotionEstimate]]:
-        """Return the policy's decision about the present motion, and each end's estimate."""
+        """Return the policy's decision about the present motion, and the estimate by place."""
         held, targets = query.held is not None, dict[int, Vec]()
         for move in near.moves:
             end = self._ends(query.state, move)[int(held)]
@@ -250,7 +250,7 @@ class SortingPlanner:
         return decision, _estimates(decision, targets)
 
     def _later(self, query: PlanQuery, near: NearOptimalMoves) -> dict[Move, MotionEstimate]:
-        """Return the estimate of each move's motion with its object, which begins over it."""
+        """Return the estimate of each move's motion with its object, from over the object."""
         found: dict[Move, MotionEstimate] = {}
         for pick in dict.fromkeys(move.pick for move in near.moves):
             moves = near.of(pick).moves
@@ -319,7 +319,7 @@ def reason(plan: SortingPlan, objective: Objective) -> str:
 
 
 def score_of(option: PlanOption, objective: Objective) -> float:
-    """Return what an objective maximises, over the motions that a move still needs.
+    """Return the score that an objective maximises, over the motions that a move still needs.
 
     Values add up, probabilities of success multiply; times add up and count per success, as
     negative numbers.
