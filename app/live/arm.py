@@ -55,7 +55,7 @@ class LiveArm:
     """State of the robot: joint positions, speeds and accelerations.
 
     Args:
-        action: Interpretation of the actions of its policy.
+        action: Meaning of the actions of its policy.
     """
 
     def __init__(self, cell: Cell, action: ActionSettings) -> None:
@@ -92,7 +92,13 @@ class LiveArm:
         return self._test(rest, rest, rest, here, here).kind != "none"
 
     def segment(self, act: Vec, *, straight: bool = False) -> TrajectorySegment:
-        """Return the trajectory segment of an action in the next period."""
+        """Return the trajectory segment of an action in the next period.
+
+        Args:
+            act: Action in [-1, 1], shape (5,) or (6,).
+            straight: Whether the action is a share of the joint speeds, whatever the policy's
+                actions mean.
+        """
         rule = pick.DEFAULT_ACTION if straight else self.action
         return pick.step_robot(self.arm, self.q, self.qd, self.qdd, act, rule)
 
@@ -126,10 +132,10 @@ class LiveArm:
         here = people.geometry
         columns = body.capsule_columns(len(here.q))
         shared = self._people._replace(columns=columns)
-        crowd = people_geometry_of(shared, here.q, here.cylinders, here.sizes)
+        geometry = people_geometry_of(shared, here.q, here.cylinders, here.sizes)
         top = np.full((len(here.cylinders), 1), self._people.top_z)
         return Shapes(
-            columns=crowd.columns,
+            columns=geometry.columns,
             cylinders=np.hstack([here.cylinders, top]),
             going=here.velocities,
         )
@@ -177,5 +183,5 @@ class LiveArm:
         return ToolState(self.tcp(), tilt, speed, clearance)
 
     def reached(self, point: Vec) -> bool:
-        """Return whether the tool is at a point [m], vertical and slow (pick scenario)."""
+        """Return whether the tool is at a point [m], shape (3,), vertical and slow."""
         return pick.tool_state(self.arm, self.q, self.qd, point)[3]

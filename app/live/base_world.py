@@ -318,7 +318,7 @@ class BaseWorld(ABC, Generic[P]):
             decision = self.policy.decide(
                 self.robot.q,
                 self.robot.qd,
-                [person.seen() for person in self.people],
+                [person.as_observed() for person in self.people],
                 offered,
                 previous=self.previous,
                 progress=self.progress,

@@ -25,7 +25,7 @@ class RestingPeopleControl:
         self.reset()
 
     def reset(self) -> None:
-        """Forget for how long people have been at rest."""
+        """Set the time for which people have been at rest to zero."""
         self._planner = RestingPeoplePlanner(self._robot.arm)
         self._rested = False
         self.act: Vec | None = None
@@ -54,7 +54,7 @@ class RestingPeopleControl:
         Args:
             people: The people in the cell.
             policy: The policy that chooses.
-            candidates: What is to be done.
+            candidates: The stations that the robot may choose.
             begun: The candidate whose pick has begun; it stays.
         """
         if not self._rested or policy is None or len(candidates) < 2:
@@ -80,11 +80,11 @@ class RestingPeopleControl:
         Args:
             people: The people in the cell; without any the policy acts.
             policy: The policy in whose place the planner acts where it picks objects up.
-            decision: Its last decision; None: the robot pursues nothing, or the policy acts.
+            decision: Its last decision; None: no target, or the policy acts.
             offered: The candidates of this decision.
             phase: Phase of the pick.
         """
-        speeds = [float(np.abs(one.seen().qd).max()) for one in people]
+        speeds = [float(np.abs(one.as_observed().qd).max()) for one in people]
         self._rested, self.act = self._planner.note(max(speeds, default=np.inf)), None
         self._rested &= policy is not None and policy.grasp.depth > 0.0
         if not self._rested or policy is None or decision is None:

@@ -69,7 +69,7 @@ class CandidateSnapshot(ReadModel):
 def candidate_snapshots(
     offered: Sequence[Candidate], decision: Decision | None
 ) -> tuple[CandidateSnapshot, ...]:
-    """Return the stations that are offered, with what the decision says of them."""
+    """Return the offered stations, with values and outcomes of the decision."""
     snapshots = []
     for k, candidate in enumerate(offered):
         outcome = None if decision is None else decision.outcome(k)
@@ -251,7 +251,7 @@ class WorldSnapshot(ReadModel):
     refused: Annotated[tuple[RefusedCommand, ...], Field(max_length=MAX_REFUSED)] = ()
     """newest commands that were refused after they had been queued, oldest first"""
     status: Status
-    """what the robot does"""
+    """activity of the robot"""
     message: str
     """the reason, in one sentence"""
     gripping: bool = False

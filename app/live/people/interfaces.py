@@ -1,4 +1,4 @@
-"""What a live world asks of its people."""
+"""Interfaces of the people of a live world."""
 
 from collections.abc import Iterator
 from typing import Protocol
@@ -16,7 +16,7 @@ class PersonLike(Protocol):
     def id(self) -> int:
         """Number of the person."""
 
-    def seen(self) -> Person:
+    def as_observed(self) -> Person:
         """Return the person as observed by a policy."""
 
     def drag(self, command: commands.MovePerson) -> None:

@@ -266,7 +266,7 @@ class LivePedestrian:
         self.yaw = math.atan2(self.row[COURSE_Y], self.row[COURSE_X])
         self._aim = self.row[[X, Y]].copy()
 
-    def seen(self) -> Person:
+    def as_observed(self) -> Person:
         """Return the person as observed by a policy."""
         x, y, vx, vy, r = (float(self.row[i]) for i in (X, Y, VX, VY, R))
         return person_from_cylinder(x, y, vx, vy, r)

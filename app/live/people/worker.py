@@ -70,7 +70,7 @@ class LiveWorker:
         """Present body lengths [m], shape (12,)."""
         return self.body.size
 
-    def seen(self) -> Person:
+    def as_observed(self) -> Person:
         """Return the person as observed by a policy, inside the joint limits.
 
         The yaw is within half a turn of the home yaw.
@@ -224,14 +224,14 @@ class LiveWorker:
             clearance_m: Distance to the robot [m].
             nearest: Whether this is the person nearest to the robot.
         """
-        seen = self.seen()
+        observed = self.as_observed()
         played = self._played if self.mode == "recorded" else None
         return PersonSnapshot(
             id=self.id,
             mode=self.mode,
-            q=frozen(seen.q),
+            q=frozen(observed.q),
             posture=frozen(self._limbs.q),
-            qd=frozen(seen.qd),
+            qd=frozen(observed.qd),
             size=frozen(self.size),
             anthropometry=self.body.snapshot(),
             motion=None if played is None else played.snapshot(self._t),

@@ -24,7 +24,7 @@ GRID = PersonGrid(x=np.linspace(-0.95, 0.95, 28), y=np.linspace(0.55, 1.95, 21))
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RiskQuery:
-    """State for which a map is computed; never changed after it was made."""
+    """State for which a map is computed; immutable."""
 
     policy: TaskPolicy
     """Policy."""
@@ -37,7 +37,7 @@ class RiskQuery:
     offered: tuple[Candidate, ...]
     """The candidates."""
     terms: ChoiceTerms
-    """What the choices depend on beside the state."""
+    """Previous choice, progress, time left and objective of the choices."""
 
     def answer(self) -> RiskMap:
         """Return the map over ``GRID``."""
@@ -49,7 +49,7 @@ class RiskQuery:
 
 
 class RiskWorker:
-    """Computes one map at a time, and at most two a second."""
+    """Computes one map at a time, at most two per second."""
 
     def __init__(self) -> None:
         self._pool = ThreadPoolExecutor(1, thread_name_prefix="risk-map")
@@ -59,7 +59,7 @@ class RiskWorker:
         """The last finished map."""
 
     def offer(self, query: Callable[[], RiskQuery | None]) -> None:
-        """Take a finished map in, and start the next one if it is due; does not wait.
+        """Store a finished map, and start the next one if it is due; does not wait.
 
         Args:
             query: Returns the state; called only if a map is due. None: there is no map.

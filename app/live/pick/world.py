@@ -226,7 +226,7 @@ class LivePickWorld(BaseWorld[LiveWorkers]):
 
     def risk_query(self) -> RiskQuery | None:
         """Return the present state for a risk map; None without a decision or a person."""
-        people = [person.seen() for person in self.people]
+        people = [person.as_observed() for person in self.people]
         if self.policy is None or self.decision is None or not people:
             return None
         return RiskQuery(

@@ -1,6 +1,6 @@
 """The live reach world.
 
-commands     Commands to a live reach cell; see ``commands.py``
+commands     Commands to a live reach cell; see ``app/live/commands.py``
 controller   Controller of a live reach cell: a reach policy, or straight motion in joint space
 explanation  Status messages of a live reach cell, one sentence each
 goal         Goal of a live reach cell: position and choice of the next one

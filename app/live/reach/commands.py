@@ -1,4 +1,4 @@
-"""Commands to a live reach cell; see ``commands.py``."""
+"""Commands to a live reach cell; see ``app/live/commands.py``."""
 
 from typing import Annotated, Literal
 

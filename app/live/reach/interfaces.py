@@ -1,15 +1,13 @@
 """Interface of policies of a live reach cell; ``app.policies`` implements it."""
 
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from app.sim.reach.batch import ReachBatch
 from app.sim.reach.reach_actor import ReachPolicyInfo
-
-if TYPE_CHECKING:  # the batch needs the ports first
-    from app.sim.reach.batch import ReachBatch
-    from app.sim.safety.layer import SafetySettings
+from app.sim.safety.layer import SafetySettings
 
 
 class LiveReachPolicy(ReachPolicyInfo, Protocol):
@@ -20,7 +18,7 @@ class LiveReachPolicy(ReachPolicyInfo, Protocol):
         """Available inference modes, ``direct`` among them."""
 
     def acts(
-        self, batch: "ReachBatch", inference_mode: str, safety: "SafetySettings | None"
+        self, batch: ReachBatch, inference_mode: str, safety: SafetySettings | None
     ) -> NDArray[np.float32]:
         """Return the actions for every environment of a batch, shape (n_envs, 6).
 

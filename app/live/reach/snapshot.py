@@ -19,7 +19,7 @@ class ReachCounters(ReadModel):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReachSnapshot(ReadModel):
-    """Goal, safety layer and outcomes at one tick."""
+    """Goal, inference mode and outcomes at one tick."""
 
     goal: Numbers
     """target of the tool centre point [m]"""

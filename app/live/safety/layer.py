@@ -1,8 +1,8 @@
 """Safety layer of a live world: settings, planned motion, times.
 
-Between two control periods the layer decides how the motion that policy or inverse kinematics
-wants is executed in the next period (docs/method.md 2.7). It is enabled at the start, with the
-settings of the cell. Disabled, it still states the override that it would set.
+Between two control periods the layer decides how the motion of policy or inverse kinematics is
+executed in the next period (docs/method.md 2.7). It is enabled at the start, with the
+settings of the cell. If disabled, it states the override without applying it.
 """
 
 from collections.abc import Sequence

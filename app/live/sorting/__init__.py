@@ -1,7 +1,7 @@
 """The live sorting world.
 
 benchmark_run      Start of a live sorting task: a random one, or one of the six tests
-commands           Commands to a live sorting cell; see ``commands.py``
+commands           Commands to a live sorting cell; see ``app/live/commands.py``
 controller         Choice of moves in a live sorting cell: by the monitored sorting policy, or
                    by the planner
 explanation        Status messages of a live sorting cell, one sentence each

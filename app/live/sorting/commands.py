@@ -1,4 +1,4 @@
-"""Commands to a live sorting cell; see ``commands.py``.
+"""Commands to a live sorting cell; see ``app/live/commands.py``.
 
 Blocks, goal and sorting policy change while the robot works, without a reset. Colours and sizes
 are words, places are station ids.

@@ -58,7 +58,7 @@ class FclPick:
         # Base and shoulder stand on the table.
         self._moving = _manager(self._bodies[2:])
         self._all = _manager(self._bodies)
-        self._crowd = _manager(self._person)
+        self._set_layers = _manager(self._person)
         self._tick = 0
         self.n_ends = 0
         self.reset()
@@ -94,7 +94,11 @@ class FclPick:
     def clearances(self) -> tuple[float, float, float]:
         """Return the distances to the person, to the table and to itself [m]."""
         to_self = min(fcl.distance(self._bodies[a], self._bodies[b]) for a, b in self._pairs)
-        return _distance(self._all, self._crowd), _distance(self._moving, self._table), to_self
+        return (
+            _distance(self._all, self._set_layers),
+            _distance(self._moving, self._table),
+            to_self,
+        )
 
     def _after(self, act: Array) -> tuple[Array, Array]:
         q_min, q_max, qd_max, acc = self._limits
@@ -118,7 +122,7 @@ class FclPick:
             body.setTransform(fcl.Transform(pose[:3, :3], pose[:3, 3]))
         for body, transform in zip(self._person, self._placed[self._tick], strict=True):
             body.setTransform(transform)
-        for manager in (self._all, self._moving, self._crowd):
+        for manager in (self._all, self._moving, self._set_layers):
             manager.update()
         return np.asarray((poses[-1] @ self._tcp)[:3])
 

@@ -18,7 +18,7 @@ def walkers() -> LivePedestrians:
 
 def test_velocity_tells_where_a_walker_is_one_period_later(walkers: LivePedestrians) -> None:
     for _ in range(400):
-        before = walkers[0].seen()
+        before = walkers[0].as_observed()
         walkers.move(DT)
         moved = (walkers.cylinders[0, :2] - before.cylinder[:2]) / DT
         assert np.allclose(moved, before.qd[:2], atol=1e-9) or np.allclose(
@@ -41,7 +41,7 @@ def test_dragged_person_follows_with_bounded_speed_and_arrives(
     walkers[0].drag(commands.MovePerson(pelvis=(0.5, 1.5, 0.0)))
     for _ in range(300):
         before = walkers.cylinders[0, :2].copy()
-        velocity = walkers[0].seen().qd[:2].copy()
+        velocity = walkers[0].as_observed().qd[:2].copy()
         walkers.move(DT)
         step = walkers.cylinders[0, :2] - before
         assert np.allclose(step, velocity * DT, atol=1e-9)
@@ -77,7 +77,7 @@ def test_all_walk_with_the_speed_that_was_asked_for_and_again_as_they_like(
     walkers.set_speed(1.6)
     walkers.change(commands.AddPerson())
     walkers.move(DT)
-    speeds = [math.hypot(*one.seen().qd[:2]) for one in walkers]
+    speeds = [math.hypot(*one.as_observed().qd[:2]) for one in walkers]
     assert speeds == pytest.approx([1.6, 1.6])
     walkers.set_speed(None)
     assert np.array_equal(walkers.rows[0, 13:21], own[13:21])
@@ -111,7 +111,7 @@ def test_mannequin_turns_where_it_walks(walkers: LivePedestrians) -> None:
     walkers.set_speed(0.5)
     for _ in range(100):
         walkers.move(DT)
-    vx, vy = walkers[0].seen().qd[:2]
+    vx, vy = walkers[0].as_observed().qd[:2]
     if math.hypot(vx, vy) > 0.1:
         turn = math.atan2(vy, vx) - walkers[0].yaw
         assert math.cos(turn) > 0.9
