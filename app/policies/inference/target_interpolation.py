@@ -56,7 +56,7 @@ class Interpolation:
         Raises:
             GoalOutside: A goal lies outside the targets.
         """
-        mix = self.cells.mix(goals, field)
+        mix = self.cells.weights_at(goals, field)
         return mix, self.cells.targets[mix.which]
 
     def acts(self, obs: NDArray[np.float32], mix: InterpolationWeights) -> NDArray[np.float32]:

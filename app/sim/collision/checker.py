@@ -121,7 +121,7 @@ class Checker:
         return Clearance(people_m=people, cell_m=cell, self_m=own)
 
     def edge_free(self, q0: Vec, q1: Vec) -> bool:
-        """Return whether the straight joint motion between two positions [rad] is free."""
+        """Return whether the straight motion from ``q0`` to ``q1`` [rad], (6,), is free."""
         verdict, looked = free.edge_free(self.arm, q0, q1, self._obstacles, self._pose)
         self.n_poses += looked
         return bool(verdict)

@@ -104,7 +104,7 @@ def hull_of(mesh: "trimesh.Trimesh") -> Any:
 
 
 def place_capsule(body: Any, p0: Vec, p1: Vec) -> None:
-    """Place an ``fcl.Capsule`` between two points [m]."""
+    """Place an ``fcl.Capsule`` between two points [m], shape (3,) each."""
     x, y, z = (p1 - p0 if p1[2] >= p0[2] else p0 - p1).tolist()
     length = math.hypot(x, y, z)
     # Quaternion (w, x, y, z) of the shortest turn from z to the axis.
@@ -113,14 +113,14 @@ def place_capsule(body: Any, p0: Vec, p1: Vec) -> None:
 
 
 def make_capsule(radius: float, p0: Vec, p1: Vec) -> Any:
-    """Return a capsule between two points [m] as a placed fcl object."""
+    """Return a capsule with a radius [m] between two points [m], shape (3,), placed in fcl."""
     body = fcl.CollisionObject(fcl.Capsule(radius, float(np.linalg.norm(p1 - p0))))
     place_capsule(body, p0, p1)
     return body
 
 
 def make_box(low: Vec, high: Vec) -> Any:
-    """Return an axis-aligned box between two corners [m] as a placed fcl object."""
+    """Return an axis-aligned box between two corners [m], shape (3,), placed in fcl."""
     transform = fcl.Transform(np.eye(3), 0.5 * (low + high))
     return fcl.CollisionObject(fcl.Box(*(high - low)), transform)
 
@@ -235,12 +235,17 @@ class CollisionReference:
         ]
 
     def self_collision(self, q: Vec) -> bool:
-        """Return whether bodies of the robot that are not neighbours touch at ``q``."""
+        """Return whether links that are not neighbours touch at ``q`` [rad], shape (6,)."""
         self.place_robot(q)
         return any(self.touching(link, body) for link, body, _ in self._self_pairs())
 
     def distance(self, q: Vec, human_q: Vec) -> Distance:
-        """Return the least distance between robot and person [m]; use it with hulls."""
+        """Return the least distance between robot and person [m]; use it with hulls.
+
+        Args:
+            q: Joint positions of the robot [rad], shape (6,).
+            human_q: Joint positions of the person [m, rad], shape (18,).
+        """
         self.place_robot(q)
         self.place_person(human_q)
         best = Distance(value=np.inf, link="", body="")

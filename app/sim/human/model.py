@@ -114,7 +114,12 @@ def rest_posture(x: float, y: float, yaw: float) -> Vec:
 
 
 def arm_lengths(size: Vec, hand: str) -> tuple[float, float]:
-    """Return the lengths of an arm [m]: shoulder to elbow, elbow to palm."""
+    """Return the lengths of an arm [m]: shoulder to elbow, elbow to palm.
+
+    Args:
+        size: Body lengths [m], shape (N_SIZE,).
+        hand: ``"r"`` or ``"l"``.
+    """
     side = 0 if hand == "r" else 1
     fore = size[body.FOREARM_R + side] + size[body.HAND]
     return float(size[body.UPPER_ARM_R + side]), float(fore)

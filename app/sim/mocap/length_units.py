@@ -246,7 +246,13 @@ def _possible_path(pelvis: Vec, dt: float) -> Callable[[float], bool]:
 
 
 def pace(pelvis: Vec, dt: float, share: float) -> float:
-    """Return a percentile of the speeds of a pelvis over 0.1 s [the file's unit/s]."""
+    """Return a percentile of the speeds of a pelvis over 0.1 s [the file's unit/s].
+
+    Args:
+        pelvis: Positions, shape (n, k).
+        dt: Time between two of them [s].
+        share: Percentile, 0 to 100.
+    """
     step = max(1, round(0.1 / dt))
     moved = np.linalg.norm(pelvis[step:] - pelvis[:-step], axis=1) / (step * dt)
     return float(np.percentile(moved, share)) if len(moved) else 0.0

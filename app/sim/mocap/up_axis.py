@@ -110,7 +110,7 @@ def vector(axis: str) -> Vec:
 
 
 def z_up(v: Vec, up: str) -> Vec:
-    """Return vectors rotated so that the direction ``up`` of the file becomes z."""
+    """Return vectors, shape (..., 3), rotated so that ``up`` of the file becomes z."""
     turns = {
         "x": [[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]],
         "y": [[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]],

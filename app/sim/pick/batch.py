@@ -292,7 +292,14 @@ def step_robot(
 
 
 def tool_state(arm: Arm, q: Vec, qd: Vec, goal: Vec) -> tuple[float, float, float, bool]:
-    """Return distance to a target [m], tilt [rad], tcp speed [m/s] and whether it succeeds."""
+    """Return distance to a target [m], tilt [rad], tcp speed [m/s] and whether it is a success.
+
+    Args:
+        arm: From ``scene.arm_of``.
+        q: Joint positions [rad], shape (6,).
+        qd: Joint speeds [rad/s], shape (6,).
+        goal: Target of the tcp [m], shape (3,).
+    """
     pose = arm_kernel.new_robot_pose(arm)
     arm_kernel.place_robot(arm, as_kernel_array(q), pose)
     distance, tilt = distance_to(as_kernel_array(goal), pose), arm_kernel.robot_tilt(pose)

@@ -1,4 +1,4 @@
-"""Variants of the four case studies, enumerated by a rule that asks no policy.
+"""Variants of the four case studies, enumerated by a rule without a policy.
 
 A variant has another start of the robot, goals, hand or stations of the palm than its case, and
 agrees with the description of the case in the numbers below. All such combinations in the cell
@@ -8,12 +8,11 @@ Case 1: the resting palm is beside the nearer goal, both goals are free, and so 
 path to the nearer one. Case 2: the resting hand blocks the nearer goal; the farther one and a
 path to it are free. Case 3: the nearer goal is free, blocked before it can be picked, and free
 at the end, and blocked when the robot can arrive; the farther one is free when that begins.
-Case 4: the nearer goal is free, and
-blocked from before it can be picked to the end; the farther one is free at the end and was
-blocked for a moment at most.
+Case 4: the nearer goal is free, and blocked from before it can be picked to the end; the
+farther one is free at the end and was blocked for at most ``MOMENT_S``.
 
 In case 3 itself the farther goal is not free at the end. Variants with the same property are
-counted by themselves, too: in the others the robot can as well end where it switched to.
+counted by themselves, too: in the others the robot can also end at the goal it switched to.
 
 Source: ours; the cases are those of docs/method.md 3.6.
 """

@@ -1,10 +1,10 @@
 """Planned motion beside people at rest, in place of a pick policy's.
 
-A learned policy is patient beside a person who stands still close to its target: the person
-may set off again. Where all people have been at rest for ``REST_S``, blocked targets are not
+A learned policy waits beside a person who stands still close to its target, because the person
+may move again. Where all people have been at rest for ``REST_S``, blocked targets are not
 offered while another is free, and a motion planner (``planning/replanning.py``) moves the robot
-around the people through the phases of the pick. It brakes where somebody enters its path. As
-soon as somebody moves, the policy acts again.
+around the people through the phases of the pick. It brakes where a person enters its path. As
+soon as a person moves, the policy acts again.
 
 Source: ours; replanning after docs/method.md 2.6.
 """

@@ -55,7 +55,7 @@ joints. ``no-goal``: no posture was given, or none within the limits."""
 SAME = 1e-6
 """Difference below which two lengths, or two positions of a joint, are one [rad]."""
 LAST_LOOK_S = 0.004
-"""Part of the budget kept to look at the path once more [s]; a quarter of it at most."""
+"""Part of the budget reserved for a last check of the path [s]; at most a quarter of it."""
 SHORTEN_SHARE = 0.15
 """Part of the budget kept to shorten the path; RRT-Connect uses the whole remainder."""
 RANGE_RAD = 0.5
@@ -195,7 +195,13 @@ class _Clock:
     def answer(
         self, outcome: str, path: Vec | None = None, goals: Vec | None = None
     ) -> MotionPlan:
-        """Return the plan with the time and poses spent so far."""
+        """Return the plan with the time and poses spent so far.
+
+        Args:
+            outcome: One of OUTCOMES.
+            path: Corners of the path [rad], shape (n, 6); None without one.
+            goals: Goal configurations [rad], shape (k, 6), to name the one that was reached.
+        """
         path = np.zeros((0, 6)) if path is None else path
         goal = -1
         if outcome == "solved" and goals is not None:

@@ -49,7 +49,10 @@ class PathFollower:
         return min(int(self.place / self.timed.dt + 1e-6), self.timed.n_periods)
 
     def locate(self, q: Vec) -> None:
-        """Find the robot's place on the path; it lies at most one period after the last."""
+        """Find the place of joint positions ``q`` [rad], shape (6,), on the path.
+
+        It is at most one period after the last place.
+        """
         at = np.abs(q - self.timed.at(self._expected)[0]).max()
         if at <= ON_PLAN:
             self.place, self.error_rad = self._expected, float(at)

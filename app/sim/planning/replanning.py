@@ -26,7 +26,7 @@ from app.sim.core.arrays import Vec, as_kernel_array
 from app.sim.planning.ompl_planners import MotionPlan, PlanSettings, plan
 from app.sim.planning.path_tracking import PathFollower, straight_stop
 from app.sim.planning.time_parameterization import TimingLimits, stopping_point, time_free_path
-from app.sim.robot.kernels import acceleration_bounds as polynomial
+from app.sim.robot.kernels import acceleration_bounds
 from app.sim.robot.kernels.arm import Arm
 from app.sim.robot.kernels.joints import JointState
 
@@ -118,7 +118,9 @@ class ReplanningExecutor:
             t: Time since the start [s].
         """
         if self.report.n_plans == 0:
-            first = self.ask(people, stopping_point(q, qd, self.limits), self.settings.plan)
+            first = self.plan_from(
+                people, stopping_point(q, qd, self.limits), self.settings.plan
+            )
             self.turn_to(first, q, qd, people)
         if self.path_follower is not None:
             self.path_follower.locate(q)
@@ -126,7 +128,7 @@ class ReplanningExecutor:
         ROLES[self.settings.role](self, q, qd, people, t)
         return self._order(q, qd)
 
-    def ask(self, people: Shapes, start: Vec, settings: PlanSettings) -> MotionPlan:
+    def plan_from(self, people: Shapes, start: Vec, settings: PlanSettings) -> MotionPlan:
         """Plan from a configuration at rest [rad], shape (6,), among the current people."""
         margin = self.settings.margin + EXTRA_MARGIN
         checker = self.checker(people, start, margin)
@@ -136,21 +138,39 @@ class ReplanningExecutor:
         report.n_plans += 1
         return answer
 
-    def again(self, people: Shapes, q: Vec, qd: Vec, t: float) -> None:
-        """Plan from the end of a straight stop from a state; used after the budget."""
+    def replan(self, people: Shapes, q: Vec, qd: Vec, t: float) -> None:
+        """Plan from the end of a straight stop; the plan is used after the budget.
+
+        Args:
+            people: People at this moment.
+            q: Joint positions [rad], shape (6,).
+            qd: Joint speeds [rad/s], shape (6,).
+            t: Time since the start [s].
+        """
         budget = REPLAN_BUDGET_S[self.settings.role]
         later = replace(self.settings.plan, budget_s=budget)
-        answer = self.ask(people, stopping_point(q, qd, self.limits), later)
+        answer = self.plan_from(people, stopping_point(q, qd, self.limits), later)
         if answer.solved:
             self.pending = (t + max(budget, self.arm.dt), answer)
 
     def checker(self, people: Shapes, q: Vec, margin: float) -> Checker:
-        """Return the checker for a margin [m], reduced where the robot at ``q`` is nearer."""
+        """Return the checker for a margin, reduced where the robot is nearer to people.
+
+        Args:
+            people: People at this moment.
+            q: Joint positions [rad], shape (6,).
+            margin: Distance to people [m].
+        """
         clearance = Checker(self.arm, people).clearance(q).people_m
         return Checker(self.arm, people, max(0.0, min(margin, clearance - REDUCTION)))
 
     def is_blocked(self, people: Shapes, q: Vec) -> bool:
-        """Return whether people are nearer to the rest of the path than the margin."""
+        """Return whether people are nearer to the rest of the path than the margin.
+
+        Args:
+            people: People at this moment.
+            q: Joint positions [rad], shape (6,).
+        """
         if self.path_follower is None:
             return True
         checker = self.checker(people, q, self.settings.margin)
@@ -203,56 +223,56 @@ class ReplanningExecutor:
         return path_follower.target_speeds(q, qd, brake=report.state == "braking")
 
 
-def _once(follower: ReplanningExecutor, q: Vec, qd: Vec, people: Shapes, t: float) -> None:
+def _once(executor: ReplanningExecutor, q: Vec, qd: Vec, people: Shapes, t: float) -> None:
     """Keep the path."""
 
 
 def _on_blocked(
-    follower: ReplanningExecutor, q: Vec, qd: Vec, people: Shapes, t: float
+    executor: ReplanningExecutor, q: Vec, qd: Vec, people: Shapes, t: float
 ) -> None:
     """Check the rest of the path; replan if it is blocked."""
-    if follower.report.state == "arrived":
+    if executor.report.state == "arrived":
         return
-    if follower.pending is not None and t >= follower.pending[0] - 1e-9:
-        answer, follower.pending = follower.pending[1], None
-        if follower.blocked or follower.path_follower is None:
-            follower.turn_to(answer, q, qd, people)
-    if t < follower.next_check - 1e-9:
+    if executor.pending is not None and t >= executor.pending[0] - 1e-9:
+        answer, executor.pending = executor.pending[1], None
+        if executor.blocked or executor.path_follower is None:
+            executor.turn_to(answer, q, qd, people)
+    if t < executor.next_check - 1e-9:
         return
-    follower.next_check = t + CHECK_EVERY_S
-    follower.blocked = follower.is_blocked(people, q)
-    if follower.blocked and follower.pending is None:
-        follower.again(people, q, qd, t)
+    executor.next_check = t + CHECK_EVERY_S
+    executor.blocked = executor.is_blocked(people, q)
+    if executor.blocked and executor.pending is None:
+        executor.replan(people, q, qd, t)
 
 
 def _every_cycle(
-    follower: ReplanningExecutor, q: Vec, qd: Vec, people: Shapes, t: float
+    executor: ReplanningExecutor, q: Vec, qd: Vec, people: Shapes, t: float
 ) -> None:
     """Plan for the state after this period; switch to the plan for this one."""
-    if follower.report.state == "arrived":
+    if executor.report.state == "arrived":
         return
-    follower.blocked = follower.is_blocked(people, q)
-    if follower.pending is not None and t >= follower.pending[0] - 1e-9:
-        answer, follower.pending = follower.pending[1], None
+    executor.blocked = executor.is_blocked(people, q)
+    if executor.pending is not None and t >= executor.pending[0] - 1e-9:
+        answer, executor.pending = executor.pending[1], None
         left = math.inf
-        if follower.path_follower is not None and not follower.blocked:
-            left = follower.path_follower.remaining * (1.0 - BETTER_SHARE)
-        follower.turn_to(answer, q, qd, people, left)
-    if follower.pending is None:
-        after_q, after_qd = _after_period(follower, q, qd)
-        follower.again(people, after_q, after_qd, t)
+        if executor.path_follower is not None and not executor.blocked:
+            left = executor.path_follower.remaining * (1.0 - BETTER_SHARE)
+        executor.turn_to(answer, q, qd, people, left)
+    if executor.pending is None:
+        after_q, after_qd = _after_period(executor, q, qd)
+        executor.replan(people, after_q, after_qd, t)
 
 
-def _after_period(follower: ReplanningExecutor, q: Vec, qd: Vec) -> tuple[Vec, Vec]:
+def _after_period(executor: ReplanningExecutor, q: Vec, qd: Vec) -> tuple[Vec, Vec]:
     """Return positions [rad] and speeds [rad/s] after this period without a safety layer."""
-    arm, path_follower = follower.arm, follower.path_follower
+    arm, path_follower = executor.arm, executor.path_follower
     if path_follower is None:
-        wanted = straight_stop(qd, follower.limits)
+        wanted = straight_stop(qd, executor.limits)
     else:
-        wanted = path_follower.target_speeds(q, qd, brake=follower.blocked)
+        wanted = path_follower.target_speeds(q, qd, brake=executor.blocked)
     end = JointState(np.empty(6), np.empty(6), np.empty(6))
     start = JointState(as_kernel_array(q), as_kernel_array(qd), np.zeros(6))
-    polynomial.advance_to_speeds(arm.limits, arm.dt, start, wanted, np.empty(6), end)
+    acceleration_bounds.advance_to_speeds(arm.limits, arm.dt, start, wanted, np.empty(6), end)
     return end.q, end.qd
 
 

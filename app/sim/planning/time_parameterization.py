@@ -57,7 +57,10 @@ class TimedPath:
         return self.n_periods * self.dt
 
     def at(self, t: float) -> tuple[Vec, Vec]:
-        """Return positions [rad] and speeds [rad/s] at time ``t`` [s], held beyond its ends."""
+        """Return positions [rad] and speeds [rad/s] at time ``t`` [s], shape (6,) each.
+
+        They are held beyond the ends.
+        """
         if t >= self.duration:
             return self.q[-1], self.qd[-1]
         k = max(0, int(t / self.dt))
@@ -80,7 +83,10 @@ class TimingLimits:
 
 
 def stop_periods(qd: Vec, limits: TimingLimits) -> int:
-    """Return the periods of a straight stop: all joints slow down evenly and rest together."""
+    """Return the number of periods of a straight stop from speeds [rad/s], shape (6,).
+
+    All joints slow down evenly and come to rest together.
+    """
     return math.ceil(float(np.max(np.abs(qd) / (limits.qdd_max * limits.dt))) - 1e-9)
 
 

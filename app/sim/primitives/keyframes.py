@@ -192,12 +192,18 @@ def _at_station(
 
 
 def is_inside(q: Vec) -> bool:
-    """Return whether no joint is at a limit, where ``solve_hands`` clips."""
+    """Return whether no joint of ``q`` [m, rad], (..., 18), is clipped at a limit."""
     return bool(((q > human.Q_MIN) & (q < human.Q_MAX)).all(axis=-1).all())
 
 
 def is_over_table(cell: Cell, q: Vec, size: Vec) -> bool:
-    """Return whether palms, wrists and elbows are clear of the table."""
+    """Return whether palms, wrists and elbows are clear of the table.
+
+    Args:
+        cell: Work cell.
+        q: Joint positions [m, rad], shape (..., 18).
+        size: Body lengths [m], shape (N_SIZE,).
+    """
     named = human.joint_points(q, size)
     points = np.stack([named[human.POINT_NAMES[i]] for i in _LOW_POINTS])
     return bool((height_over_table(cell, points) >= OVER_TABLE).all())

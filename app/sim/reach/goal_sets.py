@@ -90,7 +90,7 @@ class TargetInterpolation(Protocol):
     def targets(self) -> Vec:
         """The training targets [m], shape (n_targets, 3)."""
 
-    def mix(self, goals: Vec, field: str = "goal") -> InterpolationWeights:
+    def weights_at(self, goals: Vec, field: str = "goal") -> InterpolationWeights:
         """Return the targets around goals and their weights.
 
         Args:
@@ -164,8 +164,16 @@ class GridInterpolation:
             rule = "must be all points of a grid, z varying fastest, then y"
             raise InvalidInput("targets", list(self.targets.shape), rule)
 
-    def mix(self, goals: Vec, field: str = "goal") -> InterpolationWeights:
-        """Return the corners of each goal's box and their weights."""
+    def weights_at(self, goals: Vec, field: str = "goal") -> InterpolationWeights:
+        """Return the corners of each goal's box and their trilinear weights, shape (n, 8) each.
+
+        Args:
+            goals: Goals [m], shape (n, 3).
+            field: Name of the goals in messages.
+
+        Raises:
+            GoalOutside: A goal lies outside the targets.
+        """
         inside = _inside(self._low, self._high, goals, field)
         which = np.empty((len(inside), N_BOX), dtype=np.int64)
         weights = np.empty((len(inside), N_BOX))
@@ -203,8 +211,16 @@ class DelaunayInterpolation:
         self._last = self.targets[self.corners[:, 3]]
         self._inverse = np.ascontiguousarray(np.linalg.inv(edges[kept].transpose(0, 2, 1)))
 
-    def mix(self, goals: Vec, field: str = "goal") -> InterpolationWeights:
-        """Return the corners of each goal's tetrahedron and their weights."""
+    def weights_at(self, goals: Vec, field: str = "goal") -> InterpolationWeights:
+        """Return the corners of each goal's tetrahedron and their weights, shape (n, 4) each.
+
+        Args:
+            goals: Goals [m], shape (n, 3).
+            field: Name of the goals in messages.
+
+        Raises:
+            GoalOutside: A goal lies outside the targets.
+        """
         inside = _inside(self._low, self._high, goals, field)
         which = np.empty((len(inside), N_SIMPLEX), dtype=np.int64)
         weights = np.empty((len(inside), N_SIMPLEX))
@@ -213,7 +229,7 @@ class DelaunayInterpolation:
 
 
 def interpolation_of(targets: Vec, rule: str) -> TargetInterpolation:
-    """Return the interpolation between targets of the rule ``"grid"`` or ``"halton"``.
+    """Return the interpolation between targets [m], (n, 3), of ``"grid"`` or ``"halton"``.
 
     Raises:
         InvalidInput: The rule has no targets.

@@ -97,7 +97,13 @@ def sample_detours(
 
 
 def toward(arm: Arm, q: Vec, aim: Vec) -> NDArray[np.float32]:
-    """Return actions of straight joint motions to configurations [rad]."""
+    """Return actions of straight joint motions, in [-1, 1], shape (n, 6).
+
+    Args:
+        arm: From ``scene.arm_of``.
+        q: Joint positions [rad], shape (n, 6).
+        aim: Target configurations [rad], shape (n, 6).
+    """
     return np.clip(GAIN * (aim - q) / arm.limits.qd_max, -1.0, 1.0).astype(np.float32)
 
 
@@ -131,13 +137,14 @@ class OracleSearch:
         )
 
     def unsolved(self) -> Index:
-        """Return the episodes that no resimulation has solved."""
+        """Return the indices of the episodes that no resimulation has solved, shape (k,)."""
         return np.flatnonzero(self.resimulations.reached == 0)
 
     def scripted(self, episodes: Index, n_each: int, *, at_once: bool = False) -> None:
         """Run scripted resimulations of some episodes.
 
         Args:
+            episodes: Their indices, shape (k,).
             n_each: Resimulations of each.
             at_once: Whether all move to the goal immediately.
         """
@@ -149,9 +156,10 @@ class OracleSearch:
             self._simulate(rows, lambda batch, k: np.zeros(0), first, until, last)
 
     def disturbed(self, episodes: Index, n_each: int, acts: Acts) -> None:
-        """Run resimulations of some episodes with a policy.
+        """Run resimulations of some episodes with a policy and noise on its actions.
 
         Args:
+            episodes: Their indices, shape (k,).
             n_each: Resimulations of each.
             acts: The policy: actions of all environments of a batch.
         """

@@ -46,7 +46,7 @@ class RobotCapsules:
 
 
 def tool_capsule(tool_length: float, tool_radius: float) -> tuple[Vec, Vec]:
-    """Return the ends of the tool's segment in the frame of wrist_3_link [m].
+    """Return the ends of the tool's segment in the frame of wrist_3_link [m], shape (3,) each.
 
     The tool extends from the flange to the tcp, ``tool_length`` along z of ``tool0``; its round
     end touches the tcp.

@@ -63,13 +63,13 @@ class MeasuredState(NamedTuple):
     measured: Joints
     """As given."""
     clamped: Joints
-    """Inside the limits: what policies see; the same object where nothing is outside."""
+    """Inside the limits, as policies observe it; the same object where nothing is outside."""
     outside: tuple[OutOfRangeValue, ...]
     """Joints outside, with their limits."""
 
 
 class StateLimits:
-    """Takes measured states of one robot in.
+    """Validates measured states of one robot.
 
     Args:
         arm: From :func:`~app.sim.scene.scene.arm_of`.

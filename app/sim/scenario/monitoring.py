@@ -176,7 +176,7 @@ def joined(parts: Sequence[MonitoredEpisodes]) -> MonitoredEpisodes:
 
 
 def selected(runs: MonitoredEpisodes, which: NDArray[np.int64]) -> MonitoredEpisodes:
-    """Return the runs with the given indices."""
+    """Return the runs with the given indices, shape (k,)."""
     names = MonitoredEpisodes.__dataclass_fields__
     values: dict[str, Any] = {name: getattr(runs, name)[which] for name in names}
     return MonitoredEpisodes(**values)

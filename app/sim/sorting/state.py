@@ -1,7 +1,7 @@
 """State of the sorting task as integers, and its moves (docs/method.md 1.1 and 1.2).
 
 An object is a *code*: 0 for a free place, others ``1 + colour * n_sizes + size``, with sizes
-from the smallest. Objects of one code are duplicates. There are ``K`` clutter slots and one
+from the smallest. Objects of one code are identical. There are ``K`` clutter slots and one
 tower per colour with ``K`` levels and no gaps, for any objects.
 
 Position ``k`` is a clutter slot, ``K + c`` the top of tower ``c``. Moves are numbered as the
@@ -179,12 +179,12 @@ def empty_state(shape: SortingShape) -> SortingState:
 
 
 def code_counts(codes: Codes, shape: SortingShape) -> NDArray[np.int64]:
-    """Return the number of objects per code; index 0: free places."""
+    """Return the number of objects per code, shape (n_types + 1,); index 0: free places."""
     return np.bincount(codes.ravel().astype(np.int64), minlength=shape.n_types + 1)
 
 
 def missing(state: SortingState, shape: SortingShape) -> NDArray[np.int64]:
-    """Return the number of missing objects per code of the goal."""
+    """Return the number of missing objects per code of the goal, shape (n_types + 1,)."""
     there = code_counts(state.clutter, shape) + code_counts(state.towers, shape)
     lack = np.maximum(code_counts(state.goal, shape) - there, 0)
     lack[NULL] = 0

@@ -62,7 +62,7 @@ def test_between_targets_it_is_the_weighted_mean_of_actions_for_them(goals: str)
     wanted = random_goals(6)
     send(batch, wanted)
     found = controller_of(actor, "interpolated").acts(batch)
-    mix = Interpolation(actor).cells.mix(wanted)
+    mix = Interpolation(actor).cells.weights_at(wanted)
     mean = np.zeros((6, 6))
     for k in range(mix.which.shape[1]):
         send(batch, actor.targets[mix.which[:, k]])

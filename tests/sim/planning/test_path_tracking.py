@@ -8,7 +8,7 @@ from app.sim.cells.cell import load_cell
 from app.sim.core.arrays import Vec
 from app.sim.planning.path_tracking import PathFollower, straight_stop
 from app.sim.planning.time_parameterization import TimingLimits, time_path
-from app.sim.robot.kernels import acceleration_bounds as polynomial
+from app.sim.robot.kernels import acceleration_bounds
 from app.sim.robot.kernels.joints import JointState
 from app.sim.scene.scene import arm_of
 
@@ -20,7 +20,7 @@ def move(q: Vec, qd: Vec, wanted: Vec) -> tuple[Vec, Vec, Vec]:
     """One period of the bounded actions: coefficients, positions, speeds."""
     c, end = np.empty(6), JointState(*np.empty((3, 6)))
     start = JointState(q, qd, np.zeros(6))
-    polynomial.advance_to_speeds(ARM.limits, ARM.dt, start, wanted, c, end)
+    acceleration_bounds.advance_to_speeds(ARM.limits, ARM.dt, start, wanted, c, end)
     return c, end.q, end.qd
 
 

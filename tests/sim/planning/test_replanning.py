@@ -15,7 +15,7 @@ from app.sim.core.arrays import Vec
 from app.sim.human import model as human
 from app.sim.planning.ompl_planners import PLANNERS, PlanSettings
 from app.sim.planning.replanning import ROLES, ReplanningExecutor, ReplanningSettings
-from app.sim.robot.kernels import acceleration_bounds as polynomial
+from app.sim.robot.kernels import acceleration_bounds
 from app.sim.robot.kernels.joints import JointState
 from app.sim.scene.scene import arm_of
 from tests.sim.configurations import vertical_configuration
@@ -75,7 +75,7 @@ def drive(
         if states[-1] == "arrived":
             break
         start = JointState(q, qd, np.zeros(6))
-        polynomial.advance_to_speeds(
+        acceleration_bounds.advance_to_speeds(
             ARM.limits, ARM.dt, start, wanted, c, JointState(q_out, qd_out, np.empty(6))
         )
         assert np.all(np.abs(qd_out) <= ARM.limits.qd_max + 1e-9)

@@ -32,7 +32,7 @@ def inside(n: int, seed: int = 3) -> np.ndarray:
 
 
 def mean_of(cells: TargetInterpolation, values: np.ndarray, goals: np.ndarray) -> np.ndarray:
-    mix = cells.mix(goals)
+    mix = cells.weights_at(goals)
     return np.einsum("nk,nkd->nd", mix.weights, values[mix.which])
 
 
@@ -76,7 +76,7 @@ def test_a_flat_box_has_no_halton_targets() -> None:
 @pytest.mark.parametrize("cells", both())
 def test_weights_sum_to_one_and_give_the_goal_back(cells: TargetInterpolation) -> None:
     goals = inside(3000)
-    mix = cells.mix(goals)
+    mix = cells.weights_at(goals)
     assert mix.weights.min() >= 0.0
     np.testing.assert_allclose(mix.weights.sum(axis=1), 1.0, atol=1e-14)
     np.testing.assert_allclose(mean_of(cells, cells.targets, goals), goals, atol=1e-12)
@@ -84,7 +84,7 @@ def test_weights_sum_to_one_and_give_the_goal_back(cells: TargetInterpolation) -
 
 @pytest.mark.parametrize("cells", both())
 def test_at_a_target_it_has_all_the_weight(cells: TargetInterpolation) -> None:
-    mix = cells.mix(cells.targets)
+    mix = cells.weights_at(cells.targets)
     best = mix.weights.argmax(axis=1)
     rows = np.arange(len(cells.targets))
     np.testing.assert_array_equal(mix.which[rows, best], rows)
@@ -106,7 +106,7 @@ def test_on_a_border_of_grid_cells_only_the_border_has_weight() -> None:
     cells = GridInterpolation(REGION.targets())
     goals = inside(200)
     goals[:, 0] = np.unique(cells.targets[:, 0])[2]
-    mix = cells.mix(goals)
+    mix = cells.weights_at(goals)
     used = mix.weights > 0.0
     assert (cells.targets[mix.which[used], 0] == goals[0, 0]).all()
 
@@ -114,7 +114,7 @@ def test_on_a_border_of_grid_cells_only_the_border_has_weight() -> None:
 def test_trilinear_weights_are_those_of_the_equation() -> None:
     cells = GridInterpolation(REGION.targets())
     goal = np.array([[-0.5 + 0.2 * 1.25, 0.6 + 0.2 * 0.5, 0.1 + 0.2 * 1.75]])
-    mix = cells.mix(goal)
+    mix = cells.weights_at(goal)
     expected = {
         (i, j, k): (0.25, 0.75)[i == 1] * 0.5 * (0.75, 0.25)[k == 1]
         for i in (1, 2)
@@ -129,7 +129,7 @@ def test_trilinear_weights_are_those_of_the_equation() -> None:
 def test_tetrahedra_are_those_of_delaunay_and_fill_the_box() -> None:
     cells = DelaunayInterpolation(halton_targets(REGION))
     known, goals = Delaunay(cells.targets), inside(2000)
-    found = cells.mix(goals)
+    found = cells.weights_at(goals)
     home = known.simplices[known.find_simplex(goals)]
     np.testing.assert_array_equal(np.sort(found.which, axis=1), np.sort(home, axis=1))
     corners = cells.targets[cells.corners]
@@ -140,7 +140,7 @@ def test_tetrahedra_are_those_of_delaunay_and_fill_the_box() -> None:
 @pytest.mark.parametrize("cells", both())
 def test_goals_outside_are_refused_with_axis_and_distance(cells: TargetInterpolation) -> None:
     with pytest.raises(GoalOutside) as caught:
-        cells.mix(np.array([[0.0, 0.7, 0.3], [0.62, 0.7, 0.05]]))
+        cells.weights_at(np.array([[0.0, 0.7, 0.3], [0.62, 0.7, 0.05]]))
     found = caught.value.problem()["outside"]
     assert [one["axis"] for one in found] == ["x", "z"]
     assert [one["by_m"] for one in found] == pytest.approx([0.12, 0.05])
@@ -149,14 +149,14 @@ def test_goals_outside_are_refused_with_axis_and_distance(cells: TargetInterpola
 
 @pytest.mark.parametrize("cells", both())
 def test_goals_outside_by_rounding_are_taken(cells: TargetInterpolation) -> None:
-    np.testing.assert_allclose(cells.mix(HIGH[None] + 1e-12).weights.max(), 1.0)
+    np.testing.assert_allclose(cells.weights_at(HIGH[None] + 1e-12).weights.max(), 1.0)
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
 @pytest.mark.parametrize("cells", both())
 def test_goals_that_are_no_numbers_are_refused(cells: TargetInterpolation, bad: float) -> None:
     with pytest.raises(InvalidInput, match="must be finite"):
-        cells.mix(np.array([[0.0, bad, 0.3]]))
+        cells.weights_at(np.array([[0.0, bad, 0.3]]))
 
 
 def test_a_flat_grid_has_cells_too() -> None:
@@ -167,7 +167,7 @@ def test_a_flat_grid_has_cells_too() -> None:
     goals[:, 2] = 0.3
     np.testing.assert_allclose(mean_of(flat, flat.targets, goals), goals, atol=1e-12)
     with pytest.raises(GoalOutside, match="along z"):
-        flat.mix(inside(1))
+        flat.weights_at(inside(1))
 
 
 def test_targets_that_are_no_grid_or_have_no_corners_are_refused() -> None:

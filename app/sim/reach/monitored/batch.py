@@ -18,7 +18,7 @@ from app.sim.people.kernels.pedestrian import GROWTH, VX, VY
 from app.sim.reach.batch import ReachBatch, ReachSettings
 from app.sim.reach.monitored.kernels import step
 from app.sim.reach.monitored.kernels.state import Commands, StepResults
-from app.sim.robot.kernels import acceleration_bounds as polynomial
+from app.sim.robot.kernels import acceleration_bounds
 from app.sim.robot.kernels.joints import JointState
 from app.sim.safety.layer import SafetySettings
 from app.sim.scenario.kernels.episode import Indices
@@ -135,7 +135,7 @@ class MonitoredReachBatch(ReachBatch):
         start = JointState(
             as_kernel_array(state.q[env]), as_kernel_array(state.qd[env]), np.zeros(6)
         )
-        polynomial.advance_to_speeds(
+        acceleration_bounds.advance_to_speeds(
             arm.limits, arm.dt, start, as_kernel_array(wanted), segments[0], end
         )
         none = np.empty((0, 6), dtype=np.float32)
