@@ -19,11 +19,12 @@ if TYPE_CHECKING:
     from app.settings import Settings
 
 ROOT = Path(__file__).resolve().parents[2]
+PROTOCOL_HELP = "Such as pick-single; any other word lists all protocols."
 CHECKPOINT_HELP = "Alias, SHA-256 or .safetensors file; the protocol's own by default."
 
 
 def evaluate(
-    protocol: Annotated[str, typer.Argument(show_default=False)],
+    protocol: Annotated[str, typer.Argument(show_default=False, help=PROTOCOL_HELP)],
     files: Annotated[
         list[Path] | None, typer.Argument(help="Recorded motion, for pick-mocap and others.")
     ] = None,

@@ -33,7 +33,12 @@ INTERRUPTED = 130
 
 
 def train(
-    preset: Annotated[str, typer.Argument(show_default=False)],
+    preset: Annotated[
+        str,
+        typer.Argument(
+            show_default=False, help="Such as reach-td3; any other word lists all presets."
+        ),
+    ],
     seed: Annotated[int, typer.Option(min=0, max=2**31 - 1)] = 0,
     sets: Annotated[
         list[str] | None,
