@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal, Protocol
 
-from app.store import attempts, completion, fencing, metrics
+from app.store import attempts, completion, fencing
 from app.store.database.schema import check_schema
 from app.store.engine import Store
 from app.store.records import Claim, EarlyEnd, JobRecord, NewCheckpoint, ResumeState
@@ -58,10 +58,7 @@ class JobAccess(Protocol):
     def record_progress(
         self, step: int, values: Mapping[str, float | None], total_steps: int | None
     ) -> None:
-        """Add a point to the job's curve."""
-
-    def has_point(self, step: int) -> bool:
-        """Return whether the curve has a point of that step."""
+        """Add a point to the job's curve; the last one again has no effect."""
 
     def record_checkpoint(
         self, step: int, policy: NewCheckpoint, resume: ResumeState | None
@@ -104,13 +101,6 @@ class StoreAccess:
     ) -> None:
         """Add a point to the job's curve."""
         attempts.record_progress(self.store, self._claim, step, values, total_steps=total_steps)
-
-    def has_point(self, step: int) -> bool:
-        """Return whether the curve has a point of that step."""
-        rows = metrics.list_metrics(
-            self.store, self._claim.job_id, after_step=step - 1, limit=1
-        )
-        return any(row.step == step for row in rows)
 
     def record_checkpoint(
         self, step: int, policy: NewCheckpoint, resume: ResumeState | None

@@ -86,13 +86,7 @@ class JobWorker:
             StaleAttempt: The attempt no longer holds the job.
             StorageFull: No room is left, and the runner must stop.
         """
-
-        def write() -> None:
-            if self._waiting is not None and self.access.has_point(step):
-                return  # the commit before was reported as failed, and took place
-            self.access.record_progress(step, values, total_steps)
-
-        self.wait_to(write)
+        self.wait_to(lambda: self.access.record_progress(step, values, total_steps))
         budget = self._budgeted.step_budget
         if budget is not None and budget <= step != total_steps:
             self._early_end = "step budget"

@@ -106,7 +106,7 @@ def record_progress(
     *,
     total_steps: int | None = None,
 ) -> None:
-    """Add a point to the job's curve.
+    """Add a point to the job's curve; the last one again has no effect.
 
     Args:
         step: Steps done, above every recorded step.
@@ -122,15 +122,20 @@ def record_progress(
         if value is not None and not math.isfinite(value):
             raise InvalidInput(name, value, "must be finite, or None where not defined")
     now = datetime.now(UTC)
-    changes: dict[str, Any] = {"heartbeat_at": now, "step": step, "waiting": None}
+    changes: dict[str, Any] = {"step": step}
     if total_steps is not None:
         changes["total_steps"] = total_steps
     with store.writing() as connection:
+        alive = {"heartbeat_at": now, "waiting": None}
+        fenced_update(connection, claim, alive, counts=False)
+        points = sa.select(metrics).where(metrics.c.job_id == claim.job_id)
+        last = connection.execute(points.order_by(metrics.c.step.desc()).limit(1)).first()
+        if last is not None and (last.step, last.values) == (step, dict(values)):
+            return
+        if last is not None and step <= last.step:
+            rule = f"must lie above the last recorded step {last.step}"
+            raise InvalidInput("step", step, rule)
         event_id = fenced_update(connection, claim, changes)
-        mine = metrics.c.job_id == claim.job_id
-        last = connection.execute(sa.select(sa.func.max(metrics.c.step)).where(mine)).scalar()
-        if last is not None and step <= last:
-            raise InvalidInput("step", step, f"must lie above the last recorded step {last}")
         row = {"job_id": claim.job_id, "step": step, "values": dict(values), "at": now}
         connection.execute(sa.insert(metrics).values(row))
         append_event(connection, claim.job_id, event_id, "progress", step=step)
@@ -142,16 +147,21 @@ def record_checkpoint(
     step: int,
     policy: NewCheckpoint,
     resume: ResumeState | None = None,
-) -> None:
+) -> bool:
     """Store the policy of a step and, in the same transaction, the state to resume from.
 
     Args:
-        step: Steps done; a checkpoint of the same step is replaced.
+        step: Steps done, not below those of the last checkpoint; one of the same step is
+            replaced.
         resume: Stored beside the job's last one; earlier ones are deleted.
+
+    Returns:
+        Whether it is new; the last one again has no effect.
 
     Raises:
         StaleAttempt: The attempt no longer holds the job.
-        InvalidInput: A size exceeds its limit, or the steps differ.
+        InvalidInput: A size exceeds its limit, the steps differ, or a later checkpoint is
+            stored.
         StorageFull: No room is left; the earlier resume state stays.
     """
     if resume is not None and resume.step != step:
@@ -160,8 +170,12 @@ def record_checkpoint(
         rule = f"bytes exceed the limit of {MAX_RESUME} bytes"
         raise InvalidInput("resume.tensors", len(resume.tensors), rule)
     with store.writing() as connection:
-        changes = {"heartbeat_at": datetime.now(UTC), "waiting": None}
-        event_id = fenced_update(connection, claim, changes)
+        alive = {"heartbeat_at": datetime.now(UTC), "waiting": None}
+        fenced_update(connection, claim, alive, counts=False)
+        if _is_last(connection, claim.job_id, step, policy, resume):
+            insert_checkpoint(connection, policy)  # it may be damaged
+            return False
+        event_id = fenced_update(connection, claim, {})
         drop_job_checkpoints(connection, claim.job_id, beyond=step - 1)
         insert_checkpoint(connection, policy)
         link = {"job_id": claim.job_id, "step": step, "sha256": policy.sha256}
@@ -170,6 +184,7 @@ def record_checkpoint(
             _replace_resume(connection, claim.job_id, resume)
         data = {"sha256": policy.sha256}
         append_event(connection, claim.job_id, event_id, "checkpoint", data=data, step=step)
+    return True
 
 
 def load_resume(
@@ -250,6 +265,36 @@ def _forget_beyond(connection: sa.Connection, job_id: str, step: int) -> None:
     drop_job_checkpoints(connection, job_id, beyond=step)
 
 
+def _is_last(
+    connection: sa.Connection,
+    job_id: str,
+    step: int,
+    policy: NewCheckpoint,
+    resume: ResumeState | None,
+) -> bool:
+    """Return whether a checkpoint and its state are the last ones that a job has stored.
+
+    Raises:
+        InvalidInput: The last one is of a later step: this one was delayed.
+    """
+    mine = sa.select(job_checkpoints).where(job_checkpoints.c.job_id == job_id)
+    last = connection.execute(mine.order_by(job_checkpoints.c.step.desc()).limit(1)).first()
+    if last is not None and step < last.step:
+        rule = f"must not lie below {last.step}, the last checkpoint's"
+        raise InvalidInput("step", step, rule)
+    if last is None or (last.step, last.sha256) != (step, policy.sha256):
+        return False
+    if resume is None:
+        return True
+    stored = sa.select(resume_states.c.digest)
+    stored = stored.where(resume_states.c.job_id == job_id, resume_states.c.step == step)
+    return connection.execute(stored).scalar() == _digest(resume)
+
+
+def _digest(resume: ResumeState) -> str:
+    return digest({"manifest": dict(resume.manifest)}, resume.tensors)
+
+
 def _replace_resume(connection: sa.Connection, job_id: str, resume: ResumeState) -> None:
     mine = resume_states.c.job_id == job_id
     newest = sa.select(sa.func.max(resume_states.c.step))
@@ -257,12 +302,11 @@ def _replace_resume(connection: sa.Connection, job_id: str, resume: ResumeState)
     previous = connection.execute(newest).scalar()
     keeps = resume_states.c.step != (-1 if previous is None else previous)
     connection.execute(sa.delete(resume_states).where(mine, keeps))
-    manifest = dict(resume.manifest)
     values = {
         "job_id": job_id,
         "step": resume.step,
-        "manifest": manifest,
-        "digest": digest({"manifest": manifest}, resume.tensors),
+        "manifest": dict(resume.manifest),
+        "digest": _digest(resume),
         "tensors": resume.tensors,
     }
     connection.execute(sa.insert(resume_states).values(values))

@@ -56,13 +56,6 @@ class ServiceAccess:
         body = {"step": step, "values": dict(values), "total_steps": total_steps}
         self._send("progress", body)
 
-    def has_point(self, step: int) -> bool:
-        """Return whether the curve has a point of that step."""
-        job = self._service.attempt.partition("/attempts/")[0]
-        query = {"after_step": step - 1, "limit": 1}
-        found = self._service.send("GET", f"{job}/metrics", query=query).json()
-        return any(one["step"] == step for one in found["items"])
-
     def record_checkpoint(
         self, step: int, policy: NewCheckpoint, resume: ResumeState | None
     ) -> None:

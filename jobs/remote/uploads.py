@@ -88,6 +88,9 @@ class WorkerUploads:
     def record(self, claim: Claim, step: int, content: bytes, policy_bytes: int) -> None:
         """Store a policy and a state; then delete the files that no state lists.
 
+        The last one again, such as a repeated request, has no effect: files that a later state
+        will list may have been stored since.
+
         Args:
             claim: The attempt that sends.
             step: Steps done.
@@ -104,17 +107,15 @@ class WorkerUploads:
         _require_origin(policy.manifest, job)
         rest = content[policy_bytes:]
         state = read_state(rest) if rest else None
-        if state is not None:
-            for place, name in enumerate(_listed(state.manifest)):
-                if not self._folder(claim).path(name).is_file():
+        folder = self._folder(claim)
+        with self._lock:
+            for place, name in enumerate([] if state is None else _listed(state.manifest)):
+                if not folder.path(name).is_file():
                     rule = "is no file of this job: send it first"
                     raise InvalidInput(f"state.manifest.memory[{place}]", name, rule)
-        attempts.record_checkpoint(self._store, claim, step, to_store(policy), state)
-        with self._lock:
-            fencing.peek(self._store, claim)
-            manifests = attempts.resume_manifests(self._store, claim.job_id)
-            names = {name for one in manifests for name in _listed(one)}
-            self._folder(claim).keep(names)
+            if attempts.record_checkpoint(self._store, claim, step, to_store(policy), state):
+                manifests = attempts.resume_manifests(self._store, claim.job_id)
+                folder.keep({name for one in manifests for name in _listed(one)})
 
     def write_file(self, claim: Claim, name: str, content: bytes) -> None:
         """Store a file of the replay memory under its SHA-256.

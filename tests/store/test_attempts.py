@@ -60,8 +60,23 @@ def test_progress_reaches_job_and_curve(store: Store, claim: Claim) -> None:
 def test_step_that_does_not_advance_is_refused(store: Store, claim: Claim, step: int) -> None:
     record(store, claim, 10)
     with pytest.raises(InvalidInput, match="must lie above the last recorded step 10"):
-        record(store, claim, step)
+        attempts.record_progress(store, claim, step, {"success": 0.25})
     assert curve(store, claim) == [10]
+
+
+def test_last_point_and_last_checkpoint_again_have_no_effect(
+    store: Store, claim: Claim
+) -> None:
+    def write() -> list[bool]:
+        attempts.record_progress(store, claim, 10, {"success": 0.1 + 0.2, "reward": None})
+        states = resume(10), None
+        return [attempts.record_checkpoint(store, claim, 10, policy(), s) for s in states]
+
+    assert write() == [True, False]
+    before = events.list_events(store, claim.job_id)
+    assert write() == [False, False]
+    assert events.list_events(store, claim.job_id) == before
+    assert curve(store, claim) == [10] and attempts.load_resume(store, claim.job_id)
 
 
 def test_nan_never_reaches_the_curve(store: Store, claim: Claim) -> None:
