@@ -123,12 +123,14 @@ class Service:
         settings.data.mkdir(parents=True, exist_ok=True)
         store = Store(settings.database)
         worlds: dict[str, LiveWorld] = {}
+        names = CheckpointNames(store)
         retention = Retention(
             store=store,
             logs=settings.data.absolute() / "logs",
             keep_jobs=settings.keep_jobs,
             keep_states=settings.keep_states,
             acting=lambda: acting_in(worlds),
+            on_removed=names.forget,
         )
         supervisor = Supervisor(
             store,
@@ -140,6 +142,7 @@ class Service:
             tracer=tracer,
         )
         supervisor.composed = Sweeps(), Reports()
+        supervisor.on_lease, supervisor.on_tick = names.refresh, names.forget_unstored
         self._imports = ImportProcess()
         recordings = RecordingCatalog(store, self._imports)
         try:
@@ -148,6 +151,7 @@ class Service:
                 supervisor,
                 retention,
                 recordings,
+                names,
                 data=settings.data,
                 worlds=worlds,
                 metrics=counts,
@@ -157,7 +161,6 @@ class Service:
             supervisor.stop()
             store.close()
             raise
-        supervisor.on_lease = self.parts.checkpoints.refresh
         counts.watch(ServiceState(self.parts))
         self._warm_up = threading.Thread(target=self._start_cell, name="warm-up", daemon=True)
         self._warm_up.start()
@@ -262,6 +265,7 @@ def assemble(
     supervisor: Supervisor,
     retention: Retention,
     recordings: RecordingCatalog,
+    names: CheckpointNames,
     *,
     data: Path,
     worlds: dict[str, LiveWorld],
@@ -272,15 +276,14 @@ def assemble(
 
     Args:
         supervisor: Runs the jobs.
-        retention: Removes ended jobs of the database.
+        retention: Removes ended jobs of the database, and reports it to ``names``.
         data: The data folder.
         worlds: Live worlds by id.
         metrics: Metrics of the application.
         tracer: Makes the spans of decisions.
     """
     store = retention.store
-    names = CheckpointNames(store)
-    services = Services(
+    return Services(
         store=store,
         response_cache=ResponseCache(store),
         supervisor=supervisor,
@@ -298,8 +301,6 @@ def assemble(
         metrics=metrics,
         tracer=tracer,
     )
-    retention.on_removed = services.forget
-    return services
 
 
 def acting_in(worlds: Mapping[str, LiveWorld]) -> dict[str, str]:

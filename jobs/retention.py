@@ -34,7 +34,7 @@ class Retention:
     """Number of cancelled or failed jobs whose states to resume from are kept."""
     acting: Callable[[], Mapping[str, str]]
     """Returns the SHA-256 of each checkpoint that acts, with its place."""
-    on_removed: Callable[[Collection[str]], None] = lambda _: None
+    on_removed: Callable[[Collection[str]], object] = lambda _: None
     """Called with the SHA-256 of the checkpoints that were removed."""
     _lock: threading.Lock = field(default_factory=threading.Lock)
     _removals: int = 0

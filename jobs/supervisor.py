@@ -15,6 +15,7 @@ import shutil
 import threading
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from datetime import datetime
 from pathlib import Path
@@ -135,6 +136,8 @@ class Supervisor:
         """What advances jobs made of jobs; set before the start."""
         self.on_lease: Callable[[], object] = lambda: None
         """Called when the lease was taken: another server may have changed the database."""
+        self.on_tick: Callable[[], object] = lambda: None
+        """Called at every tick: others change the database, too."""
         self._workers: dict[Claim, _Worker] = {}
         self._orphans_queued = False
         self._not_before = self._retain_at = -math.inf
@@ -199,6 +202,7 @@ class Supervisor:
             if self._holds_lease:
                 self._guarded(self._lease.renew)
             self._guarded(self._tick if self._holds_lease else self._stand_by)
+            self._guarded(self.on_tick)
             self._wake.wait(self._timeouts.tick_s)
             self._wake.clear()
         self._shut_down()
@@ -377,10 +381,8 @@ class Supervisor:
         return [w for w in self._workers.values() if self._executor.poll(w.handle) is None]
 
     def _give_back(self, claim: Claim) -> None:
-        try:
+        with suppress(StaleAttempt, NotFound):  # the worker recorded it
             completion.give_back(self._store, claim)
-        except (StaleAttempt, NotFound):
-            return  # the worker recorded it
 
     def _fill_reserve(self) -> None:
         try:

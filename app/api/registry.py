@@ -7,13 +7,19 @@ worlds and routes share the loaded objects, so that equal states give equal deci
 import logging
 import threading
 from collections import OrderedDict
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from typing import Any, Generic, Protocol, TypeVar
 
 from starlette.concurrency import run_in_threadpool
 
 from app.errors import Damaged, InvalidInput, NotFound
-from app.store.checkpoints import list_aliases, put_checkpoint, remove_alias, set_alias
+from app.store.checkpoints import (
+    list_aliases,
+    put_checkpoint,
+    remove_alias,
+    set_alias,
+    stored_among,
+)
 from app.store.engine import Store
 from app.store.records import CheckpointRecord, NewCheckpoint
 from jobs.checkpoints import read_sound
@@ -44,13 +50,19 @@ Build = Callable[[Mapping[str, Any], bytes], P]
 
 
 class CheckpointNames:
-    """The aliases of stored checkpoints, in memory; safe to use from any thread."""
+    """What is known of stored checkpoints in memory; safe to use from any thread.
+
+    Args:
+        store: The database; it needs no tables until a method is called.
+    """
 
     def __init__(self, store: Store) -> None:
         self.store = store
         """The database."""
+        self.registries: list[PolicyRegistry[Any]] = []
+        """The registries of loaded policies."""
         self._lock = threading.Lock()
-        self._aliases: dict[str, str] = list_aliases(store)
+        self._aliases: dict[str, str] | None = None
         self._damaged: dict[str, str] = {}
 
     def publish(self, alias: str, checkpoint: NewCheckpoint) -> None:
@@ -86,7 +98,9 @@ class CheckpointNames:
     @property
     def aliases(self) -> Mapping[str, str]:
         """SHA-256 of each alias."""
-        return self._aliases
+        if self._aliases is None:
+            self.refresh()
+        return self._aliases or {}
 
     def read(self, name: str) -> tuple[CheckpointRecord, bytes]:
         """Return a checkpoint with its tensors.
@@ -96,26 +110,39 @@ class CheckpointNames:
             Damaged: It is damaged, and not shipped.
         """
         try:
-            record, tensors = read_sound(self.store, self._aliases.get(name, name))
+            record, tensors = read_sound(self.store, self.aliases.get(name, name))
         except Damaged as error:
             self.mark_damaged(error)
             raise
         except NotFound:
             rule = "is no stored checkpoint: neither its SHA-256 nor an alias"
-            raise InvalidInput("checkpoint", name, rule, tuple(self._aliases)) from None
+            raise InvalidInput("checkpoint", name, rule, tuple(self.aliases)) from None
         self._damaged.pop(record.sha256, None)
         return record, tensors
 
     def mark_damaged(self, damage: Damaged) -> None:
-        """Remember that a checkpoint is damaged, until it is read undamaged."""
+        """Remember that a checkpoint is damaged, until it is read undamaged or deleted."""
         if damage.sha256 not in self._damaged:
             logger.error("%s", damage.message)
         self._damaged[damage.sha256] = damage.name
+        self.forget_unstored()
 
-    def forget(self, removed: Iterable[str]) -> None:
-        """Drop the damage of deleted checkpoints, by SHA-256."""
+    def forget(self, removed: Collection[str]) -> None:
+        """Drop damage and policies of deleted checkpoints, by SHA-256."""
         for sha256 in removed:
             self._damaged.pop(sha256, None)
+        for registry in self.registries:
+            registry.forget(removed)
+
+    def forget_unstored(self) -> None:
+        """Drop damage and policies of checkpoints that are no longer stored.
+
+        Attempts that repeat steps and other servers delete checkpoints, too. Each addition
+        calls it: the checkpoint may have been deleted since it was read.
+        """
+        held = set(self._damaged).union(*(one.held for one in self.registries))
+        if held := held.difference(self.aliases.values()):  # those with an alias are stored
+            self.forget(held - stored_among(self.store, held))
 
     @property
     def damaged(self) -> tuple[str, ...]:
@@ -138,7 +165,13 @@ class PolicyRegistry(Generic[P]):
         self._default = default
         self._lock = threading.Lock()
         self._policies: OrderedDict[str, P] = OrderedDict()
-        self._removals = 0
+        names.registries.append(self)
+
+    @property
+    def held(self) -> set[str]:
+        """SHA-256 of the policies in memory."""
+        with self._lock:
+            return set(self._policies)
 
     def _loaded(self, reference: str | None) -> P | None:
         """Return a policy by SHA-256 or alias if it is in memory, without disk access."""
@@ -152,7 +185,6 @@ class PolicyRegistry(Generic[P]):
     def forget(self, removed: Iterable[str]) -> None:
         """Drop the policies of deleted checkpoints, by SHA-256."""
         with self._lock:
-            self._removals += 1
             for sha256 in removed:
                 self._policies.pop(sha256, None)
 
@@ -179,14 +211,13 @@ class PolicyRegistry(Generic[P]):
         policy = self._loaded(reference)
         if policy is not None:
             return policy
-        removals = self._removals
         record, tensors = self._names.read(reference or self._default)
         policy = self._build(record.manifest, tensors)
         with self._lock:
-            if removals == self._removals:  # it may be among the removed ones
-                self._policies[record.sha256] = policy
+            self._policies[record.sha256] = policy
             while len(self._policies) > MAX_POLICIES:
                 self._policies.popitem(last=False)
+        self._names.forget_unstored()
         return policy
 
     async def get(self, reference: str | None) -> P:

@@ -1,7 +1,7 @@
 """Parts of the service that routes use; ``app.main`` creates them."""
 
 import threading
-from collections.abc import Callable, Collection, Hashable, Iterator
+from collections.abc import Callable, Hashable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -208,12 +208,6 @@ class Services:
             yield
         finally:
             self.uploads.release()
-
-    def forget(self, removed: Collection[str]) -> None:
-        """Drop deleted checkpoints from memory, by SHA-256."""
-        self.checkpoints.forget(removed)
-        for policies in (self.task_policies, self.sorting_policies, self.reach_policies):
-            policies.forget(removed)
 
     def span(self, name: str) -> AbstractContextManager[object]:
         """Return a context with a span of this name; without traces none is made."""

@@ -6,7 +6,7 @@ each reading; the store never opens it. Jobs that made the same bytes share one 
 
 import logging
 import re
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from datetime import UTC, datetime
 from typing import Any
 
@@ -85,6 +85,13 @@ def read_checkpoint(store: Store, reference: str) -> tuple[CheckpointRecord, byt
         known = ", ".join(names.get(sha256, ()))
         raise Damaged("checkpoint", known or sha256, REMEDY, sha256)
     return _record(row, names), row.tensors
+
+
+def stored_among(store: Store, names: Collection[str]) -> set[str]:
+    """Return those of some checkpoints that are stored, by SHA-256."""
+    query = sa.select(checkpoints.c.sha256).where(checkpoints.c.sha256.in_(names))
+    with store.reading() as connection:
+        return set(connection.execute(query).scalars())
 
 
 def find_damaged(store: Store) -> Iterator[Damaged | None]:

@@ -1,12 +1,21 @@
 from dataclasses import dataclass
+from typing import Any
 
 import pytest
+import sqlalchemy as sa
+from fastapi.testclient import TestClient
 
 from app.api.registry import CheckpointNames, PolicyRegistry
-from app.errors import InvalidInput
-from app.store import checkpoints, retention
+from app.errors import Damaged, InvalidInput
+from app.store import attempts, checkpoints, completion, jobs, retention
+from app.store.database import tables
 from app.store.engine import Store
+from app.store.records import NewJob, ResumeState
+from tests.api.conftest import services_of
 from tests.store.test_checkpoints import policy
+from tests.support.databases import claimed
+from tests.support.idle_service import own_policy
+from tests.support.waiting import wait_until
 
 
 @dataclass(frozen=True)
@@ -23,10 +32,56 @@ def test_checkpoint_deleted_while_it_is_loaded_answers_no_later_request(store: S
     def build(*_: object) -> OnlyName:
         if checkpoints.list_checkpoints(store).items:
             retention.delete_checkpoint(store, new.sha256, {})
-            registry.forget((new.sha256,))
+            names.forget((new.sha256,))
         return OnlyName(new.sha256)
 
-    registry = PolicyRegistry(CheckpointNames(store), build, "pick")
+    names = CheckpointNames(store)
+    registry = PolicyRegistry(names, build, "pick")
     assert registry.load(new.sha256).checkpoint == new.sha256
     with pytest.raises(InvalidInput, match="is no stored checkpoint"):
         registry.load(new.sha256)
+
+
+def test_damage_found_while_a_checkpoint_is_deleted_is_not_kept(store: Store) -> None:
+    new, names = policy(b"1"), CheckpointNames(store)
+    checkpoints.put_checkpoint(store, new)
+    with store.writing() as connection:
+        connection.execute(sa.update(tables.checkpoints).values(tensors=b"2"))
+    found = checkpoints.find_damaged(store)
+    damage = next(found)
+    assert isinstance(damage, Damaged)
+    retention.delete_checkpoint(store, new.sha256, {})
+    names.forget((new.sha256,))
+    names.mark_damaged(damage)
+    assert names.damaged == ()
+
+
+def test_checkpoint_that_a_repeated_attempt_drops_answers_no_longer(store: Store) -> None:
+    jobs.create_job(store, NewJob(kind="count", spec={"kind": "count"}))
+    claim, _ = claimed(store)
+    kept, dropped = policy(b"1"), policy(b"2")
+    state = ResumeState(step=10, manifest={}, tensors=b"state")
+    attempts.record_checkpoint(store, claim, 10, kept, state)
+    attempts.record_checkpoint(store, claim, 20, dropped)
+    names = CheckpointNames(store)
+    by_tensors = {one.tensors: OnlyName(one.sha256) for one in (kept, dropped)}
+    registry = PolicyRegistry(names, lambda _, tensors: by_tensors[tensors], "pick")
+    for one in (kept, dropped):
+        registry.load(one.sha256)
+    completion.give_back(store, claim)
+    claimed(store)
+    names.forget_unstored()
+    assert registry.held == {kept.sha256}
+    with pytest.raises(InvalidInput, match="is no stored checkpoint"):
+        registry.load(dropped.sha256)
+
+
+def test_checkpoint_that_another_process_deletes_answers_no_longer(
+    client: TestClient, state: dict[str, Any]
+) -> None:
+    store = services_of(client).store
+    sha256 = checkpoints.put_checkpoint(store, own_policy()).sha256
+    asked = {**state, "previous": None, "checkpoint": sha256}
+    assert client.post("/v1/task-selection", json=asked).json()["checkpoint"] == sha256
+    retention.delete_checkpoint(store, sha256, {})
+    wait_until(lambda: client.post("/v1/task-selection", json=asked).status_code == 422)

@@ -9,7 +9,7 @@ from typing import Any
 from opentelemetry.trace import NoOpTracer
 
 from app.api.metrics import Metrics
-from app.api.registry import DEFAULT_ALIAS, PolicyRegistry
+from app.api.registry import DEFAULT_ALIAS, CheckpointNames, PolicyRegistry
 from app.api.services import LiveWorld, Services
 from app.main import acting_in, assemble, build_task_policy
 from app.policies.checkpoints import pretrained
@@ -30,17 +30,20 @@ SEEDS = count(5000)
 def idle_service(store: Store, data_dir: Path) -> Services:
     """Return the parts that routes use, without a live world."""
     worlds: dict[str, LiveWorld] = {}
+    names = CheckpointNames(store)
     retention = Retention(
         store=store,
         logs=data_dir / "logs",
         keep_jobs=1000,
         keep_states=5,
         acting=lambda: acting_in(worlds),
+        on_removed=names.forget,
     )
     return assemble(
         Supervisor(store, data_dir),
         retention,
         RecordingCatalog(store),
+        names,
         data=data_dir,
         worlds=worlds,
         metrics=Metrics("test"),
@@ -67,6 +70,4 @@ def loading(services: Services, meanwhile: Callable[[], object]) -> Services:
         return build_task_policy(manifest, tensors)
 
     policies = PolicyRegistry(services.checkpoints, build, DEFAULT_ALIAS)
-    found = replace(services, task_policies=policies)
-    found.retention.on_removed = found.forget
-    return found
+    return replace(services, task_policies=policies)
