@@ -47,6 +47,7 @@ from app.sim.sorting.decision import warm_up as warm_up_sorting
 from app.sim.sorting.sorting_values import SortingValues
 from app.storage_errors import StorageDamaged, StorageFull, StorageUnavailable
 from app.store.checkpoints import find_damaged
+from app.store.database.backup import remove_unfinished
 from app.store.engine import Store
 from jobs.cell_catalog import CellCatalog
 from jobs.checkpoints import shipped
@@ -147,6 +148,7 @@ class Service:
         recordings = RecordingCatalog(store, self._imports)
         try:
             supervisor.start()
+            remove_unfinished(store, settings.data)
             self.parts = assemble(
                 supervisor,
                 retention,

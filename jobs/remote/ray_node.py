@@ -5,15 +5,14 @@ the server's machine (``jobs.remote.ray_driver``).
 """
 
 import os
-import shutil
 import socket
-import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 
 from app.provenance import describe
 from app.sim.core.kernel_cache import kernel_cache
 from app.store.records import Claim
+from app.temporary_folder import TemporaryFolder
 from jobs.executor import PROJECT_ROOT, LocalProcess
 
 
@@ -27,8 +26,8 @@ class NodeWorker:
     def __init__(self, claim: Claim, settings: Mapping[str, str]) -> None:
         data = Path(os.environ.get("TANDEM_DATA", PROJECT_ROOT / "data"))
         os.environ.setdefault("NUMBA_CACHE_DIR", str(kernel_cache(data)))
-        self._folder = Path(tempfile.mkdtemp(prefix="tandem-"))
-        self._executor = LocalProcess(None, self._folder, "jobs.remote.run", settings)
+        self._folder = TemporaryFolder("tandem-worker-")
+        self._executor = LocalProcess(None, self._folder.path, "jobs.remote.run", settings)
         self._handle = self._executor.start(claim)
         self._read = 0
 
@@ -45,7 +44,7 @@ class NodeWorker:
         self._read += len(output)
         if ended is None:
             return output, None
-        shutil.rmtree(self._folder, ignore_errors=True)
+        self._folder.close()
         return output, ended.code
 
     def stop(self) -> None:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from app.store.database.backup import restore_backup, write_backup
+from app.store.database.backup import remove_unfinished, restore_backup, write_backup
 from app.store.engine import Store
 from tests.support.databases import SQLITE_ONLY
 from tests.support.waiting import wait_until
@@ -45,16 +45,40 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return tmp_path_factory.mktemp("backups")
 
 
+RESTORER = """
+import sys
+from pathlib import Path
+
+from app.store.database.backup import restore_backup
+from app.store.engine import Store
+
+data = Path(sys.argv[2])
+while True:
+    (data / "memory/one.bin").unlink(missing_ok=True)
+    restore_backup(Store(sys.argv[1]), data, Path(sys.argv[3]))
+"""
+
+
 @contextmanager
 def stopped_writer(store: Store, data: Path, folder: Path) -> Iterator[subprocess.Popen[bytes]]:
     """Yield a process that writes backups, stopped in the middle of one."""
-    command = [sys.executable, "-c", WRITER, store.url, str(data), str(folder)]
+    with stopped(WRITER, store, data, folder) as process:
+        yield process
+
+
+@contextmanager
+def stopped(
+    program: str, store: Store, data: Path, place: Path
+) -> Iterator[subprocess.Popen[bytes]]:
+    """Yield a process that is stopped while its temporary files exist."""
+    command = [sys.executable, "-c", program, store.url, str(data), str(place)]
+    folders = [one for one in (data, place) if not one.suffix]
     with subprocess.Popen(command, stderr=subprocess.PIPE) as process:
 
         def stop_within() -> bool:
             assert process.poll() is None
             process.send_signal(signal.SIGSTOP)
-            if hidden(data) and hidden(folder):
+            if all(hidden(one) for one in folders):
                 return True
             process.send_signal(signal.SIGCONT)
             return False
@@ -80,6 +104,30 @@ def test_next_backup_removes_what_a_killed_one_left(
     (data / ".backup-notes").mkdir()
     write_backup(store, data, folder / "next.tar")
     assert hidden(data) == [data / ".backup-notes"] and not hidden(folder)
+
+
+def test_start_removes_what_a_killed_restoration_left(
+    store: Store, data: Path, folder: Path
+) -> None:
+    write_backup(store, data, folder / "1.tar")
+    other = Store(f"sqlite:///{folder}/tandem.db")
+    with stopped(RESTORER, other, folder, folder / "1.tar") as process:
+        before = hidden(folder)
+        remove_unfinished(other, folder)
+        assert hidden(folder) == before  # it is at work
+        process.kill()
+    assert hidden(folder)
+    remove_unfinished(other, folder)
+    assert not hidden(folder)
+    other.close()
+
+
+def test_hidden_files_enter_no_backup(store: Store, data: Path, folder: Path) -> None:
+    """Such as those of killed backups of an earlier version."""
+    left = data / ".backup-k3x_9abz/memory/one.bin"
+    left.parent.mkdir(parents=True)
+    left.write_bytes(b"old")
+    assert write_backup(store, data, folder / "1.tar").n_files == 1
 
 
 def test_next_backup_leaves_those_at_work_alone(store: Store, data: Path, folder: Path) -> None:

@@ -12,9 +12,7 @@ pass through. The message that asks for a public tunnel has no handler.
 """
 
 import asyncio
-import shutil
 import socket
-import tempfile
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -25,6 +23,8 @@ import viser
 import viser._messages
 import viser.infra
 import websockets.asyncio.server
+
+from app.temporary_folder import TemporaryFolder
 
 _starting = threading.Lock()
 CURRENT_S = 2.0
@@ -39,13 +39,14 @@ class ViewerServer(viser.ViserServer):
     """
 
     def __init__(self) -> None:
-        self.address = Path(tempfile.mkdtemp(prefix="tandem-")) / "viewer"
+        self._folder = TemporaryFolder("tandem-viewer-")
+        self.address = self._folder.path / "viewer"
         """Path of the socket."""
         try:
             with _listening_on(self.address):
                 super().__init__(host=str(self.address), port=0, verbose=False)
         except BaseException:
-            shutil.rmtree(self.address.parent)
+            self._folder.close()
             raise
         self.is_current = threading.Event()
         """Whether the scene is the present one; a connecting viewer waits until it is."""
@@ -71,7 +72,7 @@ class ViewerServer(viser.ViserServer):
     def stop(self) -> None:
         """End the server and remove its socket."""
         super().stop()
-        shutil.rmtree(self.address.parent, ignore_errors=True)  # may be called twice
+        self._folder.close()
 
 
 @contextmanager

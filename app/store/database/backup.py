@@ -7,14 +7,12 @@ they are copied.
 """
 
 import errno
-import fcntl
 import os
 import shutil
 import sqlite3
 import tarfile
-import tempfile
 from collections.abc import Iterator, Mapping
-from contextlib import closing, contextmanager, suppress
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path, PurePosixPath
@@ -34,14 +32,15 @@ from app.store.database.archive import (
 from app.store.database.lock import ServerLock
 from app.store.database.schema import REVISION
 from app.store.engine import BUSY_TIMEOUT_S, Store
+from app.temporary_folder import TemporaryFolder, remove_left
 
 TEMPORARY = ".unfinished-tandem-backup-"
-"""Start of the names of folders that exist during a backup."""
+"""Start of the names of folders that exist during a backup or its restoration."""
 NOT_KEPT = (
     "kernels",
     "logs",
+    ".*",
     "*.lock",
-    f"{TEMPORARY}*",
     "*.db",
     "*.db-*",
     "*.db.*",
@@ -87,10 +86,11 @@ def write_backup(store: Store, data_dir: Path, path: Path) -> BackupSummary:
         raise _exists(path)
     with (
         _file_errors(path),
-        _temporary_folder(data_dir) as held,
-        _temporary_folder(path.parent) as folder,
+        closing(TemporaryFolder(TEMPORARY, data_dir)) as links,
+        closing(TemporaryFolder(TEMPORARY, path.parent)) as folder,
     ):
-        part, copy = folder / "backup.tar", folder / DATABASE
+        held = links.path
+        part, copy = folder.path / "backup.tar", folder.path / DATABASE
         _link_files(data_dir, held, source)
         _copy_database(source, copy, store.shown_url)
         created_at = datetime.now(UTC).isoformat(timespec="seconds")
@@ -136,9 +136,13 @@ def restore_backup(
     data_dir.mkdir(parents=True, exist_ok=True)
     lock = ServerLock(store, data_dir)
     lock.acquire()
-    part = target.with_name(f"{target.name}.part")
     try:
-        with _file_errors(target), opened(path) as (archive, head):
+        with (
+            _file_errors(target),
+            opened(path) as (archive, head),
+            closing(TemporaryFolder(TEMPORARY, target.parent)) as folder,
+        ):
+            part = folder.path / DATABASE
             if head["revision"] > REVISION:
                 raise Conflict(
                     f"{path} has schema {head['revision']}, this version of Tandem knows "
@@ -153,9 +157,15 @@ def restore_backup(
             part.replace(target)
             _sync(target.parent)
     finally:
-        part.unlink(missing_ok=True)
         lock.release()
     return _summary(path, head), kept
+
+
+def remove_unfinished(store: Store, data_dir: Path) -> None:
+    """Remove what killed backups and restorations left in the folders of data and database."""
+    remove_left(data_dir, TEMPORARY)
+    if store.sqlite_path is not None:
+        remove_left(store.sqlite_path.parent, TEMPORARY)
 
 
 def _sqlite_file(store: Store) -> Path:
@@ -167,26 +177,6 @@ def _sqlite_file(store: Store) -> Path:
 
 def _exists(path: Path) -> InvalidInput:
     return InvalidInput("FILE", str(path), "exists: name a new file")
-
-
-@contextmanager
-def _temporary_folder(parent: Path) -> Iterator[Path]:
-    """Yield a folder that exists during a backup; remove those of killed backups.
-
-    Each backup holds a shared lock of the parent folder, which ends with its process.
-    """
-    lock = os.open(parent, os.O_RDONLY | os.O_CLOEXEC)
-    try:
-        with suppress(OSError):  # another backup is at work, or the file system has no locks
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            for left in parent.glob(f"{TEMPORARY}*"):
-                shutil.rmtree(left)
-        with suppress(OSError):
-            fcntl.flock(lock, fcntl.LOCK_SH)
-        with tempfile.TemporaryDirectory(dir=parent, prefix=TEMPORARY) as folder:
-            yield Path(folder)
-    finally:
-        os.close(lock)
 
 
 def _publish(part: Path, path: Path) -> None:
