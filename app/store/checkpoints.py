@@ -18,6 +18,7 @@ from app.store.cursors import check_limit, decode_cursor, encode_cursor
 from app.store.database.tables import aliases, checkpoints, job_checkpoints
 from app.store.engine import Store
 from app.store.records import CheckpointRecord, NewCheckpoint, Page
+from app.store.references import unfinished
 
 logger = logging.getLogger(__name__)
 
@@ -216,12 +217,15 @@ def sole_checkpoints(connection: sa.Connection, job_id: str) -> tuple[str, ...]:
 
 
 def drop_job_checkpoints(connection: sa.Connection, job_id: str, *, beyond: int) -> None:
-    """Delete a job's checkpoints beyond a step, and their bytes where unreferenced."""
+    """Delete a job's checkpoints beyond a step, and their bytes where unreferenced.
+
+    Those that a job which has not ended refers to stay stored.
+    """
     mine = sa.and_(job_checkpoints.c.job_id == job_id, job_checkpoints.c.step > beyond)
-    dropped = (
-        connection.execute(sa.select(job_checkpoints.c.sha256).where(mine)).scalars().all()
-    )
+    dropped = set(connection.execute(sa.select(job_checkpoints.c.sha256).where(mine)).scalars())
     connection.execute(sa.delete(job_checkpoints).where(mine))
+    if dropped:
+        dropped -= {references.checkpoint for _, references in unfinished(connection)}
     unnamed = sa.and_(
         checkpoints.c.sha256.in_(dropped),
         sa.not_(checkpoints.c.imported),

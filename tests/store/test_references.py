@@ -10,8 +10,8 @@ from itertools import product
 import pytest
 import sqlalchemy as sa
 
-from app.errors import InvalidInput, WrongState
-from app.store import cells, checkpoints, completion, jobs, recordings, retention
+from app.errors import InvalidInput, NotFound, WrongState
+from app.store import attempts, cells, checkpoints, completion, jobs, recordings, retention
 from app.store.engine import Store
 from app.store.records import NewJob, References
 from app.store.references import references_of
@@ -112,6 +112,20 @@ def test_job_refers_to_the_checkpoint_that_its_alias_named_when_it_was_queued(
     retention.delete_checkpoint(store, other, {})
     (job,) = jobs.list_jobs(store).items
     assert (job.checkpoint, job.spec["checkpoint"]) == (sha256, "best")
+
+
+def test_checkpoint_to_be_evaluated_stays_when_its_training_repeats_the_steps(
+    store: Store,
+) -> None:
+    claim = second_job(store)
+    first, second = save(store, claim, 1, b"1"), save(store, claim, 2, b"2")
+    queue(store, References(checkpoint=second))
+    attempts.resume_earlier(store, claim, None)
+    assert checkpoints.read_checkpoint(store, second)[1] == b"2"
+    with pytest.raises(NotFound):
+        checkpoints.read_checkpoint(store, first)
+    assert save(store, claim, 2, b"2") == second
+    assert checkpoints.get_checkpoint(store, second).job_id == claim.job_id
 
 
 @pytest.mark.parametrize("stored", [uploaded, alias, cell, recording])
