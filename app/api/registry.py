@@ -65,9 +65,19 @@ class CheckpointNames:
         self._aliases: dict[str, str] | None = None
         self._damaged: dict[str, str] = {}
 
+    def put(self, checkpoint: NewCheckpoint) -> CheckpointRecord:
+        """Store a checkpoint without a job; a damaged one is replaced.
+
+        Raises:
+            InvalidInput: It is too large.
+        """
+        record = put_checkpoint(self.store, checkpoint)
+        self._damaged.pop(record.sha256, None)
+        return record
+
     def publish(self, alias: str, checkpoint: NewCheckpoint) -> None:
         """Store a shipped checkpoint under its alias."""
-        put_checkpoint(self.store, checkpoint)
+        self.put(checkpoint)
         self.point(alias, checkpoint.sha256)
 
     def point(self, alias: str, sha256: str) -> None:

@@ -7,6 +7,7 @@ from fastapi.testclient import TestClient
 
 from app.api.registry import CheckpointNames, PolicyRegistry
 from app.errors import Damaged, InvalidInput
+from app.policies.checkpoints.upload import join
 from app.store import attempts, checkpoints, completion, jobs, retention
 from app.store.database import tables
 from app.store.engine import Store
@@ -54,6 +55,22 @@ def test_damage_found_while_a_checkpoint_is_deleted_is_not_kept(store: Store) ->
     names.forget((new.sha256,))
     names.mark_damaged(damage)
     assert names.damaged == ()
+
+
+def test_damaged_checkpoint_that_is_uploaded_again_is_named_no_longer(
+    client: TestClient,
+) -> None:
+    services, new = services_of(client), own_policy()
+    content = join(new.manifest, new.tensors)
+    assert client.post("/v1/checkpoints", content=content).status_code == 201
+    broken = sa.update(tables.checkpoints).where(tables.checkpoints.c.sha256 == new.sha256)
+    with services.store.writing() as connection:
+        connection.execute(broken.values(tensors=b"2"))
+    with pytest.raises(Damaged):
+        services.checkpoints.read(new.sha256)
+    assert client.get("/readyz").json()["damaged"] == [new.sha256]
+    assert client.post("/v1/checkpoints", content=content).status_code == 200
+    assert client.get("/readyz").json() == {"status": "ready"}
 
 
 def test_checkpoint_that_a_repeated_attempt_drops_answers_no_longer(store: Store) -> None:

@@ -99,7 +99,7 @@ def _keep(found: Checkpoint, services: Services, response: Response) -> Checkpoi
         new = False
     except NotFound:
         new = True
-    record = checkpoints.put_checkpoint(services.store, to_store(found))
+    record = services.checkpoints.put(to_store(found))
     set_stored(response, f"{router.prefix}/{record.sha256}", new=new)
     return CheckpointPublic.from_domain(record)
 
