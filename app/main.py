@@ -58,7 +58,8 @@ from jobs.import_process import ImportProcess
 from jobs.recording_catalog import RecordingCatalog
 from jobs.remote.uploads import WorkerUploads
 from jobs.retention import Retention
-from jobs.supervisor import Supervisor, Timeouts
+from jobs.supervisor import Supervisor
+from jobs.timeouts import Timeouts
 from web.viewer.loop import LiveCell
 
 logger = logging.getLogger(__name__)

@@ -22,5 +22,6 @@ spec               Job specs: the body of ``POST /v1/jobs``, stored unchanged wi
 start              Start of a child process: the parent-death signal, before heavy imports
 supervisor         The supervisor: a thread of the server that starts, monitors and stops
                    workers
+timeouts           Timeouts of the supervisor
 worker             The worker of a job: one attempt in one process
 """

@@ -27,7 +27,7 @@ from app.errors import Conflict, NotFound
 from app.storage_errors import LeaseLost, StaleAttempt, StorageFull, StorageUnavailable
 from app.store import attempts, completion
 from app.store.database import reserve
-from app.store.database.lease import LEASE_S, Lease
+from app.store.database.lease import Lease
 from app.store.database.lock import ServerLock
 from app.store.database.migrate import migrate
 from app.store.database.schema import check_schema
@@ -37,34 +37,9 @@ from jobs.composed.composer import Composer
 from jobs.executor import Exit, LocalHandle, LocalProcess
 from jobs.resume_files import remove_unneeded
 from jobs.retention import Retention
+from jobs.timeouts import Timeouts
 
 logger = logging.getLogger(__name__)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Timeouts:
-    """Timeouts of the supervisor."""
-
-    tick_s: float = 0.25
-    """Period of the supervisor [s]."""
-    cancel_s: float = 30.0
-    """Time from a cancel until the worker is killed [s]."""
-    silence_s: float = 300.0
-    """Time without a heartbeat until a worker is killed [s]."""
-    lease_s: float = LEASE_S
-    """Time from a renewal of the lease until another server may take it [s]."""
-    shutdown_s: float = 8.0
-    """Time for the workers' last checkpoints when the server stops [s]."""
-    late_s: float = 15.0
-    """Time without a heartbeat until the database is checked for a lock [s]."""
-    lock_s: float = 30.0
-    """Time for the heartbeat of a silent worker once the database takes writes again [s]."""
-    retry_s: float = 5.0
-    """Time until the next start after a worker that could not start or write [s]."""
-    retain_s: float = 60.0
-    """Time until old jobs are removed after one that ended without a worker [s]."""
-    max_failures: int = 3
-    """A job fails with this number of crashes."""
 
 
 MIN_FREE_BYTES = 64 * 1024 * 1024
@@ -301,7 +276,7 @@ class Supervisor:
         for claim, worker in list(self._workers.items()):
             worker.ended = worker.ended or self._executor.poll(worker.handle)
             if worker.ended is not None:
-                self._settle(claim, worker.ended)
+                self._settle(claim, worker, worker.ended)
                 _end(worker.span, worker.ended)
                 del self._workers[claim]
                 self._retain_at = -math.inf
@@ -314,13 +289,15 @@ class Supervisor:
                 self._retention.apply()
             remove_unneeded(self._store, self._data_dir)
 
-    def _settle(self, claim: Claim, ended: Exit) -> None:
+    def _settle(self, claim: Claim, worker: _Worker, ended: Exit) -> None:
         """Record the end of an attempt, if its worker has not."""
-        failures = self._timeouts.max_failures
-        if ended.code == os.EX_TEMPFAIL:  # the database took no writes
-            self._give_back(claim)
+        had_to_leave, wrote = worker.leaving_since is not None, ended.code != os.EX_TEMPFAIL
+        if not wrote:  # the database took no writes
             self._not_before = time.monotonic() + self._timeouts.retry_s
+        if had_to_leave or not wrote:
+            self._give_back(claim)
             return
+        failures = self._timeouts.max_failures
         try:
             job = completion.crash(self._store, claim, ended.reason, max_failures=failures)
         except StaleAttempt:

@@ -17,7 +17,8 @@ from app.store import jobs
 from app.store.engine import Store
 from app.store.records import NewJob
 from jobs.executor import LocalProcess
-from jobs.supervisor import Supervisor, Timeouts
+from jobs.supervisor import Supervisor
+from jobs.timeouts import Timeouts
 from tests.jobs.supervisor_process import COUNTING
 
 MAX_ACTIVE = 4

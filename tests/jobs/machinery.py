@@ -13,7 +13,8 @@ from app.store.database.lease import LEASE_S
 from app.store.engine import Store
 from app.store.records import JobRecord, NewJob
 from jobs.executor import PROJECT_ROOT
-from jobs.supervisor import Supervisor, Timeouts
+from jobs.supervisor import Supervisor
+from jobs.timeouts import Timeouts
 from tests.jobs.counting_worker import CHECKPOINT_EVERY, FACTOR, GRID, MODULUS
 from tests.support import waiting
 

@@ -6,7 +6,8 @@ from pathlib import Path
 
 from app.store.engine import Store
 from jobs.executor import LocalProcess
-from jobs.supervisor import Supervisor, Timeouts
+from jobs.supervisor import Supervisor
+from jobs.timeouts import Timeouts
 
 COUNTING = "tests.jobs.counting_worker"
 

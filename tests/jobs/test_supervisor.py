@@ -107,11 +107,21 @@ def test_cancelled_job_leaves_a_last_checkpoint_and_resumes_from_it(
 
 
 @pytest.mark.usefixtures("supervisor")
+def test_job_cancelled_while_its_worker_starts_has_not_crashed(store: Store) -> None:
+    job_id = queue(store, steps=100)
+    wait_for(store, job_id, lambda job: job.state == "running")
+    jobs.request_cancel(store, job_id)
+    job = wait_until_final(store, job_id)
+    assert (job.state, job.failures, job.error) == ("cancelled", 0, None)
+
+
+@pytest.mark.usefixtures("supervisor")
 def test_deaf_worker_is_killed_after_the_grace_time(store: Store) -> None:
     job_id = queue(store, steps=100, hold_at=[7], deaf=True)
     wait_for(store, job_id, lambda job: job.step >= 5)
     jobs.request_cancel(store, job_id)
-    assert wait_until_final(store, job_id).state == "cancelled"
+    job = wait_until_final(store, job_id)
+    assert (job.state, job.failures) == ("cancelled", 0)
 
 
 @pytest.mark.slow

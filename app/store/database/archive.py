@@ -66,7 +66,9 @@ def opened(path: Path) -> Iterator[tuple[tarfile.TarFile, dict[str, Any]]]:
     """Open a backup and check that every member is there, whole and unchanged."""
     try:
         archive = tarfile.open(path, "r:")
-    except (tarfile.TarError, OSError) as error:
+    except OSError as error:
+        raise InvalidInput("FILE", str(path), f"cannot be read: {error.strerror}") from error
+    except tarfile.TarError as error:
         raise InvalidInput("FILE", str(path), f"is no backup of Tandem: {error}") from error
     with archive:
         try:

@@ -201,7 +201,9 @@ def _file_errors(place: Path) -> Iterator[None]:
     except OSError as error:
         if error.errno in (errno.ENOSPC, errno.EDQUOT):
             raise StorageFull(str(place.parent)) from error
-        raise InvalidInput("FILE", str(place), f"cannot be written: {error}") from error
+        raise InvalidInput(
+            "FILE", str(place), f"cannot be written: {error.strerror}"
+        ) from error
 
 
 def _link_files(folder: Path, held: Path, database: Path) -> None:
