@@ -13,7 +13,7 @@ resting_people   A live robot beside people at rest: blocked targets are left ou
                  acts
 snapshot         Immutable state of a live world at one tick, for any thread and as JSON of the
                  HTTP API
-status_messages  Status messages common to the live worlds, one sentence each
+status_messages  Status messages common to the live worlds, and their numbers as text
 world_handle     Interface of a live world for other threads: command queue and last snapshot
 people/          People of live worlds: workers, pedestrians, dragged people
 pick/            The live pick-and-place world

@@ -1,11 +1,13 @@
-"""Status messages common to the live worlds, one sentence each."""
+"""Status messages common to the live worlds, one sentence each, and their numbers as text."""
 
+import math
 from collections.abc import Callable
 
 from app.live.snapshot import ContactSnapshot, Status
 
 Label = Callable[[str], str]
 """Maps a station id to its name for people."""
+_MINUS = "\N{MINUS SIGN}"
 
 _TOUCHED = {
     "pelvis": "the person's hips",
@@ -47,3 +49,29 @@ def standstill_message(status: Status, goal: str | None, label: Label) -> str:
         "no candidates": "Nothing to do: click a cube or a dock to select it.",
         "no policy": "Resting: no policy is active. Choose a checkpoint, or train one here.",
     }.get(status, "")
+
+
+def value_text(value: float, digits: int = 2) -> str:
+    """Return a value with fixed decimals and a true minus sign, as ``value`` in format.js."""
+    return f"{value:z.{digits}f}".replace("-", _MINUS)
+
+
+def length_text(metres: float) -> str:
+    """Return a length in metres, in millimetres below 1 cm.
+
+    The page has the same rule: ``length`` in web/page/format.js.
+
+    Args:
+        metres: The length [m], not negative.
+    """
+    mm = math.floor(1000.0 * metres + 0.5)
+    if mm >= 10:
+        return f"{metres:.2f} m"
+    if mm > 0:
+        return f"{mm} mm"
+    return "0 m" if metres == 0.0 else "< 1 mm"
+
+
+def percent_text(share: float) -> str:
+    """Return a share in [0, 1] in whole percent."""
+    return f"{100.0 * share:.0f} %"

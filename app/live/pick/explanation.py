@@ -1,6 +1,6 @@
 """Status messages of a live pick cell, one sentence each."""
 
-from app.live.status_messages import Label
+from app.live.status_messages import Label, value_text
 from app.sim.pick.case_verdict import Verdict
 from app.sim.pick.kernels.grasp import LIFT
 from app.sim.pick.task_policy import Decision, PickProgress
@@ -14,18 +14,19 @@ def target_switch(
     new = decision.values[decision.index]
     return (
         f"Switched to {label(decision.chosen)} at {t_s:.1f} s "
-        f"(Q {new:.2f} vs {old:.2f} for {label(before)})."
+        f"(Q {value_text(new)} vs {value_text(old)} for {label(before)})."
     )
 
 
 def target_choice(decision: Decision, names: tuple[str, ...], label: Label) -> str:
     """Return the target with its value and the next best."""
-    text = f"Moving to {label(decision.chosen)} (Q {decision.values[decision.index]:.2f})"
+    own = value_text(decision.values[decision.index])
+    text = f"Moving to {label(decision.chosen)} (Q {own})"
     others = [i for i in range(len(names)) if i != decision.index]
     if not others:
         return text + "."
     second = max(others, key=lambda i: decision.values[i])
-    return f"{text}; next: {label(names[second])} ({decision.values[second]:.2f})."
+    return f"{text}; next: {label(names[second])} ({value_text(decision.values[second])})."
 
 
 def pick_phase(decision: Decision, progress: PickProgress, label: Label) -> str:

@@ -4,6 +4,7 @@ from app.live.reach.snapshot import ReachSnapshot
 from app.live.safety.explanation import slowed
 from app.live.safety.snapshot import SafetySnapshot
 from app.live.snapshot import Status
+from app.live.status_messages import length_text
 
 NO_POLICY = "No reach policy is active: moving straight to the goal without avoiding people"
 
@@ -24,5 +25,5 @@ def motion(
         return f"Goal reached: {then}."
     if (reason := slowed(safety, n_people)) is not None:
         return reason
-    left = f"{100.0 * view.distance:.0f} cm to go"
+    left = f"{length_text(view.distance)} to go"
     return f"Moving to the goal, {left}." if has_policy else f"{NO_POLICY}, {left}."

@@ -3,6 +3,7 @@
 from app.live.sorting.controller import FALLBACK_REASONS, MoveChoice, SortController
 from app.live.sorting.snapshot import Order, Phase
 from app.live.sorting.table import Block, SortingTable
+from app.live.status_messages import percent_text, value_text
 from app.sim.cells.cell import Cell
 from app.sim.pick.task_policy import Decision
 from app.sim.sorting.decision_types import REASONS
@@ -55,7 +56,8 @@ class StatusMessages:
 
     def failed_grasp(self, block: Block, risk: float) -> str:
         """Return that a grasp failed."""
-        return f"Grasp of {self.block(block)} failed ({risk:.0%} fail here): trying again."
+        chance = percent_text(risk)
+        return f"Grasp of {self.block(block)} failed ({chance} fail here): trying again."
 
     def timeout(self, choice: MoveChoice) -> str:
         """Return that a motion reached the time limit."""
@@ -89,7 +91,7 @@ class StatusMessages:
         if not risks:
             return ""
         label, risk = next(iter(risks.items()))
-        return f" Its duplicate in {label} fails more often ({risk:.0%})."
+        return f" Its duplicate in {label} fails more often ({percent_text(risk)})."
 
     def _fallback(self, controller: SortController) -> str:
         """Return why the planner decides in place of the policy."""
@@ -113,4 +115,4 @@ def _preference(choice: MoveChoice, order: Order, decision: Decision | None) -> 
         return ""
     own = decision.values[decision.index]
     best = max(value for i, value in enumerate(decision.values) if i != decision.index)
-    return f"{text}chosen by value {own:.2f} (the next has {best:.2f})."
+    return f"{text}chosen by value {value_text(own)} (the next has {value_text(best)})."

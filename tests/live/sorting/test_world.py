@@ -214,7 +214,7 @@ def test_duplicate_in_a_riskier_cell_is_left_and_the_message_says_so() -> None:
     assert going.sorting.duplicates == (ids["cell9"],)
     assert going.message == (
         "Moving to the large red block in cell 9, to be placed on the red tower: 1 move to go. "
-        "Its duplicate in cell 2 fails more often (40%)."
+        "Its duplicate in cell 2 fails more often (40 %)."
     )
 
 

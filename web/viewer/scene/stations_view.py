@@ -13,6 +13,7 @@ import viser
 
 from app.live.commands import ToggleCandidate
 from app.live.snapshot import CandidateSnapshot, WorldSnapshot
+from app.live.status_messages import value_text
 from app.sim.cells.cell import Cell
 from app.sim.cells.parts import Station
 from web.viewer.people.mannequin import Rgb
@@ -138,7 +139,7 @@ def _text(station: Station, candidate: CandidateSnapshot | None, values: list[fl
         return station.label
     sign = "\N{BLACK RIGHT-POINTING SMALL TRIANGLE} " if candidate.chosen else ""
     rank = 1 + sum(value > candidate.value for value in values)
-    return f"{sign}{rank}. {station.label}  {candidate.value:.1f}"
+    return f"{sign}{rank}. {station.label}  {value_text(candidate.value, 1)}"
 
 
 def _cube() -> trimesh.Trimesh:
