@@ -4,6 +4,7 @@ Pydantic's locations are inside our models; fields are paths in the JSON of the 
 """
 
 import math
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, TypeVar, get_args
 
@@ -14,6 +15,8 @@ from starlette.requests import Request
 MAX_VALUE_CHARACTERS = 200
 MAX_LISTED_ITEMS = 8
 NOTHING = "nothing"
+_SHOULD = re.compile(r"^[A-Z][a-z]+ should ")
+"""Start of pydantic's messages: ``String should have at most 80 characters``."""
 
 Member = dict[str, object]
 M = TypeVar("M", bound=BaseModel)
@@ -47,7 +50,7 @@ def validation_member(error: Mapping[str, Any], body: type[BaseModel] | None) ->
     kind, context = str(error["type"]), error.get("ctx", {})
     place, inside, inner = without_inner_tags(error["loc"], body)
     location, value = tuple(place), error.get("input")
-    rule = str(error["msg"]).replace("Input should be ", "must be ")
+    rule = _SHOULD.sub("must ", str(error["msg"]))
     rule = rule.replace("an instance of Sequence", "a valid list")
     choices: list[str] = []
     if kind == "json_invalid":
@@ -66,7 +69,8 @@ def validation_member(error: Mapping[str, Any], body: type[BaseModel] | None) ->
         rule, choices = "is not a known field", known_fields(inside, inner[:-1])
     elif kind in ("too_short", "too_long"):
         side, bound = ("at least", "min") if kind == "too_short" else ("at most", "max")
-        rule = f"must have {side} {context[bound + '_length']} items"
+        limit = context[bound + "_length"]
+        rule = f"must have {side} {limit} {'item' if limit == 1 else 'items'}"
         rule += f", not {context['actual_length']}" if context.get("actual_length") else ""
     elif "choices" in context:
         choices = list(context["choices"])

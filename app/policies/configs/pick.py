@@ -35,7 +35,7 @@ class PickLearning(TD3Learning):
         0,
         10_000,
         "episodes",
-        "Curve episodes: greedy ones behind a point; 0 counts environments without exploration",
+        "Curve episodes: greedy, behind a point; 0 counts environments without exploration",
     )
 
 
@@ -194,7 +194,7 @@ class PickPeople(FieldGroup):
     )
     human_pace: float = number(0.6, 0.2, 2.0, "", "Pace: 1 is the pace of the primitives")
     human_pace_max: float = number(
-        2.0, 0.2, 4.0, "", "Greatest pace: a person's is drawn per episode, from human_pace on"
+        2.0, 0.2, 4.0, "", "Greatest pace: each episode draws a person's, at least Pace"
     )
     human_yielding: float = number(0.0, 0.0, 1.0, "", "Yielding to the robot: 0 ignores it")
 

@@ -116,7 +116,7 @@ class ReachPeople(FieldGroup):
 
     n_people: Whole = number(1, 0, 4, "", "People")
     count: Literal["exact", "up-to"] = choice(
-        "exact", "Count: n_people everywhere, or 1 to n_people in equal shares of environments"
+        "exact", "Count: exact, or 1 to that many people in equal shares of environments"
     )
 
 
@@ -125,7 +125,7 @@ class ReachReward(FieldGroup):
 
     c_d: float = number(0.0, 0.0, 10.0, "1/m", "Distance cost c_d")
     c_p: float = number(1.0, 0.0, 10.0, "1/m", "Progress reward weight c_p")
-    c_a: float = number(0.0, 0.0, 10.0, "s^2/rad", "Acceleration cost c_a")
+    c_a: float = number(0.0, 0.0, 10.0, "s²/rad", "Acceleration cost c_a")
     c_step: float = number(0.003, 0.0, 1.0, "", "Time cost c_step: per control cycle")
     c_c: float = number(4.0, 0.0, 100.0, "", "Collision cost c_c")
     c_s: float = number(4.0, 0.0, 100.0, "", "Success bonus c_s")

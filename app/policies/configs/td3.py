@@ -16,7 +16,7 @@ class TD3Learning(Learning):
         1, 1, 1000, "", "Update interval: steps of all environments per update"
     )
     gradient_steps: Whole = number(
-        1, 1, 1000, "updates", "Updates: how many at each update interval"
+        1, 1, 1000, "updates", "Gradient steps: updates at each update interval"
     )
     actor_lr_ratio: float = number(
         1.0, 0.01, 100.0, "", "Learning rate ratio: the actor's over the critics'"

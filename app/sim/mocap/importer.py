@@ -309,7 +309,7 @@ def _converted(
 def _text(content: bytes, ending: str) -> str:
     """Return a file's text: UTF-8, UTF-16 with byte-order mark, or Latin-1 (CSV only)."""
     if len(content) > MAX_BYTES:
-        rule = f"must have at most {MAX_BYTES} bytes (32 MB)"
+        rule = f"must have at most {MAX_BYTES} bytes (32 MiB)"
         raise bad("file", f"<{len(content)} bytes>", rule, "cut it into parts")
     marked = content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
     try:

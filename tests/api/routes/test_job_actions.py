@@ -113,6 +113,8 @@ def test_labels_are_changed_and_removed(client: TestClient, ended: dict[str, Any
     assert client.get(path).json() == removed
     refused = client.patch(path, json={"priority": 1.5})
     assert refused.status_code == 422 and refused.json()["field"] == "priority"
+    long = client.patch(path, json={"name": 81 * "x"}).json()
+    assert (long["field"], long["rule"]) == ("name", "must have at most 80 characters")
 
 
 def test_budgets_are_given_changed_and_kept_by_repetitions(client: TestClient) -> None:

@@ -1,6 +1,6 @@
 """Protocols ``pick-people``, ``pick-mocap``, ``pick-yielding``, ``pick-rest``: other people.
 
-``pick-rest`` has one random target. The others select among 2-3 random targets by the critic
+``pick-rest`` has one random target. The others select among 2 or 3 random targets by the critic
 with hysteresis, as ``pick-choice`` does. They differ in the people. A policy for one person
 observes the nearest. Several workers share the table and do not avoid each other, so that they
 may overlap.

@@ -153,7 +153,7 @@ class ChoiceRun:
 
 
 def run_choice(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
-    """Evaluate the selection among 2-3 random targets, and other rules on the same episodes."""
+    """Evaluate selection among 2 or 3 random targets, and other rules on the same episodes."""
     evaluators = evaluators_of(checkpoint, (2, 3), request.episodes, request.seed)
     rows = request.rows(len(evaluators) * (len(OTHER_RULES) + 2))
     runs = {name: ChoiceRun(one, request.seed, name) for name, one in evaluators.items()}

@@ -164,7 +164,7 @@ class KeypointObserver:
 
 
 def run_tracker(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
-    """Evaluate task selection among 2-3 random targets with people observed by a tracker."""
+    """Evaluate task selection among 2 or 3 random targets with people observed by a tracker."""
     n = request.episodes or DEFAULT_EPISODES
     evaluator = evaluators_of(checkpoint, (2, 3), n, request.seed)[""]
     rule = selection_rules.critic(HYSTERESIS)
