@@ -92,9 +92,13 @@ def test_two_checkpoints_are_compared_by_what_differs(open_page: Callable[..., P
     page.click(f"{card('sorting-e1')} .job-head")
     page.check(f"{card('sorting-e1')} [data-action=compare-checkpoint]")
     table = page.locator("[data-role=checkpoint-differences] table")
-    expect(table.get_by_role("row", name="Cell")).to_contain_text("sorting-e1")
+    expect(table.locator("tr", has=page.get_by_text("Cell", exact=True))).to_contain_text(
+        "sorting-e1"
+    )
     expect(table.get_by_role("row", name="Seed")).to_have_count(0)
-    expect(table.get_by_role("row", name="learning.total_steps")).to_contain_text("\u202f000")
+    total = table.get_by_role("row", name="Total steps [env steps]")
+    expect(total).to_contain_text("\u202f000")
+    expect(total.locator("code")).to_have_text("learning.total_steps")
 
 
 def test_uploaded_checkpoint_is_deleted_after_a_question(

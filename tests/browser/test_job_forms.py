@@ -156,7 +156,9 @@ def test_sweep_shows_its_trials_and_marks_the_best(
     page.fill('[data-range="high"]', "0.001")
     page.check('[data-range="log"]')
     page.click('[data-action="add-range"]')
-    page.locator(".drawn select").last.select_option("networks.width")
+    drawn = page.locator(".drawn").last
+    drawn.locator("select").select_option(label="Width of the hidden layers [units]")
+    expect(drawn.locator("code")).to_have_text("networks.width")
     page.locator(".drawn").last.locator('[data-range="low"]').fill("16")
     page.locator(".drawn").last.locator('[data-range="high"]').fill("32")
     job_id = submit(page)
@@ -171,7 +173,7 @@ def test_sweep_shows_its_trials_and_marks_the_best(
     rows = page.locator('[data-role="trials"] tbody tr')
     expect(rows).to_have_count(2)
     expect(page.locator('[data-best="true"]')).to_have_count(1)
-    expect(page.locator('[data-role="trials"] thead')).to_contain_text("lr_start")
+    expect(page.locator('[data-role="trials"] thead')).to_contain_text("Initial learning rate")
     expect(page.locator(".is-open .plot canvas")).to_have_count(1)
     best = job(server, job_id)["result"]["trial"]
     expect(page.locator('[data-best="true"]')).to_have_attribute("data-trial", str(best))

@@ -17,6 +17,14 @@ PHONE = (390, 844)
 SCENE_PX = 150
 """Least height that the dock leaves to the scene of a desktop."""
 
+BARE_BUTTONS = """() => {
+  const seen = [...document.querySelectorAll("button")].filter((one) => one.checkVisibility());
+  const icons = seen.filter((one) => !one.innerText.trim());
+  const faults = icons.filter((one) => !one.ariaLabel || !one.title);
+  return { icons: icons.length, faults: faults.map((one) => one.outerHTML) };
+}"""
+"""Number of visible buttons without a visible text, and those without a name or a hint."""
+
 
 @pytest.fixture(params=cell_names())
 def shown(request: pytest.FixtureRequest, server: str) -> Iterator[str]:
@@ -53,6 +61,19 @@ def test_page_fits_its_window_and_its_text_stands_out(open_page: Callable[..., P
         page.set_viewport_size({"width": PHONE[0], "height": PHONE[1]})
         assert size_of(page)[0] == PHONE[0]
     assert page.problems == []  # type: ignore[attr-defined]
+
+
+@pytest.mark.usefixtures("shown")
+def test_buttons_without_a_text_have_a_name_and_a_hint(open_page: Callable[..., Page]) -> None:
+    page = open_page((1180, 800), scene=False)
+    page.wait_for_selector(".sentence")
+    page.click("#tab-training")
+    page.click('[data-action="new-job"]')
+    page.click('[data-kind="sweep"]')
+    page.click('[data-action="add-range"]')
+    bare = page.evaluate(BARE_BUTTONS)
+    assert bare["icons"] > 6
+    assert bare["faults"] == []
 
 
 @pytest.mark.usefixtures("shown")

@@ -232,9 +232,10 @@ def test_jobs_are_compared_with_a_band_over_seeds(
     groups = dialog.locator('[data-role="groups"] li')
     expect(groups).to_have_count(2)
     expect(groups.first).to_contain_text("seeds 1, 2")
-    expect(groups.last).to_contain_text("gamma 0.9")
+    expect(groups.last).to_contain_text("Discount factor γ = 0.9")
     fields = dialog.locator('[data-role="differences"] tbody th')
-    expect(fields).to_have_text(["learning.gamma", "seed"])
+    expect(fields).to_contain_text(["Discount factor γ [per step]", "Seed"])
+    expect(fields.locator("code")).to_have_text(["learning.gamma"])
     with page.expect_download() as table:
         dialog.get_by_text("CSV").click()
     rows = Path(table.value.path()).read_text().splitlines()

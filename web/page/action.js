@@ -1,4 +1,5 @@
 // Requests that a click starts: one at a time, with a question before those that remove something.
+import { sentence } from "./format.js";
 import { html, useEffect, useRef, useState } from "./vendor/htm-preact-standalone.module.js";
 
 /** One request at a time, however often its button is clicked; its error stays until the next. */
@@ -22,7 +23,7 @@ export function useAction(onDone) {
 }
 
 export function Fault({ error }) {
-  return error && html`<span class="field-error" role="alert">${error.message}</span>`;
+  return error && html`<span class="field-error" role="alert">${sentence(error.message)}</span>`;
 }
 
 /** A button that asks before it acts. */

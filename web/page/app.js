@@ -3,8 +3,9 @@ import { html, render, useEffect, useMemo, useRef, useState } from "./vendor/htm
 import { Acting, useCheckpoints } from "./training/checkpoints.js";
 import { Controls } from "./live/controls.js";
 import { FirstUse } from "./firstuse.js";
+import { capital, sentence } from "./format.js";
 import { useFrameFocus } from "./framefocus.js";
-import { Icon, Logo } from "./icons.js";
+import { Close, Icon, Logo } from "./icons.js";
 import { isActive } from "./training/jobactions.js";
 import { useJobs } from "./training/jobs.js";
 import { useCell, WORLD } from "./live/world-stream.js";
@@ -121,10 +122,9 @@ function Refusals({ errors, onDismiss }) {
   const counts = new Map();
   for (const { message } of errors) counts.set(message, (counts.get(message) ?? 0) + 1);
   return html`<div class="banner bad" role="alert"><${Icon} name="alert" />
-    <div>${[...counts].map(([message, n]) => html`<p key=${message}>${message}${
+    <div>${[...counts].map(([message, n]) => html`<p key=${message}>${sentence(message)}${
       n > 1 && ` (${n} commands)`}</p>`)}</div>
-    <button type="button" class="quiet-button" aria-label="Dismiss" onClick=${onDismiss}>
-      <${Icon} name="close" /></button></div>`;
+    <${Close} label="Dismiss" onClick=${onDismiss} /></div>`;
 }
 
 const CAUSES = {
@@ -213,15 +213,11 @@ function Scene({ cell }) {
   </section>`;
 }
 
-function capital(text) {
-  return text[0].toUpperCase() + text.slice(1);
-}
-
 function veil(link, reason) {
   if (link === "lost" || link === "stale") return ["The server does not answer", "Trying again every second."];
   if (link !== "warming") return ["Opening the cell", ""];
   const doing = reason.replace(/^(warming up|starting):? */, "");
-  if (doing === reason && reason) return ["The server is not ready", reason];
+  if (doing === reason && reason) return ["The server is not ready", sentence(reason)];
   const patience = " The first start on a machine takes several minutes, later ones seconds.";
   return ["Warming up", `${capital(doing || "starting")} …${/compil/.test(doing) ? patience : ""}`];
 }

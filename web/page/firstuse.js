@@ -1,6 +1,6 @@
 // Hint over the scene on the first visit: what to try, and a button that sets it up.
 import { html, useState } from "./vendor/htm-preact-standalone.module.js";
-import { Icon } from "./icons.js";
+import { Close } from "./icons.js";
 
 const KEPT = "tandem-tried";
 const BESIDE_M = 0.3;
@@ -55,8 +55,8 @@ export function FirstUse({ world, cell, send }) {
   return html`<p class="first-use" data-role="first-use"><span><b>Try it.</b> ${text}</span>
     ${commands.length > 0 && html`<button type="button" class="tool" data-action="try"
       onClick=${start}>${button}</button>`}
-    <button type="button" class="quiet-button" aria-label="Do not show this again"
-      data-action="dismiss-first-use" onClick=${dismiss}><${Icon} name="close" /></button></p>`;
+    <${Close} label="Do not show this again" data-action="dismiss-first-use"
+      onClick=${dismiss} /></p>`;
 }
 
 function kept() {

@@ -1,8 +1,9 @@
-// Numbers and names as people read them. SI units come in; cm, percent and minutes go out.
+// Numbers and names as people read them: one rule for each kind of quantity. SI units come in.
 
 import { serverTime } from "./api.js";
 
 const MINUS = "\u2212";
+const NB = "\u00a0"; // no line ends between a number and its unit
 const DAY_S = 24 * 3600;
 
 /** A critic's value with two decimals and a true minus sign. */
@@ -12,30 +13,40 @@ export function value(v) {
   return v < 0 && Number(text) !== 0 ? MINUS + text : text;
 }
 
-/** A distance in metres, in cm below one metre. */
-export function distance(metres) {
+/**
+ * A length in metres with two decimals, in millimetres below 1 cm; the same rule as
+ * `length_text` in app/live/status_messages.py.
+ */
+export function length(metres) {
   if (metres === null || metres === undefined || !Number.isFinite(metres)) return "–";
-  return metres < 0.995 ? `${Math.round(metres * 100)} cm` : `${metres.toFixed(1)} m`;
+  const mm = Math.round(metres * 1000);
+  if (mm >= 10) return `${metres.toFixed(2)}${NB}m`;
+  if (mm > 0) return `${mm}${NB}mm`;
+  return metres === 0 ? `0${NB}m` : `<${NB}1${NB}mm`;
 }
 
-/** How far somebody is from the robot, in metres; contact where nothing is between them. */
+/** The distance of a person from the robot, in metres; contact where nothing is between them. */
 export function gap(metres) {
-  if (metres === null || metres === undefined || !Number.isFinite(metres)) return "–";
-  return metres <= 0 ? "contact" : `${metres.toFixed(2)} m`;
+  return metres !== null && metres <= 0 ? "contact" : length(metres);
 }
 
 /** A count of steps: 950, 12.4 k, 1.25 M. */
 export function steps(n) {
   if (n === null || n === undefined) return "–";
-  if (n >= 999_950) return `${trim((n / 1e6).toFixed(2))} M`;
-  if (n >= 1e4) return `${trim((n / 1e3).toFixed(1))} k`;
+  if (n >= 999_950) return `${trim((n / 1e6).toFixed(2))}${NB}M`;
+  if (n >= 1e4) return `${trim((n / 1e3).toFixed(1))}${NB}k`;
   return String(Math.round(n));
+}
+
+/** A count with its noun: 1 step, 12.4 k steps. */
+export function count(n, one, many = `${one}s`) {
+  return `${steps(n)} ${n === 1 ? one : many}`;
 }
 
 /** A rate in [0, 1] as percent. */
 export function percent(rate, digits = 1) {
   if (rate === null || rate === undefined || !Number.isFinite(rate)) return "–";
-  return `${(rate * 100).toFixed(digits)} %`;
+  return `${(rate * 100).toFixed(digits)}${NB}%`;
 }
 
 /** A rate with its 95 % interval: 98.6 % (97.7 to 99.2). */
@@ -53,28 +64,67 @@ export function wilson(rate, n) {
   return { mean: rate, low: rate === 0 ? 0 : Math.max(0, low), high: rate === 1 ? 1 : Math.min(1, high) };
 }
 
+/** A size in bytes: 21.8 KiB, 1.25 MiB. */
+export function size(bytes) {
+  return bytes < 1024 ** 2 ? `${number(bytes / 1024)}${NB}KiB` : `${number(bytes / 1024 ** 2)}${NB}MiB`;
+}
+
 /** A time span in seconds: 8 s, 2 min 10 s, 1 h 05 min. */
 export function duration(seconds) {
   if (seconds === null || seconds === undefined || !Number.isFinite(seconds)) return "–";
   const s = Math.max(0, Math.round(seconds));
-  if (s < 60) return `${s} s`;
-  if (s < 3600) return `${Math.floor(s / 60)} min ${pad(s % 60)} s`;
-  return `${Math.floor(s / 3600)} h ${pad(Math.floor((s % 3600) / 60))} min`;
+  if (s < 60) return `${s}${NB}s`;
+  if (s < 3600) return `${Math.floor(s / 60)}${NB}min ${pad(s % 60)}${NB}s`;
+  return `${Math.floor(s / 3600)}${NB}h ${pad(Math.floor((s % 3600) / 60))}${NB}min`;
+}
+
+/** A time of the cell or of a recording in seconds, with a decimal. */
+export function seconds(t) {
+  return Number.isFinite(t) ? `${t.toFixed(1)}${NB}s` : "–";
 }
 
 /** How long ago an ISO time of the server was. */
 export function ago(iso, now = serverTime()) {
   if (!iso) return "";
-  const seconds = (now - Date.parse(iso)) / 1000;
-  if (seconds >= 2 * DAY_S) return `${Math.floor(seconds / DAY_S)} days ago`;
-  return seconds < 5 ? "just now" : `${duration(seconds).replace(/ \d\d s$/, "")} ago`;
+  const past = (now - Date.parse(iso)) / 1000;
+  if (past >= 2 * DAY_S) return `${Math.floor(past / DAY_S)} days ago`;
+  return past < 5 ? "just now" : `${duration(past).replace(/ \d\d\ss$/, "")} ago`;
 }
 
-/** A plain number with at most `digits` significant digits. */
+/** A plain number with at most `digits` significant digits; whole ones in groups from 10 000 on. */
 export function number(v, digits = 3) {
-  if (typeof v !== "number" || !Number.isFinite(v)) return String(v ?? "–");
-  const text = String(Number(v.toPrecision(digits)));
-  return text.replace("-", MINUS);
+  return typeof v === "number" && Number.isFinite(v)
+    ? grouped(Number(v.toPrecision(digits))) : String(v ?? "–");
+}
+
+/** A number with its unit. */
+export function quantity(v, unit, digits = 3) {
+  return `${number(v, digits)}${NB}${unit}`;
+}
+
+/** A value with all its digits, those of whole numbers from 10 000 on in groups of three. */
+export function grouped(v) {
+  if (typeof v !== "number") return typeof v === "string" ? v : JSON.stringify(v);
+  const text = Number.isInteger(v) && Math.abs(v) >= 1e4 && Math.abs(v) < 1e21
+    ? String(v).replace(/\B(?=(\d{3})+$)/g, "\u202f") : String(v);
+  return v < 0 ? MINUS + text.slice(1) : text;
+}
+
+/** A text of the service with true minus signs and units kept with their numbers. */
+export function typeset(text) {
+  return String(text).replace(/(?<![\w.'"`\u2212-])-(?=[\d.])/g, MINUS)
+    .replace(/(?<=\d) (?=(?:%|m|mm|cm|s|ms|min|h|Hz|steps)(?![\w/]))/g, NB);
+}
+
+/** A message of the service as a sentence; a name of a field at its start stays as it is. */
+export function sentence(text) {
+  const whole = typeset(/^[a-z]+(?![\w.[-]| = )/.test(text) ? capital(text) : text);
+  return /[.!?…]$/.test(whole) ? whole : `${whole}.`;
+}
+
+/** A text with a capital at its start. */
+export function capital(text) {
+  return text ? String(text)[0].toUpperCase() + String(text).slice(1) : "";
 }
 
 /** The first characters of a checksum or job id. */

@@ -35,6 +35,12 @@ export function Logo() {
   </svg>`;
 }
 
+/** A button with a cross; `label` says what it does, to the pointer and to screen readers. */
+export function Close({ label, ...rest }) {
+  return html`<button type="button" class="quiet-button" aria-label=${label} title=${label}
+    ...${rest}><${Icon} name="close" /></button>`;
+}
+
 /** The notice of a fault. */
 export function Alert({ children }) {
   return html`<p class="notice bad" role="alert"><${Icon} name="alert" /><span>${children}</span></p>`;

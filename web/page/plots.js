@@ -54,7 +54,7 @@ export function axis(theme, more) {
 }
 
 export function secondsAgo(v) {
-  return v === 0 ? "now" : `${format.number(v)} s`;
+  return v === 0 ? "now" : format.quantity(v, "s");
 }
 
 /** Values of all candidates over the last seconds; the chosen one is drawn thick. */

@@ -1,7 +1,8 @@
 // The frame with the 3D scene. The frame loads itself again when its drawing or its connection
 // has ended (viewer_extra.html); what it says about that is shown over it.
 import { html, useEffect, useRef, useState } from "./vendor/htm-preact-standalone.module.js";
-import { Icon } from "./icons.js";
+import { sentence } from "./format.js";
+import { Close } from "./icons.js";
 
 const MUTE_MS = 20000; // time without a word of the frame after which it is loaded again
 const NOTE_MS = 20000;
@@ -62,8 +63,7 @@ export function Viewer({ src, epoch, link, frame }) {
       <i class="spinner"></i><p><b>${text[0]}</b></p><p class="faint">${text[1]}</p></div>`}
     ${note && html`<p class="scene-note" role="status" data-role="scene-note">
       <span>The 3D scene had stopped and was loaded again.</span>
-      <button type="button" class="quiet-button" aria-label="Dismiss"
-        onClick=${() => setNote(false)}><${Icon} name="close" /></button></p>`}`;
+      <${Close} label="Dismiss" onClick=${() => setNote(false)} /></p>`}`;
 }
 
 /** What to say over the scene: a title and a sentence, or null while it is well. */
@@ -72,6 +72,6 @@ function trouble({ state, reason }, died) {
     return ["The 3D scene has stopped", "It is being loaded again. The robot goes on meanwhile."];
   }
   if (state !== "closed") return null;
-  if (reason) return ["The 3D scene cannot be shown", `${reason[0].toUpperCase()}${reason.slice(1)}.`];
-  return ["The 3D scene is being connected again", ""];
+  if (reason) return ["The 3D scene cannot be shown", sentence(reason)];
+  return ["The 3D scene is being connected again", "The robot goes on meanwhile."];
 }

@@ -14,14 +14,16 @@ export function Controls({ world, cell, cases, send, colourOf, labelOf }) {
       <div class="transport" role="group" aria-label="Clock">
         <button type="button" class="tool" onClick=${() =>
           send({ tag: world.paused ? "resume" : "pause" })} data-action="pause"
-          aria-label=${world.paused ? "Resume" : "Pause"}>
+          aria-label=${world.paused ? "Resume" : "Pause"}
+          title=${world.paused ? "The cell goes on" : "The cell stands still"}>
           <${Icon} name=${world.paused ? "play" : "pause"} filled=${world.paused} />
           <span>${world.paused ? "Resume" : "Pause"}</span></button>
         <button type="button" class="tool" disabled=${!world.paused} data-action="step"
           aria-label="Step"
-          title=${world.paused ? "One decision" : "Pause first"}
+          title=${world.paused ? "Go on for one decision" : "Pause first: a step is one decision"}
           onClick=${() => send({ tag: "step" })}><${Icon} name="step" /><span>Step</span></button>
         <button type="button" class="tool" data-action="reset" aria-label="Reset"
+          title="Robot and people start again"
           onClick=${() => send({ tag: "reset" })}><${Icon} name="reset" /><span>Reset</span></button>
         <select value=${world.speed} data-role="speed" aria-label="Speed of the clock"
           title="How fast the clock runs"

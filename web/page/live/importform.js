@@ -1,6 +1,7 @@
 // Importing a recording: a file, what is stated about it, and how it was read.
 import { html, useState } from "../vendor/htm-preact-standalone.module.js";
 import { postFile } from "../api.js";
+import * as format from "../format.js";
 import { Icon } from "../icons.js";
 
 const FORMATS = ".bvh,.mot,.sto,.csv";
@@ -43,7 +44,7 @@ export function ImportForm({ onDone }) {
   const skeleton = file?.name.toLowerCase().endsWith(".bvh");
   return html`<form class="dock-row import" onSubmit=${send} aria-label="Import a recording">
     <span class="dock-label">Import</span>
-    <label class="tool" title="BVH, OpenSim or CSV, at most 32 MB">
+    <label class="tool" title="BVH, OpenSim or CSV, at most 32 MiB">
       <input class="sr" type="file" accept=${FORMATS} data-role="import-file"
         disabled=${Boolean(answer.busy)} onChange=${choose} />
       <${Icon} name="plus" /><span>${file ? file.name : "Choose a file"}</span></label>
@@ -56,7 +57,7 @@ export function ImportForm({ onDone }) {
       <label class="stated" title=${`Unit of the root's path, if another. ${NUMBER_TITLE}`}>Root
         <input data-role="import-root-unit" list="import-units" placeholder="same"
           onInput=${state("root_unit")} /></label>
-      <label class="stated">Up
+      <label class="stated" title="Axis that points up; found from the file if empty">Up
         <select data-role="import-up" onChange=${state("up")}>
           <option value="">found</option>
           ${UP_AXES.map((one) => html`<option key=${one} value=${one}>${one}</option>`)}
@@ -67,7 +68,7 @@ export function ImportForm({ onDone }) {
     <button type="submit" class="tool" data-action="import"
       disabled=${Boolean(answer.busy)}>${answer.busy ? "Reading …" : "Import"}</button>`}
     ${answer.problem && html`<p class="field-error" role="alert" data-role="import-error">
-      ${answer.problem.message}</p>`}
+      ${format.sentence(answer.problem.message)}</p>`}
     ${answer.motion && html`<p class="result" role="status" data-role="import-result">
       ${summary(answer.motion)}</p>`}
   </form>`;
@@ -86,9 +87,9 @@ function summary({ name, reading, n_runs: runs, n_artifacts: n, artifacts }) {
   const parts = [
     `${reading.unit}, ${reading.up} up`,
     reading.root_unit !== reading.unit && `root's path in ${reading.root_unit}`,
-    `${Number(reading.rate_hz.toPrecision(4))} frames/s`,
-    reading.stature !== null && `${reading.stature.toFixed(2)} m tall`,
-    `${runs} clean ${runs === 1 ? "run" : "runs"}, ${n} cut out${n ? ` (${cutOut(artifacts)})` : ""}`,
+    `${format.number(reading.rate_hz, 4)} frames/s`,
+    reading.stature !== null && `${format.length(reading.stature)} tall`,
+    `${format.count(runs, "clean run")}, ${n} cut out${n ? ` (${cutOut(artifacts)})` : ""}`,
   ].filter(Boolean);
   return [`${name} read as: ${parts.join(", ")}.`, ...reading.notes].join(" ");
 }

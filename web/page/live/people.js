@@ -11,14 +11,14 @@ import { PedestrianControls } from "./walkers.js";
 const MAX_PEOPLE = 4;
 const MODES = [
   ["manual", "Manual", "You drag the handles in the scene", "hand"],
-  ["auto", "Work cycle", "Reaches for cubes and docks, on and on", "walk"],
-  ["recorded", "Recording", "Moves as somebody was recorded", "film"],
+  ["auto", "Work cycle", "Reaches for cubes and docks, again and again", "walk"],
+  ["recorded", "Recording", "Plays a recording of human motion", "film"],
   ["still", "Idle", "Goes home and rests", "stand"],
 ];
 const SLIDERS = [
-  ["stature", "Stature", (body) => metres(body.stature_m)],
-  ["arms", "Arms", (body) => format.distance(body.arm_m)],
-  ["shoulders", "Shoulders", (body) => format.distance(body.shoulders_m)],
+  ["stature", "Stature", (body) => format.length(body.stature_m)],
+  ["arms", "Arms", (body) => format.length(body.arm_m)],
+  ["shoulders", "Shoulders", (body) => format.length(body.shoulders_m)],
 ];
 const PERCENTILES = [1, 99];
 const SEND_MS = 150;
@@ -40,7 +40,7 @@ export function People({ world, send, children }) {
           onClick=${() => setPicked(id)}>
           <i class="swatch" style=${{ background: VESTS[id] }}></i>${nameOf(id)}</button>`)}
         ${people.length < MAX_PEOPLE && html`<button type="button" class="goal add"
-          data-action="add-person" onClick=${() => send({ tag: "add-person" })}>
+          data-action="add-person" title="A further person enters the cell" onClick=${() => send({ tag: "add-person" })}>
           <${Icon} name="plus" />Add</button>`}
       </div>
       ${tracked && !world.reach?.inference_mode.includes("distance-weighted") && html`<p class="dock-hint" title="This policy knows one person at a time.">
@@ -49,7 +49,7 @@ export function People({ world, send, children }) {
       ${children}
     </div>
     ${!person && html`<div class="dock-row"><span class="dock-label"></span>
-      <p class="dock-note">Nobody is in the cell.</p></div>`}
+      <p class="dock-note">No person is in the cell: add one to see the robot avoid people.</p></div>`}
     ${person?.cylinder && html`<${PedestrianControls} key=${person.id} person=${person}
       name=${nameOf(person.id)} world=${world} send=${send} />`}
     ${person && !person.cylinder && html`<${MotionSource} key=${person.id} person=${person} send=${send}
@@ -81,21 +81,22 @@ function MotionSource({ person, send, sized, onSized }) {
       <span class="spacer"></span>
       <div class="transport" role="group" aria-label=${`${nameOf(id)} in the cell`}>
         <button type="button" class="tool" aria-expanded=${String(sized)} data-action="size"
-          aria-label="Size" onClick=${onSized}><${Icon} name="ruler" /><span>Size</span></button>
+          aria-label="Size" title="Stature, arms and shoulders of this person" onClick=${onSized}><${Icon} name="ruler" /><span>Size</span></button>
         <button type="button" class="tool" data-action="remove-person"
           aria-label=${`Remove ${nameOf(id)}`} title=${`${nameOf(id)} leaves the cell`}
           onClick=${() => send({ tag: "remove-person", person: id })}>
           <${Icon} name="close" /><span>Remove</span></button>
       </div>
     </div>
-    ${shown && html`<${Recording} person=${person} list=${list} error=${error} send=${send} />
+    ${shown && html`<${Recording} person=${person} list=${list} error=${error} onAgain=${refresh} send=${send} />
       <${ImportForm} onDone=${refresh} />`}`;
 }
 
 /** Stored recordings to choose from, and the one that plays. */
-function Recording({ person, list, error, send }) {
+function Recording({ person, list, error, onAgain, send }) {
   const { id, motion } = person;
-  if (error) return html`<${Note}>The recordings cannot be listed: ${error}</${Note}>`;
+  if (error) return html`<${Note}>${format.sentence(`The recordings could not be listed: ${error}`)}
+      ${" "}<button type="button" class="text-button" onClick=${onAgain}>Try again</button></${Note}>`;
   if (list === null) return html`<${Note}>Looking for recordings …</${Note}>`;
   if (list.length === 0 && !motion) {
     return html`<${Note} role="empty-motions">No recordings yet. Import one here, or with
@@ -109,7 +110,7 @@ function Recording({ person, list, error, send }) {
       ${!motion && html`<option value="" disabled>Choose one</option>`}
       ${motion && !known && html`<option value=${motion.name}>${motion.name} (removed)</option>`}
       ${list.map((one) => html`<option key=${one.name} value=${one.name}>
-        ${one.name} (${seconds(one.duration_s)})</option>`)}
+        ${one.name} (${format.seconds(one.duration_s)})</option>`)}
     </select>
     ${motion && motion.n_runs > 1 && html`<select aria-label="Run of the recording"
       data-role="run" value=${motion.run} disabled=${!known}
@@ -129,12 +130,12 @@ function Progress({ person, motion }) {
       `${percent(motion.outside_share)} of the path leaves the walking area.`,
     motion.clipped_share > 0.001 &&
       `${percent(motion.clipped_share)} of the frames bend a joint beyond the model's limit; the
-      policy observes the limit, with a wrist up to ${format.distance(motion.clipped_m)} off.`,
+      policy observes the limit, with a wrist up to ${format.length(motion.clipped_m)} off.`,
   ].filter(Boolean);
   return html`<span class="played"><i style=${{ transform: `scaleX(${share})` }}></i></span>
     <span class="played-text" data-role="progress">${person.joining
       ? "on the way to the start"
-      : `${motion.t_s.toFixed(1)} of ${seconds(motion.duration_s)}`}</span>
+      : `${motion.t_s.toFixed(1)} of ${format.seconds(motion.duration_s)}`}</span>
     ${notes.length > 0 && html`<span class="hint" tabindex="0" data-role="motion-notes">
       ${person.outside_area ? "outside the area" : "notes"}
       <span class="tip tip-up" role="tooltip">${notes.join(" ")}</span></span>`}`;
@@ -152,7 +153,7 @@ function Size({ person, send }) {
   });
   const recorded = body.recorded && Object.keys(local).length === 0;
   return html`<div class="dock-row sizes">
-    <span class="dock-label">Size</span>
+    <span class="dock-label" title="P95: percentile 95 of adults">Size</span>
     ${SLIDERS.map(([name, label, shown]) => html`<label key=${name} class="size" data-size=${name}>
       <span><span>${label}${recorded ? "" : ` P${Math.round(local[name] ?? body[name])}`}</span>
         <b data-role=${`${name}-text`}>${shown(body)}</b></span>
@@ -160,7 +161,7 @@ function Size({ person, send }) {
         class=${recorded ? "is-idle" : ""}
         value=${local[name] ?? body[name]}
         aria-label=${`${label}, percentile of adults`}
-        aria-valuetext=${`${Math.round(local[name] ?? body[name])} percent, ${shown(body)}`}
+        aria-valuetext=${`percentile ${Math.round(local[name] ?? body[name])}, ${shown(body)}`}
         onInput=${(e) => {
           const value = Number(e.target.value);
           setLocal((now) => ({ ...now, [name]: value }));
@@ -210,14 +211,6 @@ function useThrottled(act) {
 
 function playOf(person, name, run = 0) {
   return { tag: "set-motion", person, name, run };
-}
-
-function metres(length) {
-  return `${length.toFixed(2)} m`;
-}
-
-function seconds(duration) {
-  return `${duration.toFixed(1)} s`;
 }
 
 function percent(share) {

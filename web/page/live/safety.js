@@ -84,12 +84,8 @@ function Terms({ safety, people }) {
     <div class=${separation < required ? "terms-top is-short" : "terms-top"}>
       <dt>${subject} to ${LINKS[link] ?? "robot"}</dt>
       <dd data-role="separation">${format.gap(separation)}</dd></div>
-    <div class="terms-top"><dt>Protective separation distance S<sub>p</sub></dt><dd data-role="required">${metres(required)}</dd></div>
+    <div class="terms-top"><dt>Protective separation distance S<sub>p</sub></dt><dd data-role="required">${format.length(required)}</dd></div>
     ${rows.map(([key, label, value]) => html`<div key=${key}><dt><i class=${`term term-${key}`}></i><span>${label}</span></dt>
-      <dd>${metres(value)}</dd></div>`)}
+      <dd>${format.length(value)}</dd></div>`)}
   </dl>`;
-}
-
-function metres(value) {
-  return Number.isFinite(value) ? `${value.toFixed(2)} m` : "–";
 }

@@ -29,9 +29,9 @@ export function StatusPanel({ world, chip = null }) {
       <span class=${`chip chip-${world.paused ? "quiet" : tone}`} data-status=${world.status}
         role="status">
         ${world.paused ? "Paused" : text}</span>
-      <span class="clock">${world.t_s.toFixed(1)} s</span>
+      <span class="clock">${format.seconds(world.t_s)}</span>
     </div>
-    <p class="sentence">${world.message || "Waiting for the first decision."}</p>
+    <p class="sentence">${format.typeset(world.message || "Waiting for the first decision.")}</p>
     ${world.verdict && html`<${Verdict} ...${world.verdict} />`}
     <${Clearance} metres=${world.clearance_m} people=${world.people ?? []} />
   </section>`;
@@ -49,7 +49,7 @@ function Verdict({ expected, observed, as_expected: agrees }) {
     : agrees ? ["as expected", "good"] : ["not as expected", "bad"];
   return html`<dl class="verdict" data-role="verdict" data-as-expected=${String(agrees)}>
     <div><dt>Expected</dt><dd data-role="expected">${expected}</dd></div>
-    <div><dt>Observed</dt><dd data-role="observed">${observed}</dd></div>
+    <div><dt>Observed</dt><dd data-role="observed">${format.typeset(observed)}</dd></div>
     <div><dt>Verdict</dt><dd><span class=${`chip chip-${tone}`}>${text}</span></dd></div>
   </dl>`;
 }
@@ -97,7 +97,7 @@ export function SmallPrint({ world }) {
 /** Checkpoint of the policy, and how long its decision took where there is one. */
 export function Provenance({ world: { checkpoint, elapsed_ms: ms } }) {
   return checkpoint && html`<p class="provenance">
-    ${Number.isFinite(ms) ? `Decided in ${format.number(ms, 2)} ms by checkpoint ` : "Checkpoint "}
+    ${Number.isFinite(ms) ? `Decided in ${format.quantity(ms, "ms", 2)} by checkpoint ` : "Checkpoint "}
     <code title=${checkpoint}>${format.short(checkpoint)}</code></p>`;
 }
 
@@ -109,8 +109,8 @@ export function outsideText({ field, value, low, high }) {
 
 function inUnits(field) {
   const speed = /\bqd\b/.test(field) ? "/s" : "";
-  if (/time_left/.test(field)) return (v) => `${format.number(v)} s`;
-  if (/pelvis_[xy]|position|tcp/.test(field)) return (v) => `${format.number(v)} m${speed}`;
+  if (/time_left/.test(field)) return (v) => format.quantity(v, "s");
+  if (/pelvis_[xy]|position|tcp/.test(field)) return (v) => format.quantity(v, `m${speed}`);
   return (v) => `${format.number(Math.round((v * 180) / Math.PI))}°${speed}`;
 }
 

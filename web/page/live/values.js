@@ -18,7 +18,7 @@ export function Values({ world, cell, history, colourOf, labelOf }) {
   return html`<section class="card" aria-labelledby="values-title">
     <header class="card-head">
       <h2 id="values-title">Value estimates${Number.isFinite(world.decided_s)
-        && html`, <span class="decided" data-role="decided">at ${world.decided_s.toFixed(1)} s</span>`}</h2>
+        && html`, <span class="decided" data-role="decided">at ${format.seconds(world.decided_s)}</span>`}</h2>
       <span class="hint" tabindex="0" aria-describedby="values-help">Q(s, π(s))
         <span class="tip tip-left" role="tooltip" id="values-help">The critic estimates the expected
           discounted reward of moving to each candidate now: reaching it is rewarded, delay and
@@ -27,7 +27,7 @@ export function Values({ world, cell, history, colourOf, labelOf }) {
       </span>
     </header>
     ${rows.length === 0
-      ? html`<p class="empty">No candidates. Pick at least one under the scene.</p>`
+      ? html`<p class="empty">No candidates. Choose at least one goal below the scene.</p>`
       : html`<ul class="bars">
           ${rows.map((c) => html`<${Bar} key=${c.id} candidate=${c} chosen=${chosen}
             isChosen=${c.id === world.chosen} colour=${colourOf(c.id)} label=${labelOf(c.id)}
@@ -49,7 +49,7 @@ function Readout({ past, age, labelOf }) {
   const others = [...past.values].filter(([id, v]) => id !== past.chosen && Number.isFinite(v));
   const [next] = others.sort((a, b) => b[1] - a[1]);
   const chosen = past.values.get(past.chosen);
-  return html`<span class="faint">${format.number(age, 2)} s</span>
+  return html`<span class="faint">${format.quantity(age, "s", 2)}</span>
     ${past.chosen && html`<span class="strong">${labelOf(past.chosen)} ${format.value(chosen)}</span>`}
     ${next && html`<span>${labelOf(next[0])} ${format.value(next[1])}</span>`}`;
 }
@@ -73,7 +73,7 @@ function Bar({ candidate, chosen, isChosen, colour, label, rank, scale }) {
     </span>
     <span class="bar-value">${format.value(value)}</span>
     <span class="bar-odds" data-role="success">${Number.isFinite(candidate.success)
-      && `${Math.round(100 * candidate.success)} %`}</span>
+      && format.percent(candidate.success, 0)}</span>
     <span class="bar-rank" aria-label=${rank && `rank ${rank}`}>${rank && `${rank}.`}</span>
     <span class="bar-note">${note(isChosen, reachable, outside)}</span>
     <span class="tip" role="tooltip" id=${`tip-${id}`}>${explain(candidate, chosen, label)}</span>
@@ -106,8 +106,8 @@ function explain({ id, value, reachable, success, contact, time_s: time, outside
     } else if (chosen?.id === id) parts.push("It is the present target.");
   } else parts.push(`No value for ${label} yet.`);
   if (Number.isFinite(success)) {
-    parts.push(`Probability of success ${Math.round(100 * success)} %, of a contact `
-      + `${Math.round(100 * contact)} %; expected time ${format.number(time, 1)} s.`);
+    parts.push(`Probability of success ${format.percent(success, 0)}, of a contact `
+      + `${format.percent(contact, 0)}; expected time ${format.seconds(time)}.`);
   }
   if (reachable === false) parts.push("No configuration with the tool pointing down reaches it.");
   for (const o of outside) parts.push(`Out of distribution: ${outsideText(o).join(" ")}.`);

@@ -1,5 +1,6 @@
 // Panel of a reach cell: status, safety layer, outcomes.
 import { html } from "../vendor/htm-preact-standalone.module.js";
+import * as format from "../format.js";
 import { Icon } from "../icons.js";
 import { Safety } from "../live/safety.js";
 import { Provenance, StatusPanel } from "../live/status.js";
@@ -30,7 +31,7 @@ function Outcomes({ world }) {
     </dl>
     <dl class="facts">
       <div><dt>Mean time to a goal</dt><dd>${counters.reached
-        ? `${(reach.counters.reaching_s / counters.reached).toFixed(1)} s` : "–"}</dd></div>
+        ? format.seconds(reach.counters.reaching_s / counters.reached) : "–"}</dd></div>
     </dl>
     <p class="range"><${Icon} name="alert" /><span>Contact at standstill: a person touched the robot
       while it stood still. People in this cell do not avoid the robot.</span></p>

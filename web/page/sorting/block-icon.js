@@ -23,11 +23,3 @@ export function Block({ colour, size, sizes, wanted = false }) {
     style=${{ "--block": BLOCKS[colour], "--block-ink": BLOCK_INK[colour], "--share": share }}>
     ${LETTERS[size] ?? size}</span>`;
 }
-
-export function capital(text) {
-  return text ? text[0].toUpperCase() + text.slice(1) : "";
-}
-
-export function plural(n, one, many = `${one}s`) {
-  return `${n} ${Number(n) === 1 ? one : many}`;
-}

@@ -1,7 +1,8 @@
 // The blocks that are there: a plan of the clutter on its failure map, from which blocks are
 // picked to be moved or taken away, and a shelf from which more are added.
 import { html } from "../vendor/htm-preact-standalone.module.js";
-import { Block, capital, kindOf, nameOf, placeName, plural } from "./block-icon.js";
+import { Block, kindOf, nameOf, placeName } from "./block-icon.js";
+import { capital, count, percent } from "../format.js";
 import { failureColours, failureGradient } from "../palette.js";
 
 export function Blocks({ sorting, cell, send, picked, onPick }) {
@@ -35,7 +36,7 @@ function Plan({ cells, sorting, picked, onPick }) {
     ${cells.map((one, index) => {
       const block = inCell(sorting, one.id);
       const { background, ink } = failureColours(sorting.failure[index]);
-      const chance = `${Math.round(100 * sorting.failure[index])} %`;
+      const chance = percent(sorting.failure[index], 0);
       const id = block?.id ?? one.id;
       return html`<button type="button" key=${one.id} class="plan-cell" data-cell=${one.id}
         data-block=${block?.id} aria-pressed=${String(picked === id)}
@@ -53,7 +54,7 @@ function Legend({ failure }) {
   const most = Math.max(0.1, ...failure);
   return html`<p class="map-legend"><span>Grasps fail: never</span>
     <i style=${{ background: failureGradient(most) }}></i>
-    <span>${Math.round(100 * most)} %</span><span class="spacer"></span>
+    <span>${percent(most, 0)}</span><span class="spacer"></span>
     <span>robot at bottom</span></p>`;
 }
 
@@ -75,7 +76,7 @@ function Picked({ block, cells, cell, sorting, send, onPick }) {
         ${block.in_goal ? "Out of the goal" : "Into the goal"}</button>
       <select value="" data-role="move-to" aria-label=${`Move the ${name} to`}
         disabled=${block.held || places.length === 0}
-        title=${block.held ? "The robot holds it" : ""}
+        title=${block.held ? "The robot holds it" : "Put it into a free cell or onto a tower"}
         onChange=${(event) => {
           send({ tag: "move-block", id: block.id, to: event.target.value });
           event.target.value = "";
@@ -97,7 +98,7 @@ function Picked({ block, cells, cell, sorting, send, onPick }) {
 /** One of every kind, to be put into the picked free cell, or into any. */
 function Shelf({ sorting, at, cells, send }) {
   const full = sorting.blocks.length >= cells.length;
-  const reason = `There is room for ${plural(cells.length, "block")} at most`;
+  const reason = `There is room for ${count(cells.length, "block")} at most`;
   return html`<div class="shelf" role="group" aria-labelledby="shelf-title">
     <span id="shelf-title">${full ? `${reason}.` : `Add to ${at ? at.label : "any free cell"}`}</span>
     <div class="shelf-kinds">

@@ -1,7 +1,7 @@
 // The goal, tower by tower: what stands there now beside what shall stand there. Blocks are
 // clicked in from below and out of the tower; the largest always lies at the bottom.
 import { html, useEffect, useRef, useState } from "../vendor/htm-preact-standalone.module.js";
-import { Block, capital, kindOf, nameOf, plural } from "./block-icon.js";
+import { Block, kindOf, nameOf } from "./block-icon.js";
 import * as format from "../format.js";
 
 const SETTLE_MS = 2000;
@@ -28,12 +28,12 @@ export function GoalEditor({ sorting, cell, send, picked, onPick }) {
 
 function progress(sorting, wanted) {
   if (wanted === 0) return "No goal yet. Click a block below a tower to ask for it.";
-  if (sorting.solved) return `Reached: ${plural(wanted, "block")} ${wanted === 1 ? "stands" : "stand"} as asked.`;
+  if (sorting.solved) return `Reached: ${format.count(wanted, "block")} ${wanted === 1 ? "stands" : "stand"} as asked.`;
   const done = sorting.goal.filter((one) => one.done).length;
   const { moves_to_go: moves, attempts_to_go: attempts } = sorting;
   const rest = Number.isFinite(moves) && moves > 0
-    ? ` ${capital(plural(moves, "move"))} to go, about ${plural(format.number(attempts, 2), "grasp")}.` : "";
-  return `${done} of ${plural(wanted, "block")} in place.${rest}`;
+    ? ` ${format.count(moves, "move")} to go, about ${format.number(attempts, 2)} ${attempts < 1.05 ? "grasp" : "grasps"}.` : "";
+  return `${done} of ${format.count(wanted, "block")} in place.${rest}`;
 }
 
 /** One tower: now and goal side by side on its plate, and the kinds it can still be given. */
@@ -44,12 +44,12 @@ function Tower({ tower, sorting, sizes, onPut, picked, onPick }) {
   const done = new Set(sorting.goal.filter((one) => one.tower === tower.id && one.done)
     .map((one) => one.level));
   const out = (level) => onPut(sizes.filter((_, k) => k !== level));
-  return html`<div class="tower" role="group" aria-label=${`${capital(colour)} tower`}>
+  return html`<div class="tower" role="group" aria-label=${`${format.capital(colour)} tower`}>
     <div class="stacks">
       <div class="stack" role="group" aria-label="On it now">
         ${now.map((one) => html`<button type="button" key=${one.id} class="block-button"
           data-block=${one.id} aria-pressed=${String(picked === one.id)}
-          aria-label=${`${capital(nameOf(one))}, level ${one.level + 1}`}
+          aria-label=${`${format.capital(nameOf(one))}, level ${one.level + 1}`}
           onClick=${() => onPick(one.id)}><${Block} ...${one} sizes=${sorting.sizes} /></button>`)}
       </div>
       <div class="stack" role="group" aria-label="Goal">
@@ -78,7 +78,7 @@ function Offer({ colour, size, sizes, sorting, asked, onAdd }) {
   const there = sorting.blocks.filter((one) => kindOf(one) === kind).length;
   const left = there - asked.filter((one) => one === size).length;
   const why = there === 0 ? `There is no ${name}: add one below`
-    : `All ${plural(there, name)} are in the goal: add another below`;
+    : `All ${format.count(there, name)} are in the goal: add another below`;
   const reason = there === 1 && left <= 0 ? `The ${name} is in the goal: add another below` : why;
   return html`<button type="button" class="offer" data-goal-add=${kind} disabled=${left <= 0}
     title=${left > 0 ? `Ask for a ${name}` : reason}

@@ -1,6 +1,6 @@
 // Sorting moves: the present move, its source (policy or planner), and the ranking.
 import { html } from "../vendor/htm-preact-standalone.module.js";
-import { Block, capital, nameOf, placeName } from "./block-icon.js";
+import { Block, nameOf, placeName } from "./block-icon.js";
 import { TaskPlanner } from "../training/checkpoints.js";
 import * as format from "../format.js";
 
@@ -35,8 +35,8 @@ export function Moves({ sorting, cell }) {
 }
 
 function idle(sorting) {
-  if (sorting.goal.length === 0) return "Nothing to do: there is no goal.";
-  return sorting.solved ? "Nothing to do: the goal is reached." : "No move is evaluated.";
+  if (sorting.goal.length === 0) return "Nothing to do: there is no goal. Add blocks to it above.";
+  return sorting.solved ? "Nothing to do: the goal is reached." : "No move is evaluated yet.";
 }
 
 function Decider({ sorting }) {
@@ -59,7 +59,7 @@ function Decider({ sorting }) {
 function Rank({ move, sorting, cell, chosen, share }) {
   const id = move.block ?? (chosen ? sorting.move.block : null);
   const block = sorting.blocks.find((one) => one.id === id);
-  const from = capital(placeName(cell, move.pick));
+  const from = format.capital(placeName(cell, move.pick));
   const to = placeName(cell, move.place);
   const what = block ? nameOf(block) : "block";
   const why = [worth(move.value, sorting.decided_by),
@@ -81,7 +81,7 @@ function Rank({ move, sorting, cell, chosen, share }) {
 function worth(value, by) {
   if (!Number.isFinite(value)) return "";
   return by === "planner"
-    ? `${format.number(-value, 2)} expected grasps to the goal if it comes first.`
+    ? `Expected grasps to the goal if it comes first: ${format.number(-value, 2)}.`
     : `Expected discounted reward if it comes first: ${format.value(value)}.`;
 }
 

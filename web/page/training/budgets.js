@@ -41,10 +41,11 @@ export function EndedByBudget({ job, onChanged }) {
   const send = () => post(`v1/jobs/${job.id}/resume`, budgetBody(form.typed));
   return html`<div data-role="ended-by">
     <p class="notice warn" role="status"><${Icon} name="alert" />
-      <span><b>Ended by its ${job.ended_by}</b> at ${format.steps(job.step)}${job.total_steps
-        ? ` of ${format.steps(job.total_steps)}` : ""} steps after ${format.duration(job.run_s)}.
-      ${job.resume_step === null ? " Its state is not kept any more." : ` It continues from
-      ${format.steps(job.resume_step)} steps with a larger budget.`}</span></p>
+      <span><b>Ended by its ${job.ended_by}</b> at ${job.total_steps
+        ? `${format.steps(job.step)} of ${format.count(job.total_steps, "step")}`
+        : format.count(job.step, "step")} after ${format.duration(job.run_s)}.
+      ${job.resume_step === null ? " Its state is not kept any more: clone it to train longer." : ` It continues from
+      ${format.count(job.resume_step, "step")} with a larger budget.`}</span></p>
     ${job.resume_step !== null && html`<form class="train" ref=${form.ref} noValidate
       onSubmit=${form.submit(send)} aria-label=${`Resume job ${job.number}`}>
       ${form.faults[""] && html`<p class="field-error" role="alert">${form.faults[""]}</p>`}

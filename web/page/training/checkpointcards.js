@@ -4,13 +4,13 @@ import { Ask, Fault, useAction } from "../action.js";
 import { postFile, put, remove } from "../api.js";
 import * as format from "../format.js";
 import { Alert, Icon } from "../icons.js";
+import { FieldName, fieldValue } from "./fieldnames.js";
 import { PAGE, storedCheckpoints } from "./checkpoints.js";
-import { grouped } from "./formfields.js";
 
 const PURPOSES = { "choosing tasks": "task selection", "reaching goals": "reach", sorting: "sorting" };
 
 /** The section of the checkpoints; `acting` are the SHA-256 of those of the live cell. */
-export function CheckpointCards({ link, jobs, acting }) {
+export function CheckpointCards({ link, jobs, acting, presets }) {
   const [list, setList] = useState(null);
   const [error, setError] = useState(null);
   const [open, setOpen] = useState(null);
@@ -25,13 +25,14 @@ export function CheckpointCards({ link, jobs, acting }) {
   return html`<section class="card" aria-labelledby="checkpoints-title" data-role="checkpoints">
     <header class="card-head"><h2 id="checkpoints-title">Checkpoints</h2></header>
     <${Upload} onDone=${(one) => { refresh(); setOpen(one.sha256); }} />
-    ${error && html`<${Alert}>The checkpoints could not be loaded: ${error.message}</${Alert}>`}
+    ${error && html`<${Alert}>${format.sentence(`The checkpoints could not be loaded: ${error.message}`)}
+      ${" "}<button type="button" class="text-button" onClick=${refresh}>Try again</button></${Alert}>`}
     ${!list && !error && html`<div class="skeleton" aria-busy="true" aria-label="Loading checkpoints"></div>`}
-    ${list?.length === 0 && html`<p class="empty">No checkpoints yet: the shipped ones are stored
-      while the server starts.</p>`}
-    ${compared.length === 2 && html`<${Comparison} pair=${compared} jobs=${jobs}
+    ${list?.length === 0 && html`<p class="empty">No checkpoints yet: train a policy with a new job, or
+      upload a checkpoint.</p>`}
+    ${compared.length === 2 && html`<${Comparison} pair=${compared} jobs=${jobs} presets=${presets}
       onClose=${() => setPair([])} />`}
-    ${compared.length === 1 && html`<p class="faint" role="status">Choose a second checkpoint to compare.</p>`}
+    ${compared.length === 1 && html`<p class="faint" role="status">Open a second checkpoint and tick Compare in it, too.</p>`}
     <ul class="jobs">${(list ?? []).map((one) => html`<${Card} key=${one.sha256} one=${one}
       open=${open === one.sha256} chosen=${pair.includes(one.sha256)} acting=${acting} jobs=${jobs}
       onOpen=${setOpen} onChoose=${choose} onChanged=${refresh} />`)}</ul>
@@ -58,8 +59,8 @@ function Card({ one, open, chosen, acting, jobs, onOpen, onChoose, onChanged }) 
       <div class="job-actions">
         <label class="tool"><input type="checkbox" data-action="compare-checkpoint" checked=${chosen}
           onChange=${() => onChoose(one.sha256)} /> Compare</label>
-        <a class="tool" download href=${`v1/checkpoints/${one.sha256}/tensors`}>safetensors</a>
-        <a class="tool" download=${`${nameOf(one)}.json`}
+        <a class="tool" download title="Download the tensors" href=${`v1/checkpoints/${one.sha256}/tensors`}>safetensors</a>
+        <a class="tool" title="Download the manifest" download=${`${nameOf(one)}.json`}
           href=${`v1/checkpoints/${one.sha256}/manifest`}>manifest</a>
         ${!one.job_id && one.aliases.length === 0 && html`<${Delete} one=${one} onChanged=${onChanged} />`}
       </div></div>`}
@@ -72,20 +73,20 @@ function nameOf(one) {
 
 function subtitle(one) {
   const steps = one.step ?? one.manifest.step;
-  return [one.aliases.length > 0 && one.preset, Number.isFinite(steps) && `${format.steps(steps)} steps`,
+  return [one.aliases.length > 0 && one.preset, Number.isFinite(steps) && format.count(steps, "step"),
     one.shipped.length ? "shipped" : format.ago(one.created_at)].filter(Boolean).join(" · ");
 }
 
 function facts(one) {
   const { manifest } = one;
   return {
-    Id: format.short(one.sha256),
+    ID: format.short(one.sha256),
     Cell: manifest.cell ?? "–",
     Seed: String(manifest.seed ?? "–"),
     Steps: format.steps(one.step ?? manifest.step),
     Updates: format.steps(manifest.updates),
     "CPU time": format.duration(manifest.cpu_s),
-    Size: `${format.number(one.size / 1024 ** 2)} MiB`,
+    Size: format.size(one.size),
     "Trained with": `torch ${manifest.versions?.torch ?? "–"}`,
     ...recalibration(manifest.recalibration),
   };
@@ -95,7 +96,7 @@ function facts(one) {
 function recalibration(record) {
   if (!record) return {};
   const n = Object.values(record.outcomes).reduce((sum, count) => sum + count, 0);
-  return { "Recalibrated by": `${n} outcomes, from ${format.short(record.from)}` };
+  return { "Recalibrated by": `${format.count(n, "outcome")}, from ${format.short(record.from)}` };
 }
 
 /** Names and values; those that are unknown are left out. */
@@ -146,7 +147,7 @@ function Aliases({ one, onChanged }) {
       title="Alias of a shipped checkpoint">${alias}</span>`)}
     ${one.aliases.filter((alias) => !one.shipped.includes(alias)).map((alias) => html`<button
       type="button" class="tool" key=${alias}
-      title=${`Remove the alias ${alias}`}
+      title=${`Remove the alias ${alias}`} aria-label=${`Remove the alias ${alias}`}
       onClick=${() => run(() => remove(`v1/aliases/${encodeURIComponent(alias)}`))}>
       ${alias}<${Icon} name="close" /></button>`)}
     <input data-role="alias" value=${name} placeholder="new alias" aria-label="New alias"
@@ -192,11 +193,11 @@ function Upload({ onDone }) {
         disabled=${Boolean(answer.busy)} onChange=${send} />
       <${Icon} name="plus" />${answer.busy ? "Checking …" : "Upload"}</label>
     ${answer.stored && html`<span class="faint" role="status">Stored ${format.short(answer.stored.sha256)}.</span>`}
-    ${answer.error && html`<span class="field-error" role="alert">${answer.error}</span>`}</div>`;
+    ${answer.error && html`<span class="field-error" role="alert">${format.sentence(answer.error)}</span>`}</div>`;
 }
 
 /** Facts, preset fields and evaluations of two checkpoints: those that differ. */
-function Comparison({ pair, jobs, onClose }) {
+function Comparison({ pair, jobs, presets, onClose }) {
   const columns = pair.map((one) => ({
     Purpose: PURPOSES[one.purpose] ?? one.purpose, ...facts(one),
     ...flat({ ...one.manifest.preset, name: undefined, cell: undefined }), ...latestRates(one, jobs),
@@ -204,9 +205,10 @@ function Comparison({ pair, jobs, onClose }) {
   const names = [...new Set(columns.flatMap(Object.keys))]
     .filter((name) => columns[0][name] !== columns[1][name]);
   return html`<div class="differences" data-role="checkpoint-differences">
-    <table><thead><tr><th scope="col">differs</th>
+    <table><thead><tr><th scope="col">Field</th>
       ${pair.map((one) => html`<th scope="col" key=${one.sha256}>${nameOf(one)}</th>`)}</tr></thead>
-    <tbody>${names.map((name) => html`<tr key=${name}><th scope="row">${name}</th>
+    <tbody>${names.map((name) => html`<tr key=${name}><th scope="row"><${FieldName}
+      presets=${presets} path=${name} preset=${pair[0].manifest.preset?.name} named /></th>
       ${columns.map((column, k) => html`<td key=${k}>${column[name] ?? "–"}</td>`)}</tr>`)}</tbody></table>
     <div class="job-actions"><button type="button" class="tool" onClick=${onClose}>Close the comparison
       </button></div></div>`;
@@ -216,7 +218,7 @@ function flat(value, prefix = "") {
   return Object.fromEntries(Object.entries(value).flatMap(([key, one]) => {
     const name = prefix ? `${prefix}.${key}` : key;
     return one !== null && typeof one === "object" && !Array.isArray(one)
-      ? Object.entries(flat(one, name)) : [[name, grouped(one)]];
+      ? Object.entries(flat(one, name)) : [[name, fieldValue(one)]];
   }));
 }
 

@@ -41,7 +41,7 @@ export function Acting({ world, checkpoints, jobs, send }) {
       onFocus=${checkpoints.refresh} title=${world.policy_title ?? ""}
       onChange=${(e) => send({ tag: "set-policy", checkpoint: e.target.value || null })}>
       ${world.reach && html`<option value="">none: straight to the goal</option>`}
-      ${!now && !world.reach && html`<option value="" disabled>no policy</option>`}
+      ${!now && !world.reach && html`<option value="" disabled>none: choose one</option>`}
       ${options(groups, now, world.policy_title)}
     </select>
   </label>`;
@@ -83,7 +83,7 @@ function grouped(list, jobs, now) {
   ].filter((group) => group.items.length);
   for (const [id, items] of byJob) {
     const job = `job ${jobs?.find((j) => j.id === id)?.number ?? format.short(id)}`;
-    groups.push({ label: job[0].toUpperCase() + job.slice(1), items, job });
+    groups.push({ label: format.capital(job), items, job });
   }
   return groups;
 }
@@ -94,6 +94,6 @@ function name(checkpoint, job) {
   const step = checkpoint.step ?? manifest.step;
   const parts = [checkpoint.aliases[0] ?? job ?? preset ?? format.short(checkpoint.sha256)];
   if (!job && preset && preset !== parts[0]) parts.push(preset);
-  if (Number.isFinite(step)) parts.push(`${format.steps(step)} steps`);
+  if (Number.isFinite(step)) parts.push(format.count(step, "step"));
   return parts.join(" · ");
 }

@@ -1,61 +1,73 @@
 // Comparison of jobs: one curve per group of seeds with its band, and the fields that differ.
 import { html, useEffect, useMemo, useRef, useState } from "../vendor/htm-preact-standalone.module.js";
 import * as format from "../format.js";
-import { Alert, Icon } from "../icons.js";
+import { Alert, Close } from "../icons.js";
 import { GOALS } from "../palette.js";
 import { axis, Plot, useTheme } from "../plots.js";
+import { FieldName, fieldOf, fieldValue } from "./fieldnames.js";
 import { useAnswer } from "./formfields.js";
 
 export const MAX_JOBS = 20;
 const RATES = new Set(["success", "collision", "timeout"]);
+const QUANTITIES = { success: "success [%]", collision: "collision [%]", timeout: "time-out [%]",
+  reward: "mean reward of an episode", cpu_s: "CPU time [s]", time_left_s: "time left [s]",
+  updates_per_s: "updates per s", steps_per_s: "steps per s" };
+const NAMED = 3; // fields that the name of a group lists
 const HEIGHT = 300;
 
+const quantityName = (name) => QUANTITIES[name] ?? name.replaceAll("_", " ");
+
 /** A dialog over the page; `ids` are the compared jobs, in their order. */
-export function Comparison({ ids, onClose }) {
+export function Comparison({ ids, presets, onClose }) {
   const [quantity, setQuantity] = useState(null);
   const dialog = useRef(null);
   const query = ids.map((id) => `job=${encodeURIComponent(id)}`).join("&");
   const chosen = quantity ? `&quantity=${encodeURIComponent(quantity)}` : "";
-  const { answer: found, error } = useAnswer(`v1/comparison?${query}${chosen}`);
+  const { answer, error } = useAnswer(`v1/comparison?${query}${chosen}`);
+  const found = useMemo(() => answer && { ...answer,
+    groups: answer.groups.map((group) => ({ ...group, label: labelOf(group, answer, presets) })) },
+  [answer, presets.items]);
   useEffect(() => dialog.current.showModal(), []);
   return html`<dialog class="compare" ref=${dialog} onClose=${onClose} data-role="comparison"
     aria-labelledby="compare-title">
-    <header class="card-head"><h2 id="compare-title">Comparison of ${ids.length} ${ids.length === 1 ? "job" : "jobs"}</h2>
-      <button type="button" class="quiet-button" aria-label="Close the comparison"
-        onClick=${() => dialog.current.close()}><${Icon} name="close" /></button></header>
-    ${error && html`<${Alert}>${error.message}</${Alert}>`}
+    <header class="card-head"><h2 id="compare-title">Comparison of ${format.count(ids.length, "job")}</h2>
+      <${Close} label="Close the comparison" onClick=${() => dialog.current.close()} /></header>
+    ${error && html`<${Alert}>${format.sentence(error.message)} Close the comparison and open it
+      again.</${Alert}>`}
     ${!found && !error && html`<div class="skeleton tall" aria-busy="true"
       aria-label="Loading the curves"></div>`}
     ${found && html`
       <${Curves} found=${found} query=${query} dialog=${dialog} onQuantity=${setQuantity} />
-      <${Differences} found=${found} />`}
+      <${Differences} found=${found} presets=${presets} />`}
   </dialog>`;
 }
 
 function Curves({ found, query, dialog, onQuantity }) {
   const [at, setAt] = useState(null);
   if (found.steps.length === 0) {
-    return html`<p class="empty">These jobs have no points of a learning curve yet.</p>`;
+    return html`<p class="empty">These jobs have no points of a learning curve: choose
+      trainings that have reached their first point.</p>`;
   }
-  const place = at ?? found.steps.length - 1;
   return html`
     <div class="compare-tools">
       <label>Quantity <select data-role="quantity" value=${found.quantity}
         onChange=${(e) => onQuantity(e.target.value)}>
         ${found.quantities.map((name) => html`<option key=${name} value=${name}>
-          ${name.replaceAll("_", " ")}</option>`)}</select></label>
+          ${quantityName(name)}</option>`)}</select></label>
       <span class="spacer"></span>
-      <a class="tool" download="jobs.csv" href=${`v1/comparison/csv?${query}`}>CSV</a>
-      <button type="button" class="tool" data-action="png"
+      <a class="tool" download="jobs.csv" title="Download all points of the curves"
+        href=${`v1/comparison/csv?${query}`}>CSV</a>
+      <button type="button" class="tool" data-action="png" title="Download the plot"
         onClick=${() => savePicture(dialog.current, found)}>PNG</button>
     </div>
     <${GroupPlot} found=${found} onHover=${setAt} />
     <p class="plot-foot"><span>Environment steps</span>
-      <span>${format.steps(found.steps[place])} steps</span></p>
+      <span>${!Number.isInteger(at)
+      ? "last point of each curve" : format.count(found.steps[at], "step")}</span></p>
     <ul class="groups" data-role="groups">${found.groups.map((group, i) => html`
       <li key=${group.label}><i class="line-mark" style=${{ background: colour(i) }}></i>
         <b>${group.label}</b> <span>${seedsOf(group, found)}</span>
-        <span class="readout">${readout(group, place, found.quantity)}</span></li>`)}</ul>
+        <span class="readout">${readout(group, at ?? lastOf(group), found.quantity)}</span></li>`)}</ul>
     <p class="field-help">Line: mean over the seeds. Band: from the least to the greatest
       of them.</p>`;
 }
@@ -65,9 +77,14 @@ function seedsOf(group, found) {
   return seeds.length === 1 ? `seed ${seeds[0]}` : `seeds ${seeds.join(", ")}`;
 }
 
+/** Place of the last point of a group's curve. */
+function lastOf({ mean }) {
+  return mean.findLastIndex((v) => v !== null);
+}
+
 function readout(group, place, quantity) {
   const [mean, low, high] = [group.mean, group.low, group.high].map((row) => row[place]);
-  if (mean === null) return "–";
+  if (!Number.isFinite(mean)) return "–";
   const show = shower(quantity);
   return group.n[place] > 1 ? `${show(mean)} (${show(low)} to ${show(high)})` : show(mean);
 }
@@ -88,7 +105,7 @@ function GroupPlot({ found, onHover }) {
   const data = useMemo(
     () => [found.steps, ...found.groups.flatMap((g) => [g.mean, g.high, g.low])], [found]);
   return html`<${Plot} options=${options} data=${data} height=${HEIGHT}
-    label=${`${found.quantity} over environment steps of ${found.groups.length} groups of jobs`} />`;
+    label=${`${quantityName(found.quantity)} over environment steps of ${format.count(found.groups.length, "group")} of jobs`} />`;
 }
 
 function groupOptions(theme, { groups, quantity }, hover) {
@@ -118,7 +135,7 @@ function groupOptions(theme, { groups, quantity }, hover) {
 }
 
 /** The fields that differ: a column for each job. */
-function Differences({ found }) {
+function Differences({ found, presets }) {
   const { differences, jobs } = found;
   if (jobs.length < 2) return null;
   if (differences.length === 0) {
@@ -129,14 +146,24 @@ function Differences({ found }) {
       <thead><tr><th scope="col">Field</th>${jobs.map((job) => html`<th key=${job.id} scope="col"
         title=${job.name ?? ""}>Job ${job.number}</th>`)}</tr></thead>
       <tbody>${differences.map(({ field, values }) => html`<tr key=${field}>
-        <th scope="row">${field}</th>
-        ${values.map((v, i) => html`<td key=${jobs[i].id}>${shown(v)}</td>`)}</tr>`)}</tbody>
+        <th scope="row"><${FieldName} presets=${presets} path=${field}
+          preset=${jobs.find((job) => job.preset)?.preset} named /></th>
+        ${values.map((v, i) => html`<td key=${jobs[i].id}>${fieldValue(v)}</td>`)}</tr>`)}</tbody>
     </table></div>`;
 }
 
-function shown(v) {
-  if (v === null || v === undefined) return "–";
-  return typeof v === "number" ? format.number(v, 6) : typeof v === "string" ? v : JSON.stringify(v);
+/** A group's values of the fields that differ between the trainings; the preset if none does. */
+function labelOf(group, { jobs, groups, differences }, presets) {
+  const place = jobs.findIndex(({ id }) => id === group.jobs[0]);
+  const trained = groups.map(({ jobs: [id] }) => jobs.findIndex((job) => job.id === id));
+  const differ = differences.filter(({ field, values }) => field !== "seed"
+    && trained.some((i) => JSON.stringify(values[i]) !== JSON.stringify(values[place])));
+  const { preset } = jobs[place];
+  if (differ.length === 0 || differ.some(({ field }) => field === "preset")) return preset;
+  const parts = differ.slice(0, NAMED).map(({ field, values }) =>
+    `${fieldOf(presets, field, preset).title} = ${fieldValue(values[place])}`);
+  const more = differ.length > NAMED ? `, ${differ.length - NAMED} more` : "";
+  return parts.join(", ") + more;
 }
 
 /** Save the plot with its title and legend as a PNG file. */
@@ -156,13 +183,13 @@ function savePicture(dialog, found) {
     pen.font = `${weight} ${13 * scale}px Inter, system-ui, sans-serif`;
     pen.fillText(text, x, y);
   };
-  write(`${found.quantity.replaceAll("_", " ")} over environment steps`, margin, 26 * scale, 600);
+  write(`${format.capital(quantityName(found.quantity))} over environment steps`, margin, 26 * scale, 600);
   pen.drawImage(plot, margin, top);
   found.groups.forEach((group, i) => {
     const y = top + plot.height + line * (i + 1.5);
     pen.fillStyle = colour(i);
     pen.fillRect(margin, y - 6 * scale, 16 * scale, 3 * scale);
-    const last = readout(group, found.steps.length - 1, found.quantity);
+    const last = readout(group, lastOf(group), found.quantity);
     write(`${group.label} · ${seedsOf(group, found)} · last ${last}`, margin + 26 * scale, y);
   });
   picture.toBlob((blob) => {

@@ -51,7 +51,7 @@ export function checkpointField(protocol, checkpoints) {
   const fitting = checkpoints.filter(({ purpose }) => purpose === protocol.purpose);
   const labels = Object.fromEntries(fitting.map((one) => [one.sha256,
     [one.aliases[0] ?? format.short(one.sha256), one.preset ?? one.manifest.preset?.name,
-      `${format.steps(one.step ?? one.manifest.step)} steps`].filter(Boolean).join(" · ")]));
+      format.count(one.step ?? one.manifest.step, "step")].filter(Boolean).join(" · ")]));
   return {
     name: "checkpoint", choices: ["", ...fitting.map(({ sha256 }) => sha256)], default: "",
     labels: { "": `default: ${protocol.checkpoint}`, ...labels },

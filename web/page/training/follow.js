@@ -43,7 +43,7 @@ export function Follow({ job }) {
 }
 
 function text({ active, step, reason }) {
-  if (!active) return `Followed no longer: ${reason}.`;
+  if (!active) return format.sentence(`Followed no longer: ${reason}`);
   return step === null ? "The cell waits for its first checkpoint."
-    : `The cell acts with ${format.steps(step)} steps.`;
+    : `The cell acts with the checkpoint at ${format.count(step, "step")}.`;
 }

@@ -1,7 +1,8 @@
 // Forms: what is typed, one submission at a time, and the faults that the service finds in it.
 import { html, useEffect, useRef, useState } from "../vendor/htm-preact-standalone.module.js";
 import { get, Unreachable } from "../api.js";
-import { Alert, Icon } from "../icons.js";
+import { capital, grouped, sentence } from "../format.js";
+import { Alert, Close } from "../icons.js";
 
 const AGAIN_MS = 3000; // pause before a request that failed is sent again
 
@@ -82,7 +83,8 @@ export function useAnswer(path, ...causes) {
 /** What a form shows while its choices are loaded, or could not be. */
 export function Loading({ what, error }) {
   return error
-    ? html`<${Alert}>The ${what} could not be loaded: ${error.message}</${Alert}>`
+    ? html`<${Alert}>${sentence(`The ${what} could not be loaded: ${error.message}`)} Trying
+        again every ${AGAIN_MS / 1000} s.</${Alert}>`
     : html`<div class="skeleton tall" aria-busy="true" aria-label=${`Loading ${what}`}></div>`;
 }
 
@@ -97,8 +99,7 @@ export function StartForm({ form, title, send, start, note, onClose, children })
   return html`<form class="train" ref=${form.ref} onSubmit=${form.submit(send)} noValidate
     aria-label=${title}>
     <div class="train-head"><h3>${title}</h3>
-      <button type="button" class="quiet-button" aria-label="Close the form" onClick=${onClose}>
-        <${Icon} name="close" /></button></div>
+      <${Close} label="Close the form" onClick=${onClose} /></div>
     ${fault && html`<${Alert}>${fault}</${Alert}>`}
     ${children}
     <div class="train-foot">
@@ -122,18 +123,17 @@ export function Field({ field, text, fault, onText, prefix }) {
           onChange=${(e) => onText(e.target.value)}>
           ${choices(field).map((c) => html`<option key=${c} value=${c}>${field.labels?.[c] ?? c}</option>`)}</select>`
       : html`<input id=${id} name=${field.name} type="text" inputmode=${keyboard(field)} spellcheck="false"
-          autocomplete="off" value=${text ?? show(field.default)} aria-describedby=${described}
+          autocomplete="off" value=${text ?? grouped(field.default)} aria-describedby=${described}
           aria-invalid=${String(Boolean(fault))} onInput=${(e) => onText(e.target.value)} />`}
     ${fault && html`<p class="field-error" id=${`${id}-error`} role="alert">${fault}</p>`}
     <p class="field-help" id=${`${id}-help`}>${helpText(field)}</p>
   </div>`;
 }
 
-/** Sentences: what the field does, and its range. */
+/** What the field does and its range, as sentences. */
 function helpText(field) {
   const help = String(field.help ?? "").trim();
-  const sentence = help && `${capital(help)}${/[.!?]$/.test(help) ? "" : "."}`;
-  return [sentence, rangeText(field)].filter(Boolean).join(" ");
+  return [help && sentence(help), rangeText(field)].filter(Boolean).join(" ");
 }
 
 function rangeText({ minimum, maximum }) {
@@ -141,12 +141,6 @@ function rangeText({ minimum, maximum }) {
   if (low !== null && high !== null) return `${low} to ${high}.`;
   if (low !== null) return `At least ${low}.`;
   return high !== null ? `At most ${high}.` : "";
-}
-
-/** A value as it is shown; from five digits on, those of a whole number in groups of three. */
-export function grouped(v) {
-  return Number.isInteger(v) && Math.abs(v) >= 1e4
-    ? show(v).replace(/\B(?=(\d{3})+$)/g, "\u202f") : show(v);
 }
 
 /** The keyboard of a phone: that of decimal numbers lacks letters and, on some, a minus sign. */
@@ -162,13 +156,10 @@ function choices(field) {
   return field.type === "bool" ? ["true", "false"] : field.choices.map(String);
 }
 
-export function show(v) {
-  return typeof v === "string" ? v : JSON.stringify(v);
-}
-
 /** Text as the JSON it stands for; what is no JSON goes as text, and the service says so. */
 export function parsed(text) {
-  const plain = String(text).trim().replaceAll("_", "").replace(/(?<=\d)[\s\u202f](?=\d)/g, "");
+  const plain = String(text).trim().replaceAll("_", "").replace("\u2212", "-")
+    .replace(/(?<=\d)[\s\u202f](?=\d)/g, "");
   try {
     return JSON.parse(plain);
   } catch {
@@ -208,15 +199,11 @@ function faultsByField(problem, names) {
     const name = fieldOf(one, names);
     const choice = one.choices?.length ? ` Choices: ${one.choices.join(", ")}.` : "";
     faults[name] = name
-      ? `${capital(one.rule ?? problem.message)}.${choice}`.replace(/\.\.(?= |$)/, ".")
-      : problem.message;
+      ? `${sentence(capital(one.rule ?? problem.message))}${choice}`
+      : sentence(problem.message);
   }
-  if (listed.length === 0) faults[""] = problem.message;
+  if (listed.length === 0) faults[""] = sentence(problem.message);
   return faults;
-}
-
-export function capital(text) {
-  return String(text)[0].toUpperCase() + String(text).slice(1);
 }
 
 /** The key of one submission, however often it is sent. */

@@ -32,7 +32,7 @@ export function JobActions({ job, onChanged, onOpen, onClone }) {
     ${repeatable && (job.resume_step !== null || COMPOSITE_KINDS.has(job.kind)) && html`<button type="button" class="tool"
       data-action="resume" disabled=${again.busy} onClick=${() => act("resume")}
       title="Continue this job from its last state">
-      ${COMPOSITE_KINDS.has(job.kind) ? "Resume" : `Resume at ${format.steps(job.resume_step)} steps`}</button>`}
+      ${COMPOSITE_KINDS.has(job.kind) ? "Resume" : `Resume at ${format.count(job.resume_step, "step")}`}</button>`}
     ${repeatable && html`<button type="button" class="tool" data-action="retry"
       disabled=${again.busy} onClick=${() => act("retry")}
       title="Run a new job with the same values from its start">Retry</button>`}
@@ -72,7 +72,7 @@ export function Labels({ job, onChanged }) {
   const values = { ...shown, ...form.typed };
   const changed = Object.keys(form.typed).filter((name) => values[name] !== shown[name]);
   const save = () => {
-    const body = { ...values, ...budgetBody(values), priority: parsed(values.priority.replace("\u2212", "-")) };
+    const body = { ...values, ...budgetBody(values), priority: parsed(values.priority) };
     return patch(`v1/jobs/${job.id}`, Object.fromEntries(changed.map((name) => [name, body[name]])));
   };
   return html`<details class="more labels" data-role="labels">

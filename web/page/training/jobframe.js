@@ -1,5 +1,6 @@
 // What every open job shows, around what its kind shows.
 import { html } from "../vendor/htm-preact-standalone.module.js";
+import { sentence } from "../format.js";
 import { Alert } from "../icons.js";
 import { JobActions, Labels } from "./jobactions.js";
 
@@ -7,7 +8,7 @@ import { JobActions, Labels } from "./jobactions.js";
 export function JobFrame({ job, error, actions, children, onChanged, onOpen, onClone }) {
   const fault = job.error ?? error?.message;
   return html`<div class="job-detail">
-    ${fault && html`<${Alert}>${fault}</${Alert}>`}
+    ${fault && html`<${Alert}>${sentence(fault)}</${Alert}>`}
     ${children}
     ${job.notes && html`<p class="notes" data-role="notes">${job.notes}</p>`}
     <div class="job-actions">${actions}<${JobActions} ...${{ job, onChanged, onOpen, onClone }} /></div>

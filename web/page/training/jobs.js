@@ -5,6 +5,7 @@ import * as format from "../format.js";
 import { Alert, Icon } from "../icons.js";
 import { CurvePlot } from "../plots.js";
 import { EndedByBudget } from "./budgets.js";
+import { FieldName, fieldValue } from "./fieldnames.js";
 import { MAX_JOBS } from "./compare.js";
 import { isActive } from "./jobactions.js";
 import { JobFrame } from "./jobframe.js";
@@ -22,6 +23,7 @@ const OUTCOMES = [
   { key: "collision", label: "collision", colour: "bad" },
   { key: "timeout", label: "time-out", colour: "warn" },
 ];
+const KINDS = { evaluate: "evaluation", sweep: "sweep" };
 const UNITS = { evaluate: "rows", sweep: "trials", report: "evaluations" };
 const REWARD = [{ key: "reward", label: "mean reward of an episode", colour: "accent" }];
 
@@ -97,7 +99,8 @@ export function QueueWaits({ waiting }) {
 
 export function JobList({ jobs, error, onNew, ...rest }) {
   const fault = error
-    && html`<${Alert}>The jobs could not be loaded: ${error.message}</${Alert}>`;
+    && html`<${Alert}>${format.sentence(`The jobs could not be loaded: ${error.message}`)} Trying
+      again every ${POLL_MS / 1000} s.</${Alert}>`;
   if (fault && !jobs) return fault;
   if (!jobs) return html`<div class="skeleton" aria-busy="true" aria-label="Loading jobs"></div>`;
   if (jobs.length === 0) {
@@ -153,6 +156,7 @@ function title(job) {
 function subtitle(job, jobs) {
   const parts = [`seed ${job.seed}`];
   if (job.name) parts.unshift(job.preset ?? job.spec?.protocol ?? job.kind);
+  if (job.kind in KINDS) parts.unshift(KINDS[job.kind]);
   const parent = job.parent && jobs.find(({ id }) => id === job.parent);
   if (parent) parts.push(`from job ${parent.number}`);
   if (job.state === "queued" && job.priority) parts.push(`priority ${format.number(job.priority)}`);
@@ -167,11 +171,11 @@ function subtitle(job, jobs) {
       else if (job.latest) parts.push("collecting");
     }
   } else {
-    if (job.step) parts.push(`${format.steps(job.step)} ${job.step === 1 ? unit.slice(0, -1) : unit}`);
+    if (job.step) parts.push(format.count(job.step, unit.slice(0, -1)));
     parts.push(format.ago(job.finished_at ?? job.created_at));
   }
   if (job.attempt > 1) parts.push(`attempt ${job.attempt}`);
-  if (job.kills) parts.push(`killed ${job.kills === 1 ? "once" : `${job.kills} times`}`);
+  if (job.kills) parts.push(`killed ${job.kills === 1 ? "once" : format.count(job.kills, "time")}`);
   return parts.join(" · ");
 }
 
@@ -180,7 +184,7 @@ function lastStep(job) {
   return job.total_steps && Math.min(job.total_steps, job.step_budget ?? Infinity);
 }
 
-function JobDetail({ job, onChanged, onOpen, onClone, onAct, acting }) {
+function JobDetail({ job, presets, onChanged, onOpen, onClone, onAct, acting }) {
   const { rows, checkpoint, lost } = useCurve(job, onChanged);
   const [at, setAt] = useState(null);
   const row = rows?.[at ?? rows.length - 1] ?? null;
@@ -193,22 +197,24 @@ function JobDetail({ job, onChanged, onOpen, onClone, onAct, acting }) {
     ${rows && rows.length === 0 && html`<p class="empty">${job.state === "queued"
       ? "Waiting for its turn; one job runs at a time."
       : isActive(job) ? "Warming up; the first point comes after the first episodes."
-        : "It ended before its first point."}</p>`}
+        : "It ended before its first point: retry it, or clone it with changes."}</p>`}
     ${rows && rows.length > 0 && html`
       <${Legend} lines=${OUTCOMES} row=${row} show=${(v) => rate(v, row?.episodes)} />
       <${CurvePlot} rows=${rows} lines=${OUTCOMES} height=${168} unit="%" range=${[0, 1]}
         sync=${job.id} onHover=${setAt}
-        label=${`Success, collision and time-out rate over ${rows.length} points`} />
+        label=${`Success, collision and time-out rate over environment steps, ${
+          format.count(rows.length, "point")}`} />
       <${Legend} lines=${REWARD} row=${row} show=${(v) => format.number(v)} />
       <${CurvePlot} rows=${rows} lines=${REWARD} height=${112} sync=${job.id} onHover=${setAt}
         label="Mean reward over environment steps" />
-      <p class="plot-foot"><span data-points=${rows.length}>${rows.length} points</span>
-        <span data-role="point">${row && `${readout ? "" : "last: "}${format.steps(row.step)} steps,
-          ${episodes(row)}`}</span></p>`}
+      <p class="plot-foot"><span data-points=${rows.length}>Environment steps,
+        ${` ${format.count(rows.length, "point")}`}</span>
+        <span data-role="point">${row && `${readout ? "" : "last: "}${format.count(row.step, "step")},
+          ${format.count(row.episodes ?? 0, "episode")}`}</span></p>`}
     ${job.ended_by && job.ended_by !== "pruned" && html`<${EndedByBudget} key=${job.attempt} job=${job} onChanged=${onChanged} />`}
     ${lost && html`<p class="notice warn" role="status"><${Icon} name="alert" />
-      Lost the stream of this job; trying again.</p>`}
-    <${Speed} job=${job} row=${rows?.at(-1)} />
+      The connection to this job was lost; trying again.</p>`}
+    <${Speed} job=${job} row=${rows?.at(-1)} presets=${presets} />
   </${JobFrame}>`;
 }
 
@@ -231,18 +237,14 @@ function Act({ job, newest, acting, onAct }) {
   return html`<button type="button" class="tool" data-action="act"
       disabled=${acting.includes(newest) && !isActive(job)} onClick=${act}>
       ${acts && isActive(job) ? "Load its newest checkpoint" : "Deploy to cell"}</button>
-    ${acts && html`<span class="faint" role="status" data-role="acts">Deployed, with
-      ${` ${format.steps(loaded.step)} `}steps.</span>`}
-    ${error && html`<span class="field-error" role="alert">${error.message}</span>`}`;
+    ${acts && html`<span class="faint" role="status" data-role="acts">Deployed,
+      with ${format.count(loaded.step, "step")}.</span>`}
+    ${error && html`<span class="field-error" role="alert">${format.sentence(error.message)}</span>`}`;
 }
 
 /** A rate of a point, with its interval where it is known of how many episodes. */
 function rate(v, n) {
   return Number.isFinite(v) && n > 0 ? format.interval(format.wilson(v, n)) : "–";
-}
-
-function episodes({ episodes: n }) {
-  return n === 1 ? "1 episode" : `${format.steps(n ?? 0)} episodes`;
 }
 
 /** An evaluation has no curve: its rows, once all are known. */
@@ -253,7 +255,7 @@ function Evaluation({ job, ...rest }) {
     ${rows.length === 0 && !job.error && html`<p class="empty">${job.state === "queued"
       ? "Waiting for its turn; one job runs at a time."
       : isActive(job) ? "The rows are shown once all are known."
-        : "It ended without a result."}</p>`}
+        : "It ended without a result: retry it."}</p>`}
     ${rows.length > 0 && html`<dl class="rows" data-role="rows">${rows.map((row) => html`
       <div key=${row.name}><dt>${row.name} <small>n = ${row.n}</small></dt>
         ${rates(row).map(({ key, label }) => html`<dd key=${key}><span>${label}</span>
@@ -270,7 +272,7 @@ function Legend({ lines, row, show }) {
     <i class=${`line-mark ${l.colour}`}></i>${l.label}<b>${show(row?.[l.key])}</b></span>`)}</p>`;
 }
 
-function Speed({ job, row }) {
+function Speed({ job, row, presets }) {
   const changed = Object.entries(job.overrides ?? {}).flatMap(([group, value]) =>
     typeof value === "object" && value !== null
       ? Object.entries(value).map(([name, v]) => [`${group}.${name}`, v]) : [[group, value]]);
@@ -285,14 +287,10 @@ function Speed({ job, row }) {
         : `${format.duration(job.run_s)} of ${format.duration(job.time_budget_s)}`],
     ].filter(([, text]) => text !== "–").map(([name, text]) => html`<div key=${name}>
       <dt>${name}</dt><dd>${text}</dd></div>`)}
-    ${changed.map(([name, v]) => html`<div key=${name}><dt>${breakable(name)}</dt>
-      <dd>${typeof v === "number" ? format.number(v, 6) : JSON.stringify(v)}</dd></div>`)}
+    ${changed.map(([name, v]) => html`<div key=${name}><dt><${FieldName}
+      presets=${presets} path=${name} preset=${job.preset} /></dt>
+      <dd>${fieldValue(v)}</dd></div>`)}
   </dl>`;
-}
-
-/** A field's name that a line may break after a dot or an underscore. */
-function breakable(name) {
-  return name.split(/(?<=[._])/).map((part) => html`${part}<wbr />`);
 }
 
 /** The curve of one job: what is stored, then what its event stream adds. */

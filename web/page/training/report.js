@@ -1,5 +1,6 @@
 // A report: its page, and the evaluations that measure it again.
 import { html } from "../vendor/htm-preact-standalone.module.js";
+import * as format from "../format.js";
 import { useAnswer } from "./formfields.js";
 import { isActive } from "./jobactions.js";
 import { JobFrame } from "./jobframe.js";
@@ -17,8 +18,8 @@ export function ReportDetail({ job, ...rest }) {
     ${isActive(job) && job.spec.measure && parts?.length === 0 && html`<p class="empty">The first
       evaluation is queued in a moment.</p>`}
     ${result && html`<p data-role="report">${result.measured
-      ? `${result.measured} results measured again` : "From stored results"}${
-      result.missing.length ? `; ${result.missing.length} numbers are not measured` : ""}${
+      ? `${format.count(result.measured, "result")} measured again` : "From stored results"}${
+      result.missing.length ? `; ${format.count(result.missing.length, "number")} not measured` : ""}${
       result.failed.length ? `; without a result: ${result.failed.join(", ")}` : ""}.</p>`}
     ${parts?.length > 0 && html`<div class="scrolled"><table class="trials" data-role="parts">
       <thead><tr><th scope="col">Evaluation</th><th scope="col">State</th></tr></thead>

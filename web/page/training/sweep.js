@@ -2,33 +2,36 @@
 import { html, useMemo } from "../vendor/htm-preact-standalone.module.js";
 import * as format from "../format.js";
 import { axis, Plot, useTheme } from "../plots.js";
+import { FieldName, fieldValue } from "./fieldnames.js";
 import { useAnswer } from "./formfields.js";
 import { isActive } from "./jobactions.js";
 import { JobFrame } from "./jobframe.js";
 
 const LABELS = { success: "success", collision: "collision", timeout: "time-out" };
 
-export function SweepDetail({ job, ...rest }) {
+export function SweepDetail({ job, presets, ...rest }) {
   // Asked for again whenever the list of jobs was.
   const { answer: found, error } = useAnswer(`v1/jobs/${job.id}/trials`, isActive(job) ? job : job.state);
   const trials = found?.items ?? [];
   return html`<${JobFrame} job=${job} error=${error} ...${rest}>
     ${!found && !error && html`<div class="skeleton tall" aria-busy="true" aria-label="Loading the trials"></div>`}
     ${found && trials.length === 0 && html`<p class="empty">${isActive(job)
-      ? "The first trial is drawn in a moment." : "It ended before its first trial."}</p>`}
+      ? "The first trial is drawn in a moment." : "It ended before its first trial: resume or retry it."}</p>`}
     ${trials.some((one) => one.value) && html`<${TrialPlot} found=${found} />
-      <p class="plot-foot"><span>${LABELS[found.quantity]} [%] by trial, with 95 % intervals</span>
-        <span>line: best so far</span></p>`}
-    ${trials.length > 0 && html`<${TrialTable} found=${found} onOpen=${rest.onOpen} />`}
+      <p class="plot-foot"><span>${format.capital(LABELS[found.quantity])} [%] by trial, with 95 % intervals</span>
+        <span>Line: best so far</span></p>`}
+    ${trials.length > 0 && html`<${TrialTable} found=${found}
+      presets=${presets} preset=${job.preset ?? job.spec.preset} onOpen=${rest.onOpen} />`}
   </${JobFrame}>`;
 }
 
-function TrialTable({ found, onOpen }) {
+function TrialTable({ found, presets, preset, onOpen }) {
   const names = Object.keys(found.items[0].parameters);
   return html`<div class="scrolled"><table class="trials" data-role="trials">
     <thead><tr><th scope="col">Trial</th>
-      ${names.map((name) => html`<th scope="col" key=${name} title=${name}>${name.split(".").at(-1)}</th>`)}
-      <th scope="col">State</th><th scope="col">${LABELS[found.quantity]} (95 %)</th></tr></thead>
+      ${names.map((name) => html`<th scope="col" key=${name}><${FieldName}
+        presets=${presets} path=${name} preset=${preset} /></th>`)}
+      <th scope="col">State</th><th scope="col">${format.capital(LABELS[found.quantity])} (95 % interval)</th></tr></thead>
     <tbody>${found.items.map((one) => html`<tr key=${one.trial} class=${one.best ? "is-best" : ""}
       data-trial=${one.trial} data-best=${String(one.best)}>
       <th scope="row"><button type="button" class="quiet-button" title=${`Show job ${one.number}`}
@@ -39,7 +42,7 @@ function TrialTable({ found, onOpen }) {
 }
 
 function shown(v) {
-  return typeof v === "number" ? format.number(v, 4) : v;
+  return typeof v === "number" ? format.number(v, 4) : fieldValue(v);
 }
 
 function stateOf(one) {
@@ -52,7 +55,7 @@ function TrialPlot({ found }) {
   const options = useMemo(() => plotOptions(theme, LABELS[found.quantity]), [theme, found.quantity]);
   const data = useMemo(() => columns(found), [found]);
   return html`<${Plot} options=${options} data=${data} height=${200}
-    label=${`${LABELS[found.quantity]} in percent of ${found.items.length} trials`} />`;
+    label=${`${LABELS[found.quantity]} in percent of ${format.count(found.items.length, "trial")}`} />`;
 }
 
 function columns({ items, maximised }) {

@@ -1,7 +1,8 @@
 // The form that starts a sweep: drawn fields with their ranges, trials and objective.
 import { html, useState } from "../vendor/htm-preact-standalone.module.js";
 import { post } from "../api.js";
-import { Icon } from "../icons.js";
+import { Close, Icon } from "../icons.js";
+import { byGroup } from "./fieldnames.js";
 import { Loading, OWN, parsed, StartForm, useForm } from "./formfields.js";
 
 const MAX_RANGES = 8;
@@ -50,7 +51,8 @@ export function SweepForm({ presets: { items: presets, error }, cell, onStarted,
     form.type(`ranges.${ranges[place].path}`, "");
     setRanges((now) => now.map((one, k) => (k === place ? { ...one, ...more } : one)));
   };
-  const free = preset.fields.filter((f) => !["cell", total.name].includes(f.name) && !ranges.some((r) => r.path === f.name));
+  const drawable = preset.fields.filter(({ name: path }) => !["cell", total.name].includes(path));
+  const free = drawable.filter((f) => !ranges.some((r) => r.path === f.name));
   return html`<${StartForm} form=${form} title="New sweep" send=${send} start="Start sweep"
     note="Its trainings wait in the queue like others." onClose=${onClose}>
     <div class="field"><label for="sweep-preset">Preset</label>
@@ -63,7 +65,9 @@ export function SweepForm({ presets: { items: presets, error }, cell, onStarted,
     ${OWN.map((field) => form.row(field))}
     ${form.row(total)}
     <fieldset class="field-list"><legend>Drawn fields</legend>
-      ${ranges.map((one, place) => html`<${RangeRow} key=${one.path} one=${one} preset=${preset} free=${free}
+      <p class="field-help">Each trial draws its values from these ranges; log draws small and large
+        ones alike.</p>
+      ${ranges.map((one, place) => html`<${RangeRow} key=${one.path} one=${one} drawable=${drawable} free=${free}
         fault=${form.faults[`ranges.${one.path}`]} onChange=${(more) => change(place, more)}
         onRemove=${ranges.length > 1 ? () => setRanges((now) => now.filter((_, k) => k !== place)) : null} />`)}
       ${form.faults.ranges && html`<p class="field-error" role="alert">${form.faults.ranges}</p>`}
@@ -91,8 +95,9 @@ function rangeOf({ path, low, high, log, choices }, preset) {
   return { low: end(low, field.minimum), high: end(high, field.maximum), ...(log && { log: true }) };
 }
 
-function RangeRow({ one, preset, free, fault, onChange, onRemove }) {
-  const field = preset.fields.find((f) => f.name === one.path);
+function RangeRow({ one, drawable, free, fault, onChange, onRemove }) {
+  const field = drawable.find((f) => f.name === one.path);
+  const fields = drawable.filter((f) => f === field || free.includes(f));
   const chosen = one.choices ?? field?.choices;
   const toggle = (choice) => onChange({ choices: chosen.includes(choice)
     ? chosen.filter((c) => c !== choice) : [...chosen, choice] });
@@ -100,12 +105,13 @@ function RangeRow({ one, preset, free, fault, onChange, onRemove }) {
     data-range=${name} placeholder=${String(limit)} aria-label=${`${label} of ${field.title}`}
     aria-invalid=${String(Boolean(fault))} onInput=${(e) => onChange({ [name]: e.target.value })} />`;
   return html`<div class="drawn" data-path=${one.path}>
-    <select value=${one.path} aria-label="Drawn field"
+    <select value=${one.path} aria-label="Drawn field" title=${one.path}
       onChange=${(e) => onChange({ path: e.target.value, low: "", high: "", choices: undefined })}>
-      ${[field, ...free].map((f) => html`<option key=${f.name} value=${f.name}>${f.name}${
-        f.unit && ` [${f.unit}]`}</option>`)}</select>
-    ${onRemove && html`<button type="button" class="quiet-button" aria-label=${`Remove ${one.path}`}
-      onClick=${onRemove}><${Icon} name="close" /></button>`}
+      ${byGroup(fields).map(([group, members]) => html`<optgroup key=${group} label=${group}>
+        ${members.map((f) => html`<option key=${f.name} value=${f.name}>${f.title}${
+          f.unit && ` [${f.unit}]`}</option>`)}</optgroup>`)}</select>
+    ${onRemove && html`<${Close} label=${`Remove ${field.title}`} onClick=${onRemove} />`}
+    <code class="raw-name">${one.path}</code>
     <div class="range-ends">${field.choices
       ? field.choices.map((c) => html`<label key=${c}><input type="checkbox" checked=${chosen.includes(c)}
           onChange=${() => toggle(c)} /> ${c}</label>`)

@@ -1,9 +1,11 @@
 // The form that starts a training job; every field comes from GET /v1/presets.
 import { html, useEffect, useState } from "../vendor/htm-preact-standalone.module.js";
 import { post } from "../api.js";
+import { count, grouped } from "../format.js";
 import { Alert, Icon } from "../icons.js";
 import { BUDGETS, budgetBody, budgetTexts } from "./budgets.js";
-import { capital, changed, Loading, OWN, parsed, show, StartForm, useForm } from "./formfields.js";
+import { byGroup } from "./fieldnames.js";
+import { changed, Loading, OWN, parsed, StartForm, useForm } from "./formfields.js";
 
 const FIRST_FIELDS = ["cell", "learning.total_steps", "learning.n_envs", "learning.lr_start"];
 /**
@@ -35,7 +37,8 @@ export function TrainForm({ presets: { items: presets, error }, cell, from, onSt
 
   if (from && presets && preset?.name !== from.preset) {
     return html`<${Alert}>Job ${from.number} was trained with the preset ${from.preset}, which does not
-      exist any more.</${Alert}>`;
+      exist any more: start a new job instead.
+      ${" "}<button type="button" class="text-button" onClick=${onClose}>Close</button></${Alert}>`;
   }
   if (!preset) return html`<${Loading} what="presets" error=${error} />`;
   const rest = fields.filter((f) => !FIRST_FIELDS.includes(f.name));
@@ -60,9 +63,9 @@ export function TrainForm({ presets: { items: presets, error }, cell, from, onSt
     ${fields.filter((f) => FIRST_FIELDS.includes(f.name)).map(row)}
     ${BUDGETS.map(row)}
     ${rest.length > 0 && html`<details class="more" open=${inRest || undefined}>
-      <summary><${Icon} name="chevron" />${rest.length} more settings</summary>
+      <summary><${Icon} name="chevron" />${count(rest.length, "more setting")}</summary>
       ${byGroup(rest).map(([group, members]) => html`<fieldset key=${group}>
-        <legend>${capital(group)}</legend>${members.map(row)}</fieldset>`)}
+        <legend>${group}</legend>${members.map(row)}</fieldset>`)}
     </details>`}
   </${StartForm}>`;
 }
@@ -71,16 +74,6 @@ export function TrainForm({ presets: { items: presets, error }, cell, from, onSt
 function shownCell(preset, cell) {
   const field = preset?.fields?.find((f) => f.name === "cell");
   return field?.choices?.includes(cell) ? { cell } : {};
-}
-
-/** Fields by their group, in order: pairs of the group's name and its fields. */
-function byGroup(fields) {
-  const groups = new Map();
-  for (const field of fields) {
-    const group = field.name.split(".")[0];
-    groups.set(group, [...(groups.get(group) ?? []), field]);
-  }
-  return [...groups];
 }
 
 function overrides(preset, texts) {
@@ -97,8 +90,8 @@ function overrides(preset, texts) {
 function texts(overrides) {
   return Object.fromEntries(Object.entries(overrides ?? {}).flatMap(([group, value]) =>
     value && typeof value === "object" && !Array.isArray(value)
-      ? Object.entries(value).map(([name, v]) => [`${group}.${name}`, show(v)])
-      : [[group, show(value)]]));
+      ? Object.entries(value).map(([name, v]) => [`${group}.${name}`, grouped(v)])
+      : [[group, grouped(value)]]));
 }
 
 /** The merge patch that makes `wanted` of the overrides `now`: null removes a member. */

@@ -51,15 +51,16 @@ export function Training({ link, cell, jobs: newest, error, waiting, refresh, ac
           <${Icon} name="plus" />New job</button>`}</header>
       ${chosen && html`<p class="field-help">Choose up to ${MAX_JOBS} jobs. Jobs that differ only in
         their seed share one curve with a band.</p>`}
-      ${compared && html`<${Comparison} ids=${compared} onClose=${() => setCompared(null)} />`}
+      ${compared && html`<${Comparison} ids=${compared} presets=${presets}
+        onClose=${() => setCompared(null)} />`}
       <${QueueWaits} waiting=${waiting} />
-      <${JobList} jobs=${jobs} error=${error} open=${open ?? null} onOpen=${setOpen}
+      <${JobList} jobs=${jobs} presets=${presets} error=${error} open=${open ?? null} onOpen=${setOpen}
         onChanged=${refresh} onAct=${onAct} acting=${acting}
         chosen=${chosen} onChoose=${choose}
         onClone=${(job) => setForm({ from: job })}
         onNew=${form ? null : () => setForm({})} />
     </section>
-    <${CheckpointCards} link=${link} jobs=${jobs} acting=${acting} />
+    <${CheckpointCards} link=${link} jobs=${jobs} acting=${acting} presets=${presets} />
   </div>`;
 }
 

@@ -1,0 +1,100 @@
+"""Numbers and texts on the page have one form each, the same as in status messages."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from playwright.sync_api import Browser, Page, Route
+
+from app.live.status_messages import length_text, percent_text, value_text
+
+pytestmark = pytest.mark.browser
+
+FILES = Path(__file__).parents[2] / "web" / "page"
+ORIGIN = "http://page.test"
+CALL = "([name, of]) => import('/format.js').then((one) => of.map((v) => one[name](v)))"
+LENGTHS = [0.0, 1e-5, 4.9e-4, 5.1e-4, 0.004, 0.00949, 0.0096, 0.0149, 0.3, 0.994, 1.236]
+VALUES = [-5.126, -0.52, -0.004, 0.0, 0.004, 3.3201]
+
+
+@pytest.fixture
+def page(browser: Browser) -> Iterator[Page]:
+    """A blank document beside the page's modules."""
+
+    def answer(route: Route) -> None:
+        name = route.request.url.removeprefix(ORIGIN).strip("/")
+        if name:
+            route.fulfill(path=FILES / name, content_type="text/javascript")
+        else:
+            route.fulfill(body="", content_type="text/html")
+
+    page = browser.new_page()
+    page.route(f"{ORIGIN}/**", answer)
+    page.goto(ORIGIN)
+    yield page
+    page.close()
+
+
+def written(page: Page, name: str, values: list[Any]) -> list[str]:
+    """Return what a function of format.js makes of values, with plain spaces."""
+    texts: list[str] = page.evaluate(CALL, [name, values])
+    return [text.replace("\u00a0", " ") for text in texts]
+
+
+def test_lengths_and_values_are_those_of_status_messages(page: Page) -> None:
+    assert written(page, "length", LENGTHS) == [length_text(one) for one in LENGTHS]
+    assert written(page, "value", VALUES) == [value_text(one) for one in VALUES]
+    shares = [0.0, 0.231, 1.0]
+    assert page.evaluate(
+        "of => import('/format.js').then((one) => of.map((v) => one.percent(v, 0)))", shares
+    ) == [percent_text(one).replace(" ", "\u00a0") for one in shares]
+
+
+def test_distance_to_a_person_is_given_in_mm_below_1_cm(page: Page) -> None:
+    gaps = [None, -0.01, 0.0, 2e-4, 0.004, 0.0123]
+    expected = ["–", "contact", "contact", "< 1 mm", "4 mm", "0.01 m"]
+    assert written(page, "gap", gaps) == expected
+
+
+def test_a_rounded_million_is_written_as_one(page: Page) -> None:
+    counts = [9_999, 999_949, 999_950, 1_250_000]
+    assert written(page, "steps", counts) == ["9999", "999.9 k", "1 M", "1.25 M"]
+
+
+def test_counts_agree_with_their_noun(page: Page) -> None:
+    code = "of => import('/format.js').then((one) => of.map((v) => one.count(v, 'step')))"
+    texts = page.evaluate(code, [0, 1, 2, 12_400])
+    assert texts == ["0 steps", "1 step", "2 steps", "12.4\u00a0k steps"]
+
+
+def test_numbers_have_true_minus_signs_and_grouped_digits(page: Page) -> None:
+    numbers = [12_288_000, -20_000, -0.5, 1e-7, "pick", [1, 2]]
+    expected = [
+        "12\u202f288\u202f000",
+        "\u221220\u202f000",
+        "\u22120.5",
+        "1e-7",
+        "pick",
+        "[1,2]",
+    ]
+    assert written(page, "grouped", numbers) == expected
+
+
+@pytest.mark.parametrize(
+    ("message", "sentence"),
+    [
+        ("no preset 'td-4'", "No preset 'td-4'."),
+        ("seed = -1 must be at least 0", "seed = \u22121 must be at least 0."),
+        (
+            "learning.lr_start = '-1' must lie in [-3, 1e-2]",
+            "learning.lr_start = '-1' must lie in [\u22123, 1e-2].",
+        ),
+        ("c_c grows to it linearly", "c_c grows to it linearly."),
+        ("The server is away …", "The server is away …"),
+    ],
+)
+def test_message_of_the_service_is_shown_as_a_sentence(
+    page: Page, message: str, sentence: str
+) -> None:
+    assert written(page, "sentence", [message]) == [sentence]

@@ -1,0 +1,37 @@
+// Fields of presets by their titles and units; a dotted name stays where it is typed, as a hint.
+import { html } from "../vendor/htm-preact-standalone.module.js";
+import * as format from "../format.js";
+
+const OTHERS = { cell: "Work cell", kind: "Kind of job", purpose: "Purpose" };
+
+/** Title and unit of a field by its dotted name; `preset` is where it is looked for first. */
+export function fieldOf(presets, path, preset = null) {
+  const known = presets?.items ?? [];
+  const own = known.filter(({ name }) => name === preset);
+  const field = [...own, ...known].flatMap(({ fields }) => fields)
+    .find(({ name }) => `.${path}`.endsWith(`.${name}`));
+  if (field && field.name !== "cell") return { title: field.title, unit: field.unit };
+  return { title: OTHERS[path] ?? format.capital(path.replaceAll("_", " ").replaceAll(".", ": ")), unit: "" };
+}
+
+/** A field's title with its unit, and its dotted name as a hint, or below it with `named`. */
+export function FieldName({ presets, path, preset, named = false }) {
+  const { title, unit } = fieldOf(presets, path, preset);
+  return html`<span title=${path}>${title}${unit && html`<span class="unit"> [${unit}]</span>`}</span>
+    ${named && path.includes(".") && html`<code class="raw-name">${path}</code>`}`;
+}
+
+/** A field's value; numbers with all their digits. */
+export function fieldValue(v) {
+  return v === null || v === undefined ? "–" : format.grouped(v);
+}
+
+/** Fields by their group, in order: pairs of the group's title and its fields. */
+export function byGroup(fields) {
+  const groups = new Map();
+  for (const field of fields) {
+    const group = format.capital(field.name.split(".")[0]);
+    groups.set(group, [...(groups.get(group) ?? []), field]);
+  }
+  return [...groups];
+}
