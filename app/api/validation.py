@@ -17,6 +17,13 @@ MAX_LISTED_ITEMS = 8
 NOTHING = "nothing"
 _SHOULD = re.compile(r"^[A-Z][a-z]+ should ")
 """Start of pydantic's messages: ``String should have at most 80 characters``."""
+_BOUNDS = {
+    "greater than or equal to": "at least",
+    "less than or equal to": "at most",
+    "greater than": "above",
+    "less than": "below",
+}
+"""Pydantic's words for limits, and ours."""
 
 Member = dict[str, object]
 M = TypeVar("M", bound=BaseModel)
@@ -51,6 +58,8 @@ def validation_member(error: Mapping[str, Any], body: type[BaseModel] | None) ->
     place, inside, inner = without_inner_tags(error["loc"], body)
     location, value = tuple(place), error.get("input")
     rule = _SHOULD.sub("must ", str(error["msg"]))
+    for theirs, ours in _BOUNDS.items():
+        rule = rule.replace(f"must be {theirs} ", f"must be {ours} ")
     rule = rule.replace("an instance of Sequence", "a valid list")
     choices: list[str] = []
     if kind == "json_invalid":

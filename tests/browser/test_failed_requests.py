@@ -34,7 +34,7 @@ def test_size_is_that_of_the_world_after_a_failed_command(
     before = slider.input_value()
     page.route(COMMANDS, lambda route: route.fulfill(status=500, body=""))
     slider.fill("95")
-    expect(page.locator(".banner.bad")).to_contain_text("the server answered 500")
+    expect(page.locator(".banner.bad")).to_contain_text("The server answered 500.")
     expect(slider).to_have_value(before, timeout=10_000)
     page.unroute(COMMANDS)
     slider.fill("80")
@@ -64,7 +64,7 @@ def test_checkpoint_of_another_purpose_is_not_evaluated(
         if protocol == "pick-single":
             page.select_option("#evaluate-checkpoint", pick)
         page.click("form.train button[type=submit]")
-        expect(page.locator("form.train .notice.bad")).to_contain_text("refused")
+        expect(page.locator("form.train .notice.bad")).to_contain_text("Refused.")
     assert sent == [pick, None]
 
 

@@ -55,7 +55,7 @@ function App() {
       ${world && html`<${Acting} world=${world} checkpoints=${checkpoints} jobs=${jobs}
         send=${cell.send} />`}
       <${Link} cell=${cell} />
-      <a class="docs" href="docs">API<${Icon} name="external" /></a>
+      <a class="docs" href="docs" title="Documentation of the HTTP interface">API<${Icon} name="external" /></a>
     </header>
     ${cell.errors.length > 0 && html`<${Refusals} errors=${cell.errors} onDismiss=${cell.dismiss} />`}
     <${Stale} cell=${cell} />
@@ -129,7 +129,7 @@ function Refusals({ errors, onDismiss }) {
 
 const CAUSES = {
   stale: "The server sends nothing.",
-  lost: "The server does not answer.",
+  lost: "The server does not answer; trying again every second.",
   warming: "The server starts again.",
 };
 

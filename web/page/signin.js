@@ -2,6 +2,7 @@
 import { html, useState } from "./vendor/htm-preact-standalone.module.js";
 import { useAction } from "./action.js";
 import { post } from "./api.js";
+import { sentence } from "./format.js";
 import { Logo } from "./icons.js";
 
 export function SignIn() {
@@ -13,12 +14,13 @@ export function SignIn() {
   };
   return html`<main class="signin"><form class="card" onSubmit=${submit}>
     <h1 class="brand"><${Logo} />Tandem</h1>
-    <p>This server is protected. Its token stands in the setting TANDEM_TOKEN.</p>
+    <p>This server is protected. Enter its token, the setting TANDEM_TOKEN of the server.</p>
     <div class="field">
       <label for="token">Token</label>
       <input id="token" type="password" autocomplete="current-password" value=${token}
         aria-invalid=${String(Boolean(error))} onInput=${(e) => setToken(e.target.value)} />
-      ${error && html`<p class="field-error" role="alert">${error.message}</p>`}
+      ${error && html`<p class="field-error" role="alert">${error.field === "token"
+        ? "This is not the token of this server." : sentence(error.message)}</p>`}
     </div>
     <button type="submit" class="primary wide" disabled=${busy}>Open the cell</button>
   </form></main>`;

@@ -17,7 +17,7 @@ export const BUDGETS = [
 /** The budgets of a job as texts of a form. */
 export function budgetTexts(job) {
   return {
-    step_budget: String(job?.step_budget ?? ""),
+    step_budget: job?.step_budget ? format.grouped(job.step_budget) : "",
     time_budget_s: job?.time_budget_s ? String(job.time_budget_s / MINUTE) : "",
   };
 }

@@ -16,7 +16,7 @@ export function EvaluateForm({ link, onStarted, onClose }) {
   });
   const error = protocols.error ?? checkpoints.error ?? recordings.error;
   if (!protocols.items || !checkpoints.items || !recordings.items) {
-    return html`<${Loading} what="choices" error=${error} />`;
+    return html`<${Loading} what="choices" error=${error} onClose=${onClose} />`;
   }
   const { typed } = form;
   const protocol = protocols.items.find(({ name }) => name === typed.protocol) ?? protocols.items[0];
@@ -63,8 +63,8 @@ function Recordings({ all, chosen, required, fault, onChange }) {
   const toggle = (name) => onChange(chosen.includes(name)
     ? chosen.filter((one) => one !== name) : [...chosen, name]);
   return html`<fieldset class="field-list"><legend>Recordings${required ? "" : " (optional)"}</legend>
-    ${all.length === 0 && html`<p class="field-help">No recording is stored yet: import one in the
-      Decision panel.</p>`}
+    ${all.length === 0 && html`<p class="field-help">No recording is stored yet: import one below
+      the scene (motion source Recording).</p>`}
     ${all.map(({ name }) => html`<label key=${name}><input type="checkbox" data-recording=${name}
       checked=${chosen.includes(name)} onChange=${() => toggle(name)} /> ${name}</label>`)}
     ${fault && html`<p class="field-error" role="alert">${fault}</p>`}</fieldset>`;

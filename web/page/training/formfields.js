@@ -81,10 +81,11 @@ export function useAnswer(path, ...causes) {
 }
 
 /** What a form shows while its choices are loaded, or could not be. */
-export function Loading({ what, error }) {
+export function Loading({ what, error, onClose }) {
   return error
     ? html`<${Alert}>${sentence(`The ${what} could not be loaded: ${error.message}`)} Trying
-        again every ${AGAIN_MS / 1000} s.</${Alert}>`
+        again every ${AGAIN_MS / 1000} s.
+        ${" "}<button type="button" class="text-button" onClick=${onClose}>Close</button></${Alert}>`
     : html`<div class="skeleton tall" aria-busy="true" aria-label=${`Loading ${what}`}></div>`;
 }
 

@@ -34,7 +34,7 @@ export function SweepForm({ presets: { items: presets, error }, cell, onStarted,
       ...ranges.map(({ path }) => `ranges.${path}`), "ranges"],
     prefix: "sweep", onDone: onStarted,
   });
-  if (!preset) return html`<${Loading} what="presets" error=${error} />`;
+  if (!preset) return html`<${Loading} what="presets" error=${error} onClose=${onClose} />`;
   const value = (field) => form.typed[field.name] ?? String(field.default);
   const send = (key) => post("v1/jobs", {
     kind: "sweep", preset: preset.name, seed: parsed(value(OWN[0])), name: value(OWN[1]) || null,

@@ -40,7 +40,7 @@ export function TrainForm({ presets: { items: presets, error }, cell, from, onSt
       exist any more: start a new job instead.
       ${" "}<button type="button" class="text-button" onClick=${onClose}>Close</button></${Alert}>`;
   }
-  if (!preset) return html`<${Loading} what="presets" error=${error} />`;
+  if (!preset) return html`<${Loading} what="presets" error=${error} onClose=${onClose} />`;
   const rest = fields.filter((f) => !FIRST_FIELDS.includes(f.name));
   const inRest = rest.some((f) => form.faults[f.name] || changed(f, values));
   const title = from ? `Clone of job ${from.number}` : "New training job";
