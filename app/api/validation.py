@@ -17,13 +17,14 @@ MAX_LISTED_ITEMS = 8
 NOTHING = "nothing"
 _SHOULD = re.compile(r"^[A-Z][a-z]+ should ")
 """Start of pydantic's messages: ``String should have at most 80 characters``."""
-_BOUNDS = {
+_WORDS = {
+    "an instance of Sequence": "a valid list",
     "greater than or equal to": "at least",
     "less than or equal to": "at most",
     "greater than": "above",
     "less than": "below",
 }
-"""Pydantic's words for limits, and ours."""
+"""Pydantic's words, and ours."""
 
 Member = dict[str, object]
 M = TypeVar("M", bound=BaseModel)
@@ -57,10 +58,7 @@ def validation_member(error: Mapping[str, Any], body: type[BaseModel] | None) ->
     kind, context = str(error["type"]), error.get("ctx", {})
     place, inside, inner = without_inner_tags(error["loc"], body)
     location, value = tuple(place), error.get("input")
-    rule = _SHOULD.sub("must ", str(error["msg"]))
-    for theirs, ours in _BOUNDS.items():
-        rule = rule.replace(f"must be {theirs} ", f"must be {ours} ")
-    rule = rule.replace("an instance of Sequence", "a valid list")
+    rule = _in_our_words(str(error["msg"]))
     choices: list[str] = []
     if kind == "json_invalid":
         rule = f"must be JSON: {context['error']}"
@@ -86,6 +84,14 @@ def validation_member(error: Mapping[str, Any], body: type[BaseModel] | None) ->
     elif isinstance(value, float) and not math.isfinite(value):
         rule = "must be a finite number"
     return member(dotted(location), shown(value), rule, choices)
+
+
+def _in_our_words(message: str) -> str:
+    """Return a message of pydantic as a rule: ``must be at least 0``."""
+    rule = _SHOULD.sub("must ", message)
+    for theirs, ours in _WORDS.items():
+        rule = rule.replace(f"must be {theirs}", f"must be {ours}")
+    return rule
 
 
 def member(field: str, value: str, rule: str, choices: Sequence[str] = ()) -> Member:

@@ -82,7 +82,7 @@ def test_clone_merges_changes_into_the_spec(client: TestClient, ended: dict[str,
 @pytest.mark.parametrize(
     ("changes", "field", "text"),
     [
-        ({"seed": -1}, "seed", "greater"),
+        ({"seed": -1}, "seed", "at least 0"),
         ({"kind": "evaluate"}, "kind", "train"),
         ({"preset": None}, "preset", "required"),
         ({"colour": "red"}, "colour", "priority"),
