@@ -82,7 +82,7 @@ def test_the_rollout_knows_the_active_safety_layer(
     world.apply(SetSafety(on=on, use_measured_velocity=measured))
     controller = live._controllers["direct-rollout"]
     assert isinstance(controller, RolloutController)
-    assert (controller.layer != NO_CONSTRAINT) == (on and measured)
+    assert (controller.constraint != NO_CONSTRAINT) == (on and measured)
 
 
 def test_under_the_layer_remaining_time_is_constant_and_elapsed_time_true(
