@@ -68,6 +68,16 @@ def test_counts_agree_with_their_noun(page: Page) -> None:
     assert texts == ["0 steps", "1 step", "2 steps", "12.4\u00a0k steps"]
 
 
+def test_times_are_given_in_days_from_two_days_on(page: Page) -> None:
+    texts: list[str] = page.evaluate(
+        """of => import("/format.js").then((one) => of.map((s) =>
+          one.ago("2026-03-01T12:00:00Z", Date.parse("2026-03-01T12:00:00Z") + 1000 * s)))""",
+        [4, 90, 5400, 2 * 86400, 30.5 * 86400],
+    )
+    shown = [text.replace("\u00a0", " ") for text in texts]
+    assert shown == ["just now", "1 min ago", "1 h 30 min ago", "2 days ago", "30 days ago"]
+
+
 def test_numbers_have_true_minus_signs_and_grouped_digits(page: Page) -> None:
     numbers = [12_288_000, -20_000, -0.5, 1e-7, "pick", [1, 2]]
     expected = [

@@ -110,19 +110,6 @@ def test_a_value_of_a_contact_does_not_flatten_the_plot(open_page: Callable[...,
     assert ranges == [[0.5, 2], [-5, 2], [-8, -7]]
 
 
-def test_times_are_given_in_days_from_two_days_on(open_page: Callable[..., Page]) -> None:
-    page = open_page(scene=False)
-    shown = page.evaluate(
-        """async () => {
-          const { ago } = await import("/static/format.js");
-          const start = "2026-03-01T12:00:00Z";
-          return [4, 90, 5400, 2 * 86400, 30.5 * 86400].map((s) =>
-            ago(start, Date.parse(start) + 1000 * s));
-        }"""
-    )
-    assert shown == ["just now", "1 min ago", "1 h 30 min ago", "2 days ago", "30 days ago"]
-
-
 def test_goal_chips_change_the_candidates_of_the_world(
     open_page: Callable[..., Page], server: str
 ) -> None:
