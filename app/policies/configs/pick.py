@@ -279,12 +279,11 @@ REACH_ONLY = PickPreset(
 """The task without a grasp: a target counts when it is reached, as in the thesis."""
 MONITORED = PickPreset(
     name="pick-td3-monitored",
-    learning=PICK_LEARNING.model_copy(update={"total_steps": 8_192_000, "gamma": 0.997}),
     networks=PickNetworks(critic="quantiles"),
-    episode=PickEpisode(safety="ssm", short_share=0.0),
+    episode=PickEpisode(safety="ssm"),
 )
-"""``pick-td3`` under speed and separation monitoring, with a longer horizon, because the robot
-waits for people; a person may touch it at standstill."""
+"""``pick-td3`` under speed and separation monitoring; a person may touch the robot at
+standstill."""
 THESIS = PickPreset(
     name="pick-td3-thesis",
     learning=PickLearning(
