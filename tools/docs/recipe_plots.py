@@ -28,6 +28,8 @@ AXES = (
     ("updates", "updates"),
     ("cpu_min", "processor time [min]"),
 )
+PYTORCH = "PyTorch's initial weights"
+"""Variant of the recipe of sorting."""
 POOLED = 200
 """Least number of episodes behind a drawn point."""
 Json = dict[str, Any]
@@ -46,16 +48,23 @@ class Row(NamedTuple):
 
 
 ROWS = (
-    *(
-        Row(
-            f"sorting, {task}",
-            (
-                ("thesis-sorting", f"sorting-{task}-thesis", ORANGE),
-                ("sorting-curves", f"sorting-{task}-dqn", BLUE),
-            ),
-            (),
-        )
-        for task in ("e0", "e1")
+    Row(
+        "sorting, e0",
+        (
+            ("thesis-sorting", f"sorting-e0-thesis, {PYTORCH}", ORANGE),
+            ("thesis-sorting", "sorting-e0-thesis, four attempts per update", GREEN),
+            ("thesis-sorting", f"sorting-e0-thesis, four attempts per update, {PYTORCH}", RED),
+            ("sorting-curves", "sorting-e0-dqn", BLUE),
+        ),
+        (),
+    ),
+    Row(
+        "sorting, e1",
+        (
+            ("thesis-sorting", "sorting-e1-thesis", ORANGE),
+            ("sorting-curves", "sorting-e1-dqn", BLUE),
+        ),
+        (),
     ),
     Row(
         "reach",
