@@ -2,51 +2,27 @@
 
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import replace
 
 import numpy as np
 import pytest
 from playwright.sync_api import Page, expect
 
-from app.sim.cells.cell import Cell, load_cell
+from app.sim.cells.cell import load_cell
 from app.sim.human import model as human
-from tests.browser.camera import Camera
+from tests.browser.scene import drag_along
 from tests.support import patient_http
-from web.viewer.scene import workplace
-from web.viewer.server import ViewerServer
 
 pytestmark = pytest.mark.browser
 
 CELL = load_cell()
-VIEWER = '[data-role="viewer"]'
 START, GOALS = "cube2", {"cube1", "cube3"}
 """Where the robot has just picked, and the two neighbours it may go to next."""
 GRIP_M = 0.12
 """Where along a gizmo's arrow the mouse takes it; the arrows of the hands are 0.2 m long."""
 NEAR_M = 0.03
-ROUNDS, MOVES = 4, 10
+ROUNDS = 4
 PICK_S = 120.0
 """Time the robot may take for its first pick, on a busy machine [s]."""
-
-
-def first_camera(cell: Cell) -> Camera:
-    """Return the camera every visitor of a cell starts with, from a scene of its own."""
-    server = ViewerServer()
-    workplace.build(server, cell)
-    first = server.initial_camera
-    camera = Camera(
-        position=tuple(first.position), look_at=tuple(first.look_at), fov=float(first.fov)
-    )
-    server.stop()
-    return camera
-
-
-def on_canvas(page: Page, camera: Camera) -> Camera:
-    """Return the camera as it draws on this page now."""
-    box = page.frame_locator(VIEWER).locator("canvas").first.bounding_box()
-    assert box is not None
-    x, y, width, height = (box[side] for side in ("x", "y", "width", "height"))
-    return replace(camera, left=x, top=y, width=width, height=height)
 
 
 def tell(server: str, *commands: dict) -> None:
@@ -65,19 +41,6 @@ def hand(server: str, name: str) -> np.ndarray:
     """Return where a hand is, as the service says [m]."""
     q = np.array(state(server)["state"]["people"][0]["q"])
     return np.array(human.joint_points(q, CELL.body)[f"hand_{name[0]}"])
-
-
-def drag(page: Page, camera: Camera, start: np.ndarray, offset: np.ndarray) -> None:
-    """Drag the arrow of a hand's gizmo along one axis by ``offset`` [m]."""
-    grip = start + GRIP_M * np.abs(np.sign(offset))
-    (x0, y0), (x1, y1) = camera.project(grip), camera.project(grip + offset)
-    page.mouse.move(x0, y0)
-    page.wait_for_timeout(400)
-    page.mouse.down()
-    for k in range(1, MOVES + 1):
-        page.mouse.move(x0 + (x1 - x0) * k / MOVES, y0 + (y1 - y0) * k / MOVES)
-        page.wait_for_timeout(120)
-    page.mouse.up()
 
 
 def shown_choice(page: Page) -> str | None:
@@ -153,15 +116,14 @@ def test_dragging_a_hand_onto_the_chosen_cube_changes_the_choice(
     pause_after_a_pick(server)
     page = open_page()
     expect(page.locator(".story .chip")).to_have_text("Paused")
-    page.frame_locator(VIEWER).locator("canvas").first.wait_for()
-    camera = first_camera(CELL)
     chosen = settle(page, server)
     target = np.array(CELL.station(chosen).position)
     name = "right" if target[0] < 0 else "left"
     for axis in (2, 1, 0) * ROUNDS:
         now = hand(server, name)
         if abs(target[axis] - now[axis]) > NEAR_M:
-            drag(page, on_canvas(page, camera), now, np.eye(3)[axis] * (target - now))
+            offset = np.eye(3)[axis] * (target - now)
+            drag_along(page, CELL, lambda: hand(server, name), offset, GRIP_M)
             other = settle(page, server)
             if other != chosen:
                 break

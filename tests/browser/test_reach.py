@@ -7,7 +7,8 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from app.sim.cells.cell import load_cell
-from tests.browser.test_drag import VIEWER, first_camera, on_canvas, state, tell, until
+from tests.browser.scene import drag_along
+from tests.browser.test_drag import state, tell, until
 from tests.support import patient_http
 
 pytestmark = pytest.mark.browser
@@ -27,6 +28,11 @@ def reaching(server: str) -> Iterator[str]:
     assert shown.status_code == 200, shown.text
     yield server
     patient_http.put(world, json={"cell": load_cell().name}).raise_for_status()
+
+
+def goal(server: str) -> np.ndarray:
+    """Return where the goal is, as the service says [m]."""
+    return np.array(state(server)["reach"]["goal"])
 
 
 def override(page: Page) -> float:
@@ -71,27 +77,9 @@ def test_goal_is_dragged_by_its_arrow(open_page: Callable[..., Page], reaching: 
         {"tag": "pause"},
     )
     page = open_page()
-    page.frame_locator(VIEWER).locator("canvas").first.wait_for()
-    camera = first_camera(CELL)
-    for _ in range(4):
-        view = on_canvas(page, camera)
-        start = np.array(state(reaching)["reach"]["goal"])
-        up = np.array([0.0, 0.0, 1.0])
-        (x0, y0), (x1, y1) = (
-            view.project(start + GRIP_M * up),
-            view.project(start + (GRIP_M + 0.2) * up),
-        )
-        page.mouse.move(x0, y0)
-        page.wait_for_timeout(600)
-        page.mouse.down()
-        for share in np.linspace(0.1, 1.0, 8):
-            page.mouse.move(x0 + share * (x1 - x0), y0 + share * (y1 - y0))
-            page.wait_for_timeout(150)
-        page.mouse.up()
-        page.wait_for_timeout(1500)
-        moved = np.array(state(reaching)["reach"]["goal"]) - start
-        if moved[2] > 0.1:
-            break
+    start = goal(reaching)
+    drag_along(page, CELL, lambda: goal(reaching), np.array([0.0, 0.0, 0.2]), GRIP_M)
+    moved = goal(reaching) - start
     assert moved[2] > 0.1
     assert np.allclose(moved[:2], 0.0, atol=0.02)
 

@@ -6,11 +6,12 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Error, Frame, Page, TimeoutError, expect
+from playwright.sync_api import Page, expect
 
 from app.sim.cells.cell import load_cell
 from tests.browser.conftest import free_port, serving
-from tests.browser.test_drag import VIEWER, state, tell, until
+from tests.browser.scene import VIEWER, expect_drawing, scene_of
+from tests.browser.test_drag import state, tell, until
 from tests.support import patient_http
 
 pytestmark = pytest.mark.browser
@@ -19,38 +20,7 @@ SERVERS = pytest.mark.xdist_group("scenes-and-servers")
 """At most two processes draw the scene; others have time to wait."""
 
 REACH, SORT = "shared-workspace", "sorting-e0"
-UP = f'{VIEWER}[data-state="up"]'
 LIMIT_S = 180.0
-ATTEMPTS = 5
-NEXT_PICTURE = """() => new Promise((resolve) => {
-  const draw = WebGL2RenderingContext.prototype.drawElements;
-  WebGL2RenderingContext.prototype.drawElements = function (...all) {
-    WebGL2RenderingContext.prototype.drawElements = draw;
-    resolve();
-    return draw.apply(this, all);
-  };
-})"""
-"""Resolves in a frame when it draws next."""
-
-
-def scene_of(page: Page) -> Frame:
-    """Return the frame of the scene once it has drawn."""
-    page.wait_for_selector(UP)
-    return next(one for one in page.frames if "/viewer/" in one.url)
-
-
-def expect_drawing(page: Page) -> None:
-    """Wait until the scene draws another picture; another cell loads it again meanwhile."""
-    for _ in range(ATTEMPTS):
-        try:
-            scene_of(page).evaluate(NEXT_PICTURE)
-        except (Error, StopIteration) as error:
-            if isinstance(error, TimeoutError):
-                raise
-            page.wait_for_timeout(1000)
-            continue
-        return
-    raise AssertionError("the scene does not stay")
 
 
 def show(server: str, cell: str) -> None:

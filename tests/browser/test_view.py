@@ -5,7 +5,7 @@ from collections.abc import Callable
 import pytest
 from playwright.sync_api import Page, expect
 
-from tests.browser.test_drag import VIEWER
+from tests.browser.scene import VIEWER
 from tests.browser.test_scene import WINDOWS
 
 pytestmark = [pytest.mark.browser, WINDOWS]
