@@ -1,4 +1,4 @@
-"""What each visitor may show or hide over the scene, each for himself.
+"""What visitors may show or hide over the scene, each in their own window.
 
 Everything that can be hidden lies below a node of its own. A visitor's setting is a check box
 of that visitor's connection, and hides the node in that visitor's scene only. The viewer's own
@@ -90,5 +90,5 @@ class ViewSettings:
         @box.on_update
         async def _(_: object) -> None:
             (seen_by.add if box.value else seen_by.discard)(id)
-            # A visitor's own node of that name stands in for everybody's.
+            # Replaces the shared node of that name in the scene of this visitor.
             visitor.scene.add_frame(setting.node, show_axes=False, visible=box.value)
