@@ -13,8 +13,11 @@ with the safety layer between policy and robot.
     The same episodes without the safety layer.
 ``choice-ssm``, ``choice-no-ssm``
     Two or three targets, chosen by the critic.
+``ssm-short-reaction``, ``choice-ssm-short-reaction``
+    The layer with a reaction time of 0.05 s (T_r = 0.1 s with the control period) and hands of
+    up to 2 m/s, the speed of ISO 13855 for hands over less than 0.5 m.
 ``choice-ssm-fast-hands``
-    The same with hands of up to 2.8 m/s and a reaction time of 0.05 s.
+    The same reaction time and hands of up to 2.8 m/s.
 
 Contact with a moving link ends an episode, also at a speed that power and force limiting
 admits (``contact_admissible``). A person may touch a robot at standstill: the episode continues
@@ -44,8 +47,10 @@ from app.sim.scenario.monitoring import MonitoredEpisodes, MonitoringSettings, j
 DEFAULT_EPISODES = 20_000
 TIME_LIMIT_S = 20.0
 """Time limit of an episode [s]."""
-FAST_HANDS = replace(AMONG_HANDS, human_speed=2.8, reaction_time=0.05)
-"""Assumptions that cover hands faster than 1.6 m/s; an episode has no other delay."""
+SHORT_REACTION = replace(AMONG_HANDS, human_speed=2.0, reaction_time=0.05)
+"""Assumptions for a short reaction time; an episode has no delay but the control period."""
+FAST_HANDS = replace(SHORT_REACTION, human_speed=2.8)
+"""The same for faster hands."""
 CHUNK = 5_000
 """Number of episodes that run together."""
 
@@ -67,10 +72,14 @@ class Condition:
 CONDITIONS: Mapping[str, Condition] = {
     "no-ssm": Condition(active=False),
     "ssm": Condition(against="no-ssm"),
+    "ssm-short-reaction": Condition(safety=SHORT_REACTION, against="no-ssm"),
     "ssm-distance": Condition(safety=SafetySettings(), against="no-ssm"),
     "pfl": Condition(safety=replace(AMONG_HANDS, pfl=True), against="no-ssm"),
     "choice-no-ssm": Condition(active=False, choice=True),
     "choice-ssm": Condition(choice=True, against="choice-no-ssm"),
+    "choice-ssm-short-reaction": Condition(
+        safety=SHORT_REACTION, choice=True, against="choice-no-ssm"
+    ),
     "choice-ssm-fast-hands": Condition(safety=FAST_HANDS, choice=True, against="choice-no-ssm"),
 }
 """Conditions by row."""

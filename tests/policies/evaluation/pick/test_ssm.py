@@ -33,7 +33,7 @@ def test_layer_prevents_contacts_of_the_moving_robot_and_costs_time(found):
     rows = {row["name"]: row for row in found["results"]}
     assert rows["no-ssm"]["contacts_moving"] > 0
     assert rows["no-ssm"]["fastest_link_m_s"] > 0.01
-    for name in ("ssm", "ssm-distance", "choice-ssm", "pfl"):
+    for name in ("ssm", "ssm-short-reaction", "ssm-distance", "choice-ssm", "pfl"):
         assert rows[name]["contacts_moving"] == 0
         assert rows[name]["fastest_link_m_s"] == 0.0
     assert rows["ssm"]["success"]["mean"] > 0.9
@@ -42,7 +42,9 @@ def test_layer_prevents_contacts_of_the_moving_robot_and_costs_time(found):
     assert rows["no-ssm"]["override"] == pytest.approx(1.0)
     assert rows["no-ssm"]["stopped"] == 0.0
     assert rows["no-ssm"]["time_lost_s"] is None
-    assert rows["ssm-distance"]["stopped"] > rows["ssm"]["stopped"] > rows["pfl"]["stopped"]
+    stopped = [rows[name]["stopped"] for name in ("ssm-distance", "ssm", "ssm-short-reaction")]
+    assert stopped == sorted(stopped, reverse=True)
+    assert stopped[-1] > rows["pfl"]["stopped"]
 
 
 def test_every_episode_has_one_end(found):
