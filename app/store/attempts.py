@@ -209,19 +209,38 @@ def has_resume(store: Store, job_id: str) -> bool:
 def resume_earlier(store: Store, claim: Claim, step: int | None) -> None:
     """Let a claimed attempt start from an earlier state than its claim states.
 
-    The job's points and checkpoints beyond that state are deleted.
+    The job's points and checkpoints beyond that state are deleted. Once the attempt has
+    recorded something, the same start again has no effect: it was delayed.
 
     Args:
         step: Step of the state; None: the attempt starts without one.
 
     Raises:
         StaleAttempt: The attempt no longer holds the job.
+        InvalidInput: The attempt has recorded something since its start from another step.
     """
     with store.writing() as connection:
         fenced_update(connection, claim, {}, counts=False)
+        started_from, has_recorded = _start_of(connection, claim.job_id)
+        if has_recorded and started_from != (step or 0):
+            rule = f"must equal {started_from}, the start of what the attempt has recorded"
+            raise InvalidInput("step", step, rule)
+        if has_recorded:
+            return
         _forget_beyond(connection, claim.job_id, -1 if step is None else step)
-        data = {"attempt": claim.attempt, "resumed_from_step": step or 0}
-        change_state(connection, claim.job_id, "running", {"step": step or 0}, data)
+        if started_from != (step or 0):
+            data = {"attempt": claim.attempt, "resumed_from_step": step or 0}
+            change_state(connection, claim.job_id, "running", {"step": step or 0}, data)
+
+
+def _start_of(connection: sa.Connection, job_id: str) -> tuple[int, bool]:
+    """Return the first step of a running attempt, and whether it has recorded something."""
+    of_job = sa.select(events).where(events.c.job_id == job_id)
+    states = of_job.where(events.c.kind == "state").order_by(events.c.id.desc())
+    found = connection.execute(states).all()
+    start = next(one for one in found if one.data.get("state") == "running")
+    later = of_job.where(events.c.id > start.id, events.c.kind != "state").limit(1)
+    return start.data["resumed_from_step"], connection.execute(later).first() is not None
 
 
 def resume_manifests(store: Store, job_id: str) -> tuple[Mapping[str, Any], ...]:

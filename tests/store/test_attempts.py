@@ -162,12 +162,37 @@ def test_attempt_may_start_from_an_earlier_state_than_its_claim(
     assert (job.state, job.step, curve(store, claim)) == ("running", 10, [5, 10])
     assert (last.kind, last.data["resumed_from_step"]) == ("state", 10)
     assert [c.step for c in checkpoints.list_checkpoints(store).items] == [10]
-    record(store, second, 15)
     attempts.resume_earlier(store, second, None)
     assert (curve(store, claim), attempts.has_resume(store, claim.job_id)) == ([], False)
     claim_again(store)
     with pytest.raises(StaleAttempt):
         attempts.resume_earlier(store, second, None)
+
+
+@pytest.mark.parametrize("step", [10, None])
+def test_delayed_start_changes_nothing(store: Store, claim: Claim, step: int | None) -> None:
+    for at in (10, 20):
+        attempts.record_checkpoint(store, claim, at, policy(bytes([at])), resume(at))
+    second = claim_again(store)
+
+    def written() -> tuple[object, ...]:
+        stored = checkpoints.list_checkpoints(store, job_id=claim.job_id).items
+        state = attempts.load_resume(store, claim.job_id)
+        told = events.list_events(store, claim.job_id)
+        return curve(store, claim), stored, state, told, jobs.get_job(store, claim.job_id)
+
+    attempts.resume_earlier(store, second, step)
+    before = written()
+    attempts.resume_earlier(store, second, step)
+    assert written() == before
+    record(store, second, 15, 25)
+    attempts.record_checkpoint(store, second, 30, policy(b"30"), resume(30))
+    jobs.request_cancel(store, claim.job_id)
+    before = written()
+    attempts.resume_earlier(store, second, step)
+    with pytest.raises(InvalidInput, match=f"step = 20 must equal {step or 0}, the start"):
+        attempts.resume_earlier(store, second, 20)
+    assert written() == before
 
 
 def test_checkpoint_of_the_same_step_replaces_the_earlier(store: Store, claim: Claim) -> None:

@@ -19,6 +19,7 @@ from tests.store.test_cells import KITCHEN
 from tests.store.test_checkpoints import policy, second_job
 from tests.store.test_recordings import WAVE
 from tests.store.test_retention import save
+from tests.support.databases import claimed
 
 WAIT_S = 30.0
 Delete = Callable[[Store], object]
@@ -120,6 +121,8 @@ def test_checkpoint_to_be_evaluated_stays_when_its_training_repeats_the_steps(
     claim = second_job(store)
     first, second = save(store, claim, 1, b"1"), save(store, claim, 2, b"2")
     queue(store, References(checkpoint=second))
+    completion.give_back(store, claim)
+    claim = claimed(store)[0]
     attempts.resume_earlier(store, claim, None)
     assert checkpoints.read_checkpoint(store, second)[1] == b"2"
     with pytest.raises(NotFound):

@@ -91,7 +91,10 @@ def record_progress(body: AttemptProgress, access: AccessDep) -> None:
 
 @router.post("/start", status_code=204, summary="Start from a state", responses=WRITE_RESPONSES)
 def start_attempt(body: AttemptStart, access: AccessDep) -> None:
-    """Start from an earlier state than the job states, where a later one is damaged."""
+    """Start from an earlier state than the job states, where a later one is damaged.
+
+    The same start again has no effect; another one is refused once something is recorded.
+    """
     access.resume_earlier(body.step)
 
 
