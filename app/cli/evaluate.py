@@ -79,13 +79,14 @@ def find_checkpoint(reference: str, settings: "Settings") -> "Checkpoint":
     from app.cli.database import has_database, opened
     from app.policies.checkpoints import pretrained
     from app.policies.checkpoints.checkpoint import MAX_BYTES, load
+    from app.policies.checkpoints.files import read_files
     from jobs.checkpoints import read_sound
 
     path = Path(reference)
     if path.suffix == ".safetensors":
         if not path.is_file():
             raise NotFound("checkpoint file", reference)
-        return load(_manifest(path.with_suffix(".json")), file_content(path, MAX_BYTES))
+        return read_files(path, lambda one: load(_manifest(one), file_content(path, MAX_BYTES)))
     if reference in pretrained.ALIASES:
         return pretrained.load(reference)
     if not has_database(settings):

@@ -67,6 +67,7 @@ def _train(configuration: "Preset", cell: "Cell", seed: int, output: Path) -> Pa
     """Train in a folder that no other process uses; return the path of the policy."""
     import torch
 
+    from app.policies.checkpoints.files import write_files
     from app.policies.training import train as training
     from app.policies.training.state_folder import StateFolder
 
@@ -86,8 +87,7 @@ def _train(configuration: "Preset", cell: "Cell", seed: int, output: Path) -> Pa
             file.write(json.dumps(asdict(progress)) + "\n")
 
     def write(_step: int, policy: "Checkpoint", state: "TrainingState | None") -> None:
-        path.write_bytes(policy.tensors)
-        path.with_suffix(".json").write_text(json.dumps(policy.manifest, indent=1))
+        write_files(path, policy)
         if state is not None:
             states.write(state)
 
@@ -163,10 +163,13 @@ def require_same(
 
 def cut_curve(path: Path, step: int) -> None:
     """Delete the points of a learning curve beyond a step, which are measured again."""
+    from app.policies.training.file_store import write_durably
+
     if path.exists():
         lines = path.read_text(encoding="utf-8").splitlines(keepends=True)
         kept = [line for line in lines if line.endswith("\n")]
-        path.write_text("".join(one for one in kept if json.loads(one)["step"] <= step))
+        before = "".join(one for one in kept if json.loads(one)["step"] <= step)
+        write_durably(path, before.encode())
 
 
 def parse_overrides(sets: Sequence[str]) -> dict[str, Any]:

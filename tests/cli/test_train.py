@@ -66,7 +66,10 @@ def test_interrupted_command_continues_with_the_same_result(
     ):
         assert main(call(parts, *change)) == 2
         assert field in capsys.readouterr().err
-    assert main(call(parts)) == 0
+    before = (parts / "policy.safetensors").read_bytes()
+    with (parts / "policy.safetensors").open("rb") as reader:
+        assert main(call(parts)) == 0
+        assert reader.read() == before
     assert "continues at step" in capsys.readouterr().err
     assert main(call(whole)) == 0
     for name in ("policy.safetensors", "policy.json"):

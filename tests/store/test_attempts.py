@@ -178,8 +178,8 @@ def test_delayed_start_changes_nothing(store: Store, claim: Claim, step: int | N
     def written() -> tuple[object, ...]:
         stored = checkpoints.list_checkpoints(store, job_id=claim.job_id).items
         state = attempts.load_resume(store, claim.job_id)
-        told = events.list_events(store, claim.job_id)
-        return curve(store, claim), stored, state, told, jobs.get_job(store, claim.job_id)
+        happened = events.list_events(store, claim.job_id)
+        return curve(store, claim), stored, state, happened, jobs.get_job(store, claim.job_id)
 
     attempts.resume_earlier(store, second, step)
     before = written()

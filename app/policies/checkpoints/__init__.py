@@ -1,6 +1,7 @@
 """Checkpoint files and what they state.
 
 checkpoint      Checkpoint format: tensors as safetensors, everything else as a JSON manifest
+files           Checkpoints as files: a reader gets tensors and manifest of one checkpoint
 model_state     Tensors of networks and optimisers in checkpoints, and versions of packages
 trained_cell    Training cell of a checkpoint
 trained_values  Training range of a reach policy, to flag inputs outside it
