@@ -286,6 +286,7 @@ def assemble(
         tracer: Makes the spans of decisions.
     """
     store = retention.store
+    names.acting = lambda: acting_in(worlds)
     return Services(
         store=store,
         response_cache=ResponseCache(store),

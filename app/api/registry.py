@@ -61,6 +61,10 @@ class CheckpointNames:
         """The database."""
         self.registries: list[PolicyRegistry[Any]] = []
         """The registries of loaded policies."""
+        self.acting: Callable[[], Iterable[str]] = tuple
+        """Returns the SHA-256 of each checkpoint that acts."""
+        self.unstored: frozenset[str] = frozenset()
+        """SHA-256 of those that act and are no longer stored."""
         self._lock = threading.Lock()
         self._aliases: dict[str, str] | None = None
         self._damaged: dict[str, str] = {}
@@ -150,9 +154,12 @@ class CheckpointNames:
         Attempts that repeat steps and other servers delete checkpoints, too. Each addition
         calls it: the checkpoint may have been deleted since it was read.
         """
-        held = set(self._damaged).union(*(one.held for one in self.registries))
+        acting = set(self.acting())
+        held = acting.union(self._damaged, *(one.held for one in self.registries))
         if held := held.difference(self.aliases.values()):  # those with an alias are stored
-            self.forget(held - stored_among(self.store, held))
+            held -= stored_among(self.store, held)
+            self.forget(held)
+        self.unstored = frozenset(acting & held)
 
     @property
     def damaged(self) -> tuple[str, ...]:

@@ -75,6 +75,18 @@ def test_shipped_checkpoints_are_choices_behind_a_page_of_newer_ones(
     expect(options).to_contain_text(["pick · pick-td3", "pick-monitored"])
 
 
+def test_active_policy_that_is_no_longer_stored_says_so(open_page: Callable[..., Page]) -> None:
+    page, none = open_page(scene=False), {"items": [], "next_cursor": None}
+    acting = page.locator("[data-role=acting]").input_value()
+    for kind in ("checkpoints?limit=100", "aliases"):
+        page.route(f"**/v1/{kind}", lambda route: route.fulfill(json=none))
+    world = {"items": [{"id": "main", "follow": None, "unstored": [acting]}]}
+    page.route("**/v1/worlds", lambda route: route.fulfill(json=world))
+    page.locator("[data-role=acting]").focus()
+    chosen = page.locator(f'[data-role=acting] option[value="{acting}"]')
+    expect(chosen).to_contain_text("no longer stored")
+
+
 def test_uploaded_files_make_the_same_checkpoint(open_page: Callable[..., Page]) -> None:
     page = opened(open_page, "pick")
     files = page.locator("[data-role=checkpoint-files]")

@@ -59,9 +59,14 @@ WorldDep = Annotated[LiveWorld, Depends(live_world)]
 @router.get("", summary="List the live worlds")
 async def list_worlds(services: ServicesDep) -> WorldList:
     """Return every live world; none while the service warms up."""
+    unstored = services.checkpoints.unstored
     return WorldList(
         items=[
-            WorldSummary.from_domain(world.handle.snapshot(), services.follows.of(world_id))
+            WorldSummary.from_domain(
+                world.handle.snapshot(),
+                services.follows.of(world_id),
+                sorted(unstored & world.handle.acting),
+            )
             for world_id, world in services.worlds.items()
         ]
     )

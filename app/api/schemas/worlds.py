@@ -1,5 +1,6 @@
 """Live worlds as answers of the API: the snapshot itself, with the request of its decision."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass, fields
 from typing import Any, ClassVar, Self
 
@@ -84,11 +85,21 @@ class WorldSummary(Answer):
     follow: FollowPublic | None = Field(
         description="the training that it follows or followed last; null for none"
     )
+    unstored: list[str] = Field(
+        description="SHA-256 of policies that act and are no longer stored, such as those "
+        "that a training dropped when it was resumed from an earlier state"
+    )
 
     @classmethod
-    def from_domain(cls, snapshot: WorldSnapshot, follow: FollowPublic | None = None) -> Self:
+    def from_domain(
+        cls,
+        snapshot: WorldSnapshot,
+        follow: FollowPublic | None = None,
+        unstored: Iterable[str] = (),
+    ) -> Self:
         """Make it from a snapshot."""
-        return cls.from_object(snapshot, viewer=f"/viewer/{snapshot.id}/", follow=follow)
+        viewer = f"/viewer/{snapshot.id}/"
+        return cls.from_object(snapshot, viewer=viewer, follow=follow, unstored=list(unstored))
 
 
 class WorldCell(Body):

@@ -20,15 +20,20 @@ export async function storedCheckpoints() {
     ({ ...one, shipped: one.aliases.filter((name) => names.includes(name)) }));
 }
 
-/** Known checkpoints; asked for again when `stamp` changes and by `refresh`. */
+/**
+ * Known checkpoints, and the ids of policies that act and are no longer stored; asked for again when `stamp`
+ * changes and by `refresh`.
+ */
 export function useCheckpoints(link, stamp) {
   const [list, setList] = useState([]);
+  const [unstored, setUnstored] = useState([]);
   const refresh = useCallback(() => {
     if (link !== "live") return;
     storedCheckpoints().then(setList, () => {});
+    get("v1/worlds").then(({ items }) => setUnstored(items.flatMap((one) => one.unstored)), () => {});
   }, [link]);
   useEffect(refresh, [refresh, stamp]);
-  return { list, refresh };
+  return { list, unstored, refresh };
 }
 
 export function Acting({ world, checkpoints, jobs, send }) {
@@ -42,7 +47,7 @@ export function Acting({ world, checkpoints, jobs, send }) {
       onChange=${(e) => send({ tag: "set-policy", checkpoint: e.target.value || null })}>
       ${world.reach && html`<option value="">none: straight to the goal</option>`}
       ${!now && !world.reach && html`<option value="" disabled>none: choose one</option>`}
-      ${options(groups, now, world.policy_title)}
+      ${options(groups, now, world.policy_title, checkpoints.unstored)}
     </select>
   </label>`;
 }
@@ -56,15 +61,16 @@ export function TaskPlanner({ sorting, cell, checkpoints, jobs, send }) {
     <select value=${now ?? ""} data-role="sorting-policy" onFocus=${checkpoints.refresh}
       onChange=${(e) => send({ tag: "set-sorting-policy", checkpoint: e.target.value || null })}>
       <option value="">the exact planner</option>
-      ${options(groups, now, sorting.sorting_policy_title)}
+      ${options(groups, now, sorting.sorting_policy_title, checkpoints.unstored)}
     </select></label>`;
 }
 
 /** The checkpoints of groups, after the one that acts now if it is in none of them. */
-function options(groups, now, title) {
+function options(groups, now, title, unstored) {
   const known = groups.some((g) => g.items.some((c) => c.sha256 === now));
+  const state = unstored.includes(now) ? " · no longer stored" : "";
   return html`
-    ${now && !known && html`<option value=${now}>${title ?? format.short(now)}</option>`}
+    ${now && !known && html`<option value=${now}>${title ?? format.short(now)}${state}</option>`}
     ${groups.map((group) => html`<optgroup key=${group.label} label=${group.label}>
       ${group.items.map((c) => html`<option key=${c.sha256} value=${c.sha256}>
         ${name(c, group.job)}</option>`)}</optgroup>`)}`;

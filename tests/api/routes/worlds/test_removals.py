@@ -10,7 +10,7 @@ import pytest
 import sqlalchemy as sa
 
 from app.api.routes.cells import delete_cell
-from app.api.routes.worlds import command_world, set_world_cell
+from app.api.routes.worlds import command_world, list_worlds, set_world_cell
 from app.api.schemas.worlds import CommandAccepted, WorldCell
 from app.api.services import Services
 from app.api.world_policies import newest_for
@@ -20,12 +20,13 @@ from app.main import acting_in
 from app.policies.checkpoints.checkpoint import CHOOSING
 from app.sim.cells.cell import Cell, load_cell
 from app.sim.pick.task_policy import TaskPolicy
-from app.store import checkpoints
+from app.store import attempts, checkpoints, completion, jobs
 from app.store.database import tables
 from app.store.engine import Store
+from app.store.records import NewJob
 from jobs.checkpoints import shipped
 from tests.support import workshop
-from tests.support.databases import SQLITE_ONLY
+from tests.support.databases import SQLITE_ONLY, claimed
 from tests.support.idle_service import add_world, idle_service, loading, own_policy
 from web.viewer.loop import LiveCell
 
@@ -95,6 +96,28 @@ def test_world_does_not_start_with_a_policy_that_is_deleted_meanwhile(
     assert services.worlds["main"] is before
     with pytest.raises(Conflict, match="was stopped"):
         started[0].handle.submit(PauseClock())
+
+
+def test_policy_that_acts_is_named_once_its_training_has_dropped_it(
+    services: Services, store: Store
+) -> None:
+    jobs.create_job(store, NewJob(kind="count", spec={}))
+    claim, _ = claimed(store)
+    made = own_policy()
+    attempts.record_checkpoint(store, claim, 20, made)
+    choose(services, made.sha256)
+
+    def unstored() -> list[str]:
+        services.checkpoints.forget_unstored()
+        (world,) = asyncio.run(list_worlds(services)).items
+        return world.unstored
+
+    assert unstored() == []
+    completion.give_back(store, claim)
+    claim, _ = claimed(store)
+    assert unstored() == [made.sha256]
+    attempts.record_checkpoint(store, claim, 20, made)
+    assert unstored() == []
 
 
 def test_cell_is_not_removed_while_a_world_starts_in_it(services: Services) -> None:
