@@ -6,6 +6,7 @@ surrogates); integers beyond the database's range.
 
 import json
 import re
+import sys
 from collections.abc import Iterator, Sequence
 from urllib.parse import parse_qsl
 
@@ -47,8 +48,11 @@ def fault_in_json(body: bytes) -> Member | None:
         return None
     try:
         found = json.loads(body)
-    except ValueError:
+    except json.JSONDecodeError:
         return None
+    except ValueError:
+        limit = f"must have integers of at most {sys.get_int_max_str_digits()} digits"
+        return member("body", "<a longer integer>", limit)
     return next(_faults(found, ("body",)), None)
 
 

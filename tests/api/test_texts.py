@@ -25,6 +25,7 @@ FAULTS: list[tuple[bytes, str, str]] = [
     (b'{"a": 9223372036854775808}', "a", "9223372036854775807"),
     (b'{"a": [-9223372036854775809]}', "a[0]", "-9223372036854775808"),
     (b"1" + b"0" * 400, "body", "9223372036854775807"),
+    (b'{"a": ' + b"9" * 5000 + b"}", "body", "integers of at most 4300 digits"),
 ]
 SOUND: list[Any] = [
     {
@@ -52,9 +53,7 @@ def test_sound_values_pass(value: Any, ascii_only: bool) -> None:
     assert fault_in_json(json.dumps(value, ensure_ascii=ascii_only).encode()) is None
 
 
-@pytest.mark.parametrize(
-    "body", [b"", b"{", b'"' + b'\\"' * 300_000, b'{"a": \\u0000', b"9" * 5000]
-)
+@pytest.mark.parametrize("body", [b"", b"{", b'"' + b'\\"' * 300_000, b'{"a": \\u0000'])
 def test_what_is_no_json_is_left_to_the_parser(body: bytes) -> None:
     assert fault_in_json(body) is None
 

@@ -104,7 +104,7 @@ async def stream_job(
     ] = None,
 ) -> AsyncIterator[ServerSentEvent]:
     """Send every event of the job, then new ones, then ``end`` once it is over."""
-    after = last_event_id or 0
+    after = min(last_event_id or 0, job.last_event)  # less in a database that was restored
     while not services.stopping.is_set():
         news = await run_in_threadpool(events.list_events, services.store, job.id, after=after)
         for event in news:

@@ -1,14 +1,19 @@
+import asyncio
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
 from fastapi.testclient import TestClient
 
-from app.store.jobs import create_job
+from app.api.routes.jobs import stream_job
+from app.store.engine import Store
+from app.store.jobs import create_job, request_cancel
 from app.store.records import NewJob
 from tests.api.answers import post_json, problem_of
 from tests.api.conftest import services_of
 from tests.sim.recorded_person import csv_text, working
+from tests.support.idle_service import idle_service
 
 TINY = {
     "learning": {
@@ -208,6 +213,20 @@ def test_stream_of_a_job_can_be_resumed_and_ends_with_it(client: TestClient) -> 
     rest = client.get(f"/v1/jobs/{job['id']}/events", headers={"Last-Event-ID": "1"}).text
     assert "id: 1\n" in whole and "id: 1\n" not in rest
     assert "id: 2\n" in rest
+
+
+def test_stream_after_an_event_that_a_restored_database_lacks_sends_later_ones(
+    store: Store, tmp_path: Path
+) -> None:
+    services = idle_service(store, tmp_path)
+    waiting = create_job(store, NewJob(kind="count", spec={}))
+    stream = stream_job(waiting, services, 1000)
+    request_cancel(store, waiting.id)
+
+    async def sent() -> list[str | None]:
+        return [one.event async for one in stream]
+
+    assert asyncio.run(sent()) == ["state", "end"]
 
 
 def test_presets_are_described_for_a_form(client: TestClient) -> None:
