@@ -20,6 +20,8 @@ KEEP_UNKNOWN_S = 7 * 24 * 3600.0
 """Time for which the files of an unknown job are kept [s]."""
 _MARK = "unknown-job"
 """Name of a file whose time is that of the first look at an unknown job."""
+_UNFINISHED = ("*.unfinished", "*.part")
+"""Names of files that a worker or a restoration has not finished, as patterns."""
 
 
 def folder_of(data_dir: Path, job_id: str) -> Path:
@@ -35,18 +37,27 @@ def remove(folder: Path) -> None:
 def remove_unneeded(store: Store, data_dir: Path) -> None:
     """Delete the files of jobs that have ended without a state to resume from.
 
-    Those of unknown jobs are deleted ``KEEP_UNKNOWN_S`` after the first look at them.
+    Those of unknown jobs are deleted ``KEEP_UNKNOWN_S`` after the first look at them, and
+    unfinished files of ended jobs, which a killed worker or restoration has left, at once.
+    Called by the thread that starts workers, so that no ended job is started meanwhile.
     """
     for folder in folder_of(data_dir, "").glob("*"):
-        try:
-            job = get_job(store, folder.name)
-        except NotFound:
-            with suppress(OSError):
-                _remove_unknown(folder)
-            continue
-        (folder / _MARK).unlink(missing_ok=True)
-        if job.is_final and not has_resume(store, job.id):
-            remove(folder)
+        with suppress(OSError):  # one that cannot be changed keeps no other from its turn
+            _remove_unneeded(store, folder)
+
+
+def _remove_unneeded(store: Store, folder: Path) -> None:
+    try:
+        job = get_job(store, folder.name)
+    except NotFound:
+        _remove_unknown(folder)
+        return
+    (folder / _MARK).unlink(missing_ok=True)
+    if job.is_final and not has_resume(store, job.id):
+        remove(folder)
+    elif job.is_final:
+        for left in (one for kind in _UNFINISHED for one in folder.glob(kind)):
+            left.unlink()
 
 
 def _remove_unknown(folder: Path) -> None:

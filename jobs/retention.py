@@ -108,5 +108,8 @@ class Retention:
         self.on_removed(removed)
 
     def _remove_files(self, job_id: str) -> None:
-        (self.logs / f"{job_id}.log").unlink(missing_ok=True)
         resume_files.remove(resume_files.folder_of(self.logs.parent, job_id))
+        try:
+            (self.logs / f"{job_id}.log").unlink(missing_ok=True)
+        except OSError as error:  # the job is deleted all the same
+            logger.warning("the log of job %s stays: %s", job_id, error)

@@ -163,8 +163,11 @@ def _not_finite(value: object, place: str) -> Iterator[tuple[str, float]]:
 
 
 def _shown(error: str) -> str:
-    """Return the end of an error, without the NULs that PostgreSQL cannot store."""
-    return error.replace("\0", "")[-MAX_ERROR:]
+    """Return the end of an error as text that every database stores.
+
+    PostgreSQL takes no NUL, and neither takes bytes of file names that are no UTF-8.
+    """
+    return error.replace("\0", "").encode(errors="backslashreplace").decode()[-MAX_ERROR:]
 
 
 def _end(

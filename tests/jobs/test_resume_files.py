@@ -53,3 +53,40 @@ def test_files_of_an_unknown_job_are_kept_for_a_while(store: Store, tmp_path: Pa
     remove_unneeded(store, tmp_path)
     assert [path.exists() for path in paths] == [False, True]
     assert not (paths[1].parent / "unknown-job").exists()
+
+
+def test_unfinished_files_of_ended_jobs_are_deleted(store: Store, tmp_path: Path) -> None:
+    policy = NewCheckpoint(sha256=digest({}, b"p"), manifest={}, tensors=b"p")
+    left: dict[str, list[str]] = {}
+    for name in ("cancelled", "running"):
+        jobs.create_job(store, NewJob(kind="count", spec={}))
+        claim, _ = claimed(store)
+        resume = ResumeState(step=10, manifest={}, tensors=b"r")
+        attempts.record_checkpoint(store, claim, 10, policy, resume)
+        path = with_file(tmp_path, claim.job_id)
+        for suffix in (".unfinished", ".part"):
+            path.with_name(path.name + suffix).touch()
+        if name == "cancelled":
+            completion.finish(store, claim, state="cancelled")
+        remove_unneeded(store, tmp_path)
+        left[name] = sorted(one.name for one in path.parent.iterdir())
+    kept = "transitions.safetensors"
+    assert left == {
+        "cancelled": [kept],
+        "running": [kept, f"{kept}.part", f"{kept}.unfinished"],
+    }
+
+
+def test_what_is_no_folder_keeps_no_other_from_being_deleted(
+    store: Store, tmp_path: Path
+) -> None:
+    ids = [jobs.create_job(store, NewJob(kind="x", spec={})).id for _ in range(5)]
+    for job_id in ids:
+        jobs.request_cancel(store, job_id)
+    paths = [with_file(tmp_path, job_id) for job_id in ids]
+    for path in paths[::2]:
+        path.unlink()
+        path.parent.rmdir()
+        path.parent.touch()
+    remove_unneeded(store, tmp_path)
+    assert not any(path.exists() for path in paths)

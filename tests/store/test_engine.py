@@ -1,3 +1,4 @@
+import os
 import signal
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
@@ -263,6 +264,13 @@ def test_nul_is_refused_by_name(store: Store) -> None:
 def test_error_with_a_nul_is_stored(store: Store, claim: Claim) -> None:
     completion.fail(store, claim, "output: \0\0.")
     assert jobs.get_job(store, claim.job_id).error == "output: ."
+
+
+def test_error_with_a_file_name_that_is_no_utf8_is_stored(store: Store, claim: Claim) -> None:
+    name = os.fsdecode(b"walk-\xff.bvh")
+    completion.crash(store, claim, f"cannot read {name}", max_failures=1)
+    error = jobs.get_job(store, claim.job_id).error
+    assert error == "Failed after 1 attempts. Last error: cannot read walk-\\udcff.bvh"
 
 
 @SQLITE_ONLY
