@@ -21,11 +21,21 @@ def print_result(text: str, data: Mapping[str, Any], *, as_json: bool) -> None:
 def write_output(path: Path, content: bytes) -> None:
     """Write the file of the option ``--output``, in a folder that exists.
 
+    A file is replaced as a whole; content also goes to devices and pipes.
+
     Raises:
         InvalidInput: It cannot be written.
+        StorageFull: No room is left; the present file stays.
     """
+    from app.policies.training.file_store import write_durably
+
     try:
-        path.write_bytes(content)
+        if path.exists() and not path.is_file():
+            path.write_bytes(content)
+        else:
+            target = path.resolve()
+            target.parent.stat()
+            write_durably(target, content)
     except OSError as error:
         rule = f"cannot be written: {error.strerror}"
         raise InvalidInput("--output", str(path), rule) from error

@@ -1,14 +1,18 @@
 """Files that trainings need to resume are deleted when no job needs them any more."""
 
+import logging
 import os
 import time
 from pathlib import Path
+
+import pytest
 
 from app.digests import digest
 from app.store import attempts, completion, jobs
 from app.store.engine import Store
 from app.store.records import NewCheckpoint, NewJob, ResumeState
 from jobs.resume_files import KEEP_UNKNOWN_S, folder_of, remove_unneeded
+from jobs.retention import Retention
 from tests.support.databases import claimed
 
 
@@ -90,3 +94,21 @@ def test_what_is_no_folder_keeps_no_other_from_being_deleted(
         path.parent.touch()
     remove_unneeded(store, tmp_path)
     assert not any(path.exists() for path in paths)
+
+
+def test_log_that_cannot_be_deleted_is_stated_and_its_job_is_deleted_with_its_files(
+    store: Store, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    logs, ids = tmp_path / "logs", []
+    for _ in range(3):
+        ids.append(jobs.create_job(store, NewJob(kind="x", spec={})).id)
+        jobs.request_cancel(store, ids[-1])
+        folder_of(tmp_path, ids[-1]).mkdir(parents=True)
+        (logs / f"{ids[-1]}.log").mkdir(parents=True)
+    keep = Retention(store=store, logs=logs, keep_jobs=0, keep_states=0, acting=dict)
+    with caplog.at_level(logging.WARNING):
+        keep.delete(ids[0])
+        keep.apply()
+    assert jobs.list_jobs(store).items == ()
+    assert not any(folder_of(tmp_path, one).exists() for one in ids)
+    assert [f"the log of job {one} stays" in caplog.text for one in ids] == [True] * 3
