@@ -11,7 +11,9 @@ a bounded action (docs/method.md 2.2) like those of a policy. The ``b_i`` are th
 
 found by lengthening the blends that are too short. A blend leaves the path near its corner by
 at most ``|v_i - v_{i-1}| b_i dt / 8``; if that is in contact, the motion stops at the corner. A
-robot in motion begins with a blend: the first corner is the end of its straight stop.
+robot in motion begins with a blend: the first corner is the end of its straight stop. The less
+deceleration the stop leaves for turning, the slower the first segment must be; where it alone
+would take longer than to stop and start again, the robot stops first.
 
 The result is not time-optimal: speeds are constant along a segment and durations whole periods,
 which costs little on straight lines between few corners. TOPP-RA (toppra 0.6.10) has wheels for
@@ -20,6 +22,7 @@ x86-64 Linux only, requires Matplotlib, and keeps limits only at its grid points
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -70,6 +73,17 @@ class TimedPath:
         return self.q[k] + 0.5 * (self.qd[k] + speed) * x, speed
 
 
+class Blends(NamedTuple):
+    """Blends of a path of n segments."""
+
+    periods: list[int]
+    """Periods of the blend about each corner, n + 1."""
+    speeds: Vec
+    """Joint speeds after each corner [rad/s], shape (n + 1, 6)."""
+    cruise: list[int]
+    """Periods at these speeds, n + 1."""
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TimingLimits:
     """Limits of a timed motion, per joint."""
@@ -104,7 +118,8 @@ def time_path(
         path: Postures joined by straight motions [rad], shape (n, 6), n >= 1. For a start in
             motion the first one is :func:`stopping_point`.
         qd0: Joint speeds at the start [rad/s], shape (6,), inside the limits; at rest if None.
-        stops: Corners (places in ``path``) to stop at; 0 means to brake before anything else.
+        stops: Corners (places in ``path``) to stop at; 0 means to brake before anything else,
+            as it also does where turning at once would take longer.
 
     Raises:
         InvalidInput: The path has no posture, or a number is NaN or infinite.
@@ -118,13 +133,13 @@ def time_path(
     corners = [k for k in sorted(stops) if (0 if qd0.any() else 1) <= k < len(path) - 1]
     runs: list[TimedPath] = []
     for first, last in zip([0, *corners], [*corners, len(path) - 1], strict=True):
-        runs.append(_run(path[first : last + 1], limits, np.zeros(6) if runs else qd0))
+        runs += _runs(path[first : last + 1], limits, np.zeros(6) if runs else qd0)
     return TimedPath(
         dt=limits.dt,
         q=np.vstack([*(run.q[:-1] for run in runs[:-1]), runs[-1].q]),
         qd=np.vstack([*(run.qd[:-1] for run in runs[:-1]), runs[-1].qd]),
         corner_rad=max(run.corner_rad for run in runs),
-        n_stops=len(corners),
+        n_stops=len(runs) - 1,
     )
 
 
@@ -160,11 +175,20 @@ def time_free_path(
     return best
 
 
-def _run(path: Vec, limits: TimingLimits, qd0: Vec) -> TimedPath:
-    """Time a path without stops between its ends."""
+def _runs(path: Vec, limits: TimingLimits, qd0: Vec) -> list[TimedPath]:
+    """Time a path without stops between its ends, or with one at the start."""
     apart = np.abs(np.diff(path, axis=0)).max(axis=1) > SAME
     path = np.vstack([path[:1], path[1:][apart]])
-    blends, speeds, cruise = _blends(np.diff(path, axis=0), limits, qd0)
+    segments = np.diff(path, axis=0)
+    blends = _blends(segments, limits, qd0)
+    if blends is not None:
+        return [_run(path, limits, qd0, blends)]
+    return [*_runs(path[:1], limits, qd0), *_runs(path, limits, np.zeros(6))]
+
+
+def _run(path: Vec, limits: TimingLimits, qd0: Vec, found: Blends) -> TimedPath:
+    """Return the knots of a path with its blends."""
+    blends, speeds, cruise = found
     q, qd = [path[0] - 0.5 * blends[0] * limits.dt * qd0], [qd0]
     corner = 0.0
     for i, corner_q in enumerate(path):
@@ -184,30 +208,44 @@ def _run(path: Vec, limits: TimingLimits, qd0: Vec) -> TimedPath:
     return TimedPath(dt=limits.dt, q=np.array(q), qd=np.array(qd), corner_rad=corner, n_stops=0)
 
 
-def _blends(segments: Vec, limits: TimingLimits, qd0: Vec) -> tuple[list[int], Vec, list[int]]:
-    """Return the blends [periods], the speeds after each corner, and the periods at them.
+def _blends(segments: Vec, limits: TimingLimits, qd0: Vec) -> Blends | None:
+    """Return the blends of a path.
 
     Args:
         segments: The segments [rad], shape (n, 6).
         limits: Limits of the motion.
         qd0: Joint speeds before the first corner [rad/s], shape (6,).
+
+    Returns:
+        None where the first segment would take longer than a stop and the path from rest.
     """
     n, dt = len(segments), limits.dt
     least = np.max(np.abs(segments) / limits.qd_max, axis=1, initial=0.0) / dt
     moving = stop_periods(qd0, limits)
     blends = np.array([moving if moving > 0 else min(n, 1), *[1] * n], dtype=np.float64)
-    speeds = np.zeros((n + 1, 6))
+    speeds, longest = np.zeros((n + 1, 6)), math.inf
     while True:
         ends = 0.5 * (blends[:-1] + blends[1:])
         cruise = np.maximum(0.0, np.ceil(least - ends - 1e-9))
         if n:
             speeds[:n] = segments / ((cruise + ends) * dt)[:, None]
         turns = np.diff(speeds, axis=0, prepend=qd0[None])
-        short = np.max(np.abs(turns) / (limits.qdd_max * dt), axis=1) > blends + 1e-9
+        short = np.max(np.abs(turns) / (limits.qdd_max * dt), axis=1) - 1e-9 > blends
         if not short.any():
             break
         if moving > 0 and short[0]:  # where its corner lies fixes the first blend: go slower
+            if longest == math.inf:
+                longest = moving + _periods_from_rest(segments, limits)
+            if cruise[0] > longest:
+                return None
             least[0] = cruise[0] + ends[0] + 1.0
             short[0] = False
         blends[short] += 1.0
-    return ([int(b) for b in blends], speeds, [*(int(m) for m in cruise), 0])
+    return Blends([int(b) for b in blends], speeds, [*(int(m) for m in cruise), 0])
+
+
+def _periods_from_rest(segments: Vec, limits: TimingLimits) -> int:
+    """Return the number of periods that a path takes from rest to rest."""
+    found = _blends(segments, limits, np.zeros(6))
+    assert found is not None  # only a start in motion slows the first segment down
+    return sum(found.periods) + sum(found.cruise)

@@ -187,6 +187,19 @@ def test_a_start_in_motion_turns_at_once_where_that_is_shorter() -> None:
     np.testing.assert_array_equal(timed.qd[0], qd0)
 
 
+@pytest.mark.parametrize("share", [0.5, 0.99, 1.0])
+def test_a_reversal_that_the_deceleration_leaves_no_room_for_begins_with_a_stop(
+    share: float,
+) -> None:
+    qd0 = np.zeros(6)
+    qd0[0] = share * LIMITS.qdd_max[0] * LIMITS.dt  # the stop takes that share of a period
+    stop = stopping_point(ARM.home, qd0, LIMITS)
+    path = np.stack([stop, stop - np.array([0.5, 0, 0, 0, 0, 0])])
+    timed = time_path(path, LIMITS, qd0)
+    assert timed.n_stops == 1
+    assert timed.n_periods == time_path(path, LIMITS, qd0, frozenset({0})).n_periods
+
+
 def test_bad_paths_are_named() -> None:
     with pytest.raises(InvalidInput, match="path"):
         time_path(np.zeros((0, 6)), LIMITS)
