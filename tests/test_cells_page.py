@@ -31,6 +31,17 @@ def test_example_is_a_cell_that_policies_can_act_in() -> None:
     assert lacks_for_pick(read_cell(block("json").encode())) is None
 
 
+def test_an_environment_takes_the_cell_of_the_file(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("my-cell.json").write_text(block("json"), "utf-8")
+    names: dict[str, Any] = {}
+    exec(block("python"), names)
+    names["env"].reset(seed=1)
+    assert names["env"].unwrapped.batch.cell.name == "workshop"
+
+
 def test_faults_are_listed_as_shown(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
