@@ -166,7 +166,10 @@ class CandidateValue(Answer):
     outcome: Outcome | None = Field(
         description="probabilities and time; null where the checkpoint predicts none"
     )
-    reachable: bool = Field(description="whether a configuration with vertical tool exists")
+    reachable: bool = Field(
+        description="whether a configuration with vertical tool exists, in contact or not; "
+        "others are chosen only if no candidate is reachable"
+    )
     action: Action
     outside: list[OutOfRangeInput] = Field(description="coordinates outside the training range")
 

@@ -2,10 +2,12 @@
 
 ``R_i = Q(s_i, pi(s_i))`` for every candidate, with the smaller of both critics; the candidate
 with the greatest value is selected. With hysteresis the previous target is kept unless another
-one is better by a margin, which prevents oscillation. HTTP route, live cell and evaluations use
-the same networks.
+one is better by a margin, which prevents oscillation. A candidate out of reach is selected only
+if none is in reach, because critics were trained with targets in reach. HTTP route, live cell
+and evaluations use the same networks.
 
-Source: thesis eq. (5.1)-(5.7). Deviates: hysteresis is ours; 0 gives the thesis' rule.
+Source: thesis eq. (5.1)-(5.7). Deviates: hysteresis is ours (0 gives the thesis' rule), and so
+is the rule on reach.
 """
 
 import math
@@ -240,16 +242,18 @@ class TaskChooser(TrainedPolicy):
         )
         act, values, outcomes = self._networks.evaluate(obs)
         by_set = values.reshape(-1, len(query.ids))
+        offered = reachable if reachable.any() else ~reachable
         if last is not None and terms.progress.phase == LIFT:
             chosen = np.full(len(by_set), last)
         elif outcomes is None or terms.objective == "value":
             before = None if last is None else np.full(len(by_set), last)
-            chosen = select(by_set, before, HYSTERESIS)
+            chosen = select(np.where(offered, by_set, -np.inf), before, HYSTERESIS)
         else:
             success = outcomes.probability[:, 0]
             per_success = outcomes.time_s / np.maximum(success, LEAST_SUCCESS)
             scores = success if terms.objective == "success" else -per_success
-            chosen = scores.reshape(by_set.shape).argmax(axis=1)
+            by_score = np.where(offered, scores.reshape(by_set.shape), -np.inf)
+            chosen = by_score.argmax(axis=1)
         return _Evaluation(obs, reachable, act, by_set, outcomes, chosen)
 
     def _speeds(self, q: Vec, qd: Vec, act: NDArray[np.float32]) -> Vec:

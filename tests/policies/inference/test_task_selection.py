@@ -102,6 +102,31 @@ def test_a_candidate_out_of_reach_is_answered_and_flagged(chooser):
     assert np.isfinite(decision.values[1])
 
 
+BASE = Candidate(id="base", position=np.array([0.0, 0.0, 0.1]))
+"""Inside the robot's base, out of reach; the critic values it above a cube."""
+
+
+@pytest.mark.parametrize("objective", ["value", "success", "time"])
+@pytest.mark.parametrize("previous", [None, "base"])
+def test_a_candidate_out_of_reach_is_not_chosen_beside_one_in_reach(
+    chooser, objective, previous
+):
+    offered = [BASE, *cubes("cube0")]
+    decision = chooser.decide(
+        HOME, np.zeros(6), [person()], offered, previous=previous, objective=objective
+    )
+    assert decision.reachable == (False, True)
+    assert decision.values[0] > decision.values[1]
+    assert decision.chosen == "cube0"
+
+
+def test_of_candidates_out_of_reach_the_best_is_chosen(chooser):
+    far = Candidate(id="far", position=np.array([3.0, 3.0, 0.1]))
+    decision = chooser.decide(HOME, np.zeros(6), [person()], [far, BASE])
+    assert decision.reachable == (False, False)
+    assert decision.index == int(np.argmax(decision.values))
+
+
 def test_a_person_beyond_training_is_flagged_with_the_range(chooser):
     decision = chooser.decide(HOME, np.zeros(6), [person(y=2.5)], cubes("cube0"))
     flagged = {entry.field: entry for entry in decision.outside}
