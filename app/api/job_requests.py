@@ -8,6 +8,7 @@ from fastapi import Depends, Header, Response
 from app.api.schemas.jobs import JobList, JobPublic
 from app.api.services import Services, ServicesDep
 from app.policies.configs import presets
+from app.policies.evaluation.registry import check_task
 from app.sim.cells.cell import cell_names
 from app.store import job_actions, jobs, metrics
 from app.store.records import JobRecord, JobState, MetricRow, NewJob, References
@@ -63,10 +64,13 @@ def checked(body: AnySpec, services: Services) -> NewJob:
     Raises:
         InvalidInput: A preset, protocol, checkpoint, cell or recording is unknown or unfit.
     """
+    record = None
     if isinstance(body, EvaluateSpec) and body.checkpoint is not None:
-        services.checkpoints.read(body.checkpoint)
+        record, _ = services.checkpoints.read(body.checkpoint)
     new = body.new_job()
     if isinstance(body, EvaluateSpec):
+        if record is not None:
+            check_task(body.protocol, record.manifest, str(body.checkpoint))
         services.recordings.check(body.recordings)
     if new.preset is not None:
         preset = presets.resolve(new.preset, new.overrides or {})

@@ -21,10 +21,10 @@ from starlette.websockets import WebSocket
 
 from app.api.sockets import POLICY, refuse
 from app.api.validation import (
-    NOTHING,
     BodyFault,
     Member,
     body_models,
+    fault_text,
     member,
     validation_member,
     without_tag,
@@ -155,7 +155,7 @@ def member_problem(
         instance: Path of the request.
         headers: Headers of the answer.
     """
-    detail = f"{fault['field']} = {fault['value']} {fault['rule']}"
+    detail = fault_text(fault)
     return problem(status, detail, kind=kind, instance=instance, data=fault, headers=headers)
 
 
@@ -207,10 +207,9 @@ def validation_problem(
     found = [validation_member(one, model) for one, model in cut]
     malformed = errors[0]["type"] == "json_invalid"
     first = found[0]
-    given = "" if first["value"] == NOTHING else f" = {first['value']}"
     return problem(
         400 if malformed else 422,
-        f"{first['field']}{given} {first['rule']}",
+        fault_text(first),
         kind="malformed-json" if malformed else "invalid-input",
         instance=instance,
         data={**first, "errors": found},
@@ -260,8 +259,7 @@ async def on_socket_error(client: WebSocket, error: Exception) -> None:
     """Refuse a socket whose parameters do not match their schema."""
     assert isinstance(error, WebSocketRequestValidationError)
     fault = validation_member(error.errors()[0], None)
-    reason = f"{fault['field']} = {fault['value']} {fault['rule']}: {fault['choices'] or ''}"
-    await refuse(client, reason.removesuffix(": "), POLICY)
+    await refuse(client, fault_text(fault), POLICY)
 
 
 def install(app: FastAPI) -> None:

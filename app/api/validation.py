@@ -99,6 +99,13 @@ def member(field: str, value: str, rule: str, choices: Sequence[str] = ()) -> Me
     return {"field": field, "value": value, "rule": rule, "choices": list(choices)}
 
 
+def fault_text(fault: Mapping[str, Any]) -> str:
+    """Return a fault as a sentence with the value, the rule and the choices."""
+    given = "" if fault["value"] == NOTHING else f" = {fault['value']}"
+    choices = f"; choices: {', '.join(fault['choices'])}" if fault["choices"] else ""
+    return f"{fault['field']}{given} {fault['rule']}{choices}"
+
+
 def _tag_member(location: tuple[str | int, ...], context: Mapping[str, Any]) -> Member:
     """Return the fault of a missing or unknown discriminator."""
     field = dotted((*location, context["discriminator"].strip("'")))

@@ -124,7 +124,8 @@ def evaluate(
     check_motions(name, [motion.name for motion in motions])
     tested = {}
     if checkpoint is not None and name not in WITHOUT_CHECKPOINT:
-        _check_task(name, checkpoint)
+        preset = checkpoint.manifest["preset"].get("name")
+        check_task(name, checkpoint.manifest, preset or checkpoint.sha256[:12])
         tested = {"checkpoint": checkpoint.sha256}
     started = time.process_time()
     request = EvaluationRequest(episodes=episodes, seed=seed, motions=motions, on_row=on_row)
@@ -163,11 +164,19 @@ def task_measured(name: str) -> str:
     return REACHING if name in OF_REACHING else CHOOSING
 
 
-def _check_task(name: str, checkpoint: Checkpoint) -> None:
-    """Check that a checkpoint is of the scenario of a protocol."""
-    wanted, actual = task_measured(name), purpose_of(checkpoint.manifest)
-    if wanted != actual:
-        found = checkpoint.manifest["preset"].get("name") or checkpoint.sha256[:12]
+def check_task(name: str, manifest: Mapping[str, Any], found: str) -> None:
+    """Check that a checkpoint is of the scenario of a protocol; any is where it uses none.
+
+    Args:
+        name: A protocol.
+        manifest: Manifest of the checkpoint.
+        found: Name of the checkpoint in the error.
+
+    Raises:
+        InvalidInput: It is of another scenario; the choices are the protocols of its own.
+    """
+    wanted, actual = task_measured(name), purpose_of(manifest)
+    if wanted != actual and name not in WITHOUT_CHECKPOINT:
         fitting = set(PROTOCOLS) - WITHOUT_CHECKPOINT
         known = sorted(one for one in fitting if task_measured(one) == actual)
         raise InvalidInput(

@@ -84,7 +84,11 @@ def test_override_that_is_not_finite_is_refused(client: TestClient) -> None:
 
 @pytest.mark.parametrize(
     ("change", "field"),
-    [({"protocol": "pick-luck"}, "protocol"), ({"checkpoint": "best"}, "checkpoint")],
+    [
+        ({"protocol": "pick-luck"}, "protocol"),
+        ({"checkpoint": "best"}, "checkpoint"),
+        ({"checkpoint": "reach"}, "checkpoint"),
+    ],
 )
 def test_bad_evaluation_is_refused_by_field(
     client: TestClient, change: dict[str, Any], field: str
