@@ -11,7 +11,7 @@ from app.errors import InvalidInput
 from app.sim.cells.cell import Cell, cell_names, load_cell
 from app.sim.pick.batch import PickSettings
 from app.sim.reach.batch import ReachSettings
-from app.sim.scene.scene import HumanKind
+from app.sim.scene.scene import HUMAN_KINDS, HumanKind
 
 Settings = TypeVar("Settings")
 WithPeople = TypeVar("WithPeople", PickSettings, ReachSettings)
@@ -53,9 +53,17 @@ def settings_of(settings: Settings | None, default: Settings) -> Settings:
 def settings_with(
     settings: WithPeople | None, default: WithPeople, people: Sequence[HumanKind] | None
 ) -> WithPeople:
-    """Return settings as :func:`settings_of`, with other people unless ``people`` is None."""
+    """Return settings as :func:`settings_of`, with other people unless ``people`` is None.
+
+    Raises:
+        InvalidInput: The settings are of another type, or the people are no list of kinds.
+    """
     chosen = settings_of(settings, default)
-    return chosen if people is None else replace(chosen, people=tuple(people))
+    if people is None:
+        return chosen
+    if isinstance(people, str) or not isinstance(people, Sequence):
+        raise InvalidInput("people", people, "must be a list of kinds of people", HUMAN_KINDS)
+    return replace(chosen, people=tuple(people))
 
 
 def env_number(field: str, value: int, least: int = 0) -> int:

@@ -35,6 +35,13 @@ def test_arguments_of_another_type_are_refused(
     assert text in str(refused.value)
 
 
+@pytest.mark.parametrize("make", [ReachEnv, PickEnv, ReachVectorEnv, PickVectorEnv])
+@pytest.mark.parametrize("people", ["walker", 2, {"walker": 1}])
+def test_people_are_a_list_of_kinds(make: Any, people: Any) -> None:
+    with pytest.raises(InvalidInput, match="people = .* must be a list of kinds of people; ch"):
+        make(people=people)
+
+
 @pytest.mark.parametrize("make", VECTOR)
 @pytest.mark.parametrize("number", [0, -1, 1.5, "2", True, None])
 def test_batch_needs_a_number_of_environments(make: Any, number: Any) -> None:
