@@ -26,6 +26,7 @@ from app.api.validation import (
     body_models,
     fault_text,
     member,
+    merged,
     validation_member,
     without_tag,
 )
@@ -204,7 +205,7 @@ def validation_problem(
         instance: Path of the request.
     """
     cut = [without_tag(one, models) for one in errors[:MAX_LISTED_ERRORS]]
-    found = [validation_member(one, model) for one, model in cut]
+    found = merged([validation_member(one, model) for one, model in cut])
     malformed = errors[0]["type"] == "json_invalid"
     first = found[0]
     return problem(

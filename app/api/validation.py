@@ -15,6 +15,16 @@ from starlette.requests import Request
 MAX_VALUE_CHARACTERS = 200
 MAX_LISTED_ITEMS = 8
 NOTHING = "nothing"
+_SCALARS = (
+    "int",
+    "float",
+    "str",
+    "bool",
+    "constrained-int",
+    "constrained-float",
+    "constrained-str",
+)
+"""Branches of a union of scalars in pydantic's locations, which no body has as a field."""
 _SHOULD = re.compile(r"^[A-Z][a-z]+ should ")
 """Start of pydantic's messages: ``String should have at most 80 characters``."""
 _WORDS = {
@@ -106,6 +116,16 @@ def fault_text(fault: Mapping[str, Any]) -> str:
     return f"{fault['field']}{given} {fault['rule']}{choices}"
 
 
+def merged(faults: Sequence[Member]) -> list[Member]:
+    """Return faults with those of one field, the branches of a union, as one."""
+    found: dict[object, Member] = {}
+    for fault in faults:
+        first = found.setdefault(fault["field"], fault)
+        if first["rule"] != fault["rule"]:
+            found[fault["field"]] = {**first, "rule": f"{first['rule']} or {fault['rule']}"}
+    return list(found.values())
+
+
 def _tag_member(location: tuple[str | int, ...], context: Mapping[str, Any]) -> Member:
     """Return the fault of a missing or unknown discriminator."""
     field = dotted((*location, context["discriminator"].strip("'")))
@@ -144,7 +164,7 @@ def _tagged(annotation: Any) -> dict[str, type[BaseModel]]:
 def without_inner_tags(
     location: Sequence[str | int], model: type[BaseModel] | None
 ) -> tuple[list[str | int], type[BaseModel] | None, list[str | int]]:
-    """Remove the tags of unions inside a body from a location.
+    """Remove the tags and scalar branches of unions inside a body from a location.
 
     Args:
         location: Location of the error, ``body`` first.
@@ -164,6 +184,9 @@ def without_inner_tags(
         if isinstance(part, str):
             field = model.model_fields.get(part) if model else None
             variants = _tagged(field.annotation) if field else {}
+    if place[-1] in _SCALARS:
+        place.pop()
+        inner.pop()
     return place, model, inner
 
 

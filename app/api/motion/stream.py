@@ -41,7 +41,7 @@ logger = logging.getLogger(__name__)
 PATH = "/v1/motion/stream"
 MAX_WAITING = 64
 """Largest number of requests that wait where each is answered; then none is received."""
-MAX_STAMP, MAX_TIME = 64, 1e18
+MAX_STAMP, MAX_TIME = 64, 2**63
 """Longest text and greatest number of a stamp in a problem."""
 CHECK_S = 0.2
 """Period at which a socket checks whether it is idle or the server stops [s]."""

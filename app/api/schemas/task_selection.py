@@ -29,7 +29,8 @@ FRAME_TEXT = (
     "at z = 0; the pendant's `base` is turned by half a turn about z (x and y change sign)"
 )
 
-Stamp = Finite | Annotated[str, Field(max_length=64)] | None
+Stamp = int | Finite | Annotated[str, Field(max_length=64)] | None
+"""Returned unchanged: a float would round nanoseconds since 1970."""
 
 
 class CandidateState(Body):

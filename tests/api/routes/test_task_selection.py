@@ -30,6 +30,22 @@ def test_answer_names_the_choice_every_value_and_the_checkpoint(
     assert answer["elapsed_ms"] > 0.0
 
 
+@pytest.mark.parametrize("stamp", [1764259200123456789, 12, 12.5, "12", None])
+def test_stamps_are_returned_unchanged(
+    client: TestClient, state: dict[str, Any], stamp: int | float | str | None
+) -> None:
+    found = client.post(URL, json={**state, "stamp": stamp}).json()["stamp"]
+    assert (found, type(found)) == (stamp, type(stamp))
+
+
+def test_a_stamp_that_is_none_is_one_fault_of_its_field(
+    client: TestClient, state: dict[str, Any]
+) -> None:
+    (fault,) = problem_of(client.post(URL, json={**state, "stamp": [1]}))["errors"]
+    assert fault["field"] == "stamp"
+    assert "valid number or must be a valid string" in fault["rule"]
+
+
 def test_state_of_a_world_gives_the_choice_and_values_that_the_world_shows(
     client: TestClient,
 ) -> None:
