@@ -109,7 +109,8 @@ def test_evaluation_is_started_with_choices_of_the_server(
     page = open_page((1280, 900), scene=False)
     open_form(page)
     page.click('[data-kind="evaluate"]')
-    page.select_option("#evaluate-protocol", "sorting-tests")
+    page.select_option("#evaluate-protocol", label="A sorting policy in the six tests")
+    expect(page.locator("#evaluate-protocol-name")).to_have_text("sorting-tests")
     expect(page.locator("#evaluate-checkpoint")).to_contain_text("default: sorting-e0")
     expect(page.locator("#evaluate-checkpoint")).to_contain_text("sorting-e1")
     page.select_option("#evaluate-protocol", "pick-mocap")
@@ -132,6 +133,9 @@ def test_evaluation_is_started_with_choices_of_the_server(
         11,
     )
     expect(page.locator('.is-open [data-role="rows"]')).to_contain_text("success")
+    expect(page.locator(".is-open .job-detail")).to_contain_text(
+        "One random target per episode"
+    )
     assert len(page.problems) == 2  # type: ignore[attr-defined]  # two refusals
 
 

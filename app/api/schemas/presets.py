@@ -7,7 +7,7 @@ from pydantic import Field
 
 from app.api.schemas.numbers import Answer
 from app.policies.configs.fields import PresetEntry, entries
-from app.policies.configs.presets import PRESETS
+from app.policies.configs.presets import PRESETS, TITLES
 from jobs.spec import OBJECTIVES
 
 
@@ -47,6 +47,7 @@ class PresetPublic(Answer):
     """One preset."""
 
     name: str
+    title: str = Field(description="what it trains, and the algorithm")
     cell: str = Field(description="work cell of the training")
     fields: list[PresetField]
     objectives: Sequence[str] = Field(description="protocols that a sweep can use")
@@ -74,7 +75,9 @@ class PresetPublic(Answer):
             )
             listed.insert(0, choice)
         objectives = OBJECTIVES.get(name.partition("-")[0], ())
-        return cls(name=name, cell=own, fields=listed, objectives=objectives)
+        return cls(
+            name=name, title=TITLES[name], cell=own, fields=listed, objectives=objectives
+        )
 
 
 class PresetList(Answer):

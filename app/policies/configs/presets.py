@@ -22,6 +22,26 @@ PRESETS: Mapping[str, Preset] = MappingProxyType(
     {one.name: one for one in (*PICK_PRESETS, *REACH_PRESETS, *SORTING_PRESETS)}
 )
 """Every preset by name."""
+TITLES: Mapping[str, str] = MappingProxyType(
+    {
+        "pick-td3": "Pick and place (TD3)",
+        "pick-reach-td3": "Pick and place without grasps (TD3)",
+        "pick-td3-monitored": "Pick and place under SSM (TD3)",
+        "pick-td3-thesis": "Pick and place, thesis tables 5.1 and 5.2 (TD3)",
+        "reach-td3": "Reach (TD3)",
+        "reach-td3-monitored": "Reach under SSM (TD3)",
+        "reach-td3-people-set": "Reach beside up to four people (TD3)",
+        "reach-ddpg-authors": "Reach, code of the authors (DDPG)",
+        "reach-ddpg-thesis": "Reach, thesis tables 4.1 and 4.2 (DDPG)",
+        "sorting-e0-dqn": "Sorting e0 with expert labels (DQN)",
+        "sorting-e1-dqn": "Sorting e1 with expert labels (DQN)",
+        "sorting-e1-dqn-pure": "Sorting e1 from rewards alone (DQN)",
+        "sorting-e0-thesis": "Sorting e0, thesis table 3.1 (DQN)",
+        "sorting-e1-thesis": "Sorting e1, thesis table 3.1 (DQN)",
+        "sorting-e0-thesis-informed": "Sorting e0, thesis table 3.1, failures observed (DQN)",
+    }
+)
+"""Title of every preset, for people."""
 
 
 def get(name: str) -> Preset:

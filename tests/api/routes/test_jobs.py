@@ -235,7 +235,7 @@ def test_stream_after_an_event_that_a_restored_database_lacks_sends_later_ones(
 
 def test_presets_are_described_for_a_form(client: TestClient) -> None:
     preset = client.get("/v1/presets").json()["items"][0]
-    assert preset["name"] == "pick-td3"
+    assert (preset["name"], preset["title"]) == ("pick-td3", "Pick and place (TD3)")
     field = {one["name"]: one for one in preset["fields"]}["learning.total_steps"]
     assert field["minimum"] <= field["default"] <= field["maximum"]
     assert field["unit"] and field["title"]

@@ -28,6 +28,11 @@ def test_a_preset_is_read_from_its_own_data(name):
     assert read_config(type(preset), preset.model_dump(), "manifest.preset") == preset
 
 
+def test_every_preset_has_its_own_title():
+    assert list(presets.TITLES) == list(presets.PRESETS)
+    assert len(set(presets.TITLES.values())) == len(presets.TITLES)
+
+
 def test_resolving_without_overrides_gives_the_preset():
     assert presets.resolve("pick-td3", {}) == presets.get("pick-td3")
 

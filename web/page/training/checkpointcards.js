@@ -4,10 +4,9 @@ import { Ask, Fault, useAction } from "../action.js";
 import { postFile, put, remove } from "../api.js";
 import * as format from "../format.js";
 import { Alert, Icon } from "../icons.js";
-import { FieldName, fieldValue } from "./fieldnames.js";
+import { Facts, FieldName, fieldValue } from "./fieldnames.js";
+import { PURPOSES } from "./formfields.js";
 import { PAGE, storedCheckpoints } from "./checkpoints.js";
-
-const PURPOSES = { "choosing tasks": "task selection", "reaching goals": "reach", sorting: "sorting" };
 
 /** The section of the checkpoints; `acting` are the SHA-256 of those of the live cell. */
 export function CheckpointCards({ link, jobs, acting, presets }) {
@@ -59,9 +58,9 @@ function Card({ one, open, chosen, acting, jobs, onOpen, onChoose, onChanged }) 
       <div class="job-actions">
         <label class="tool"><input type="checkbox" data-action="compare-checkpoint" checked=${chosen}
           onChange=${() => onChoose(one.sha256)} /> Compare</label>
-        <a class="tool" download title="Download the tensors" href=${`v1/checkpoints/${one.sha256}/tensors`}>safetensors</a>
+        <a class="tool" download title="Download the tensors" href=${`v1/checkpoints/${one.sha256}/tensors`}>Tensors</a>
         <a class="tool" title="Download the manifest" download=${`${nameOf(one)}.json`}
-          href=${`v1/checkpoints/${one.sha256}/manifest`}>manifest</a>
+          href=${`v1/checkpoints/${one.sha256}/manifest`}>Manifest</a>
         ${!one.job_id && one.aliases.length === 0 && html`<${Delete} one=${one} onChanged=${onChanged} />`}
       </div></div>`}
   </li>`;
@@ -97,12 +96,6 @@ function recalibration(record) {
   if (!record) return {};
   const n = Object.values(record.outcomes).reduce((sum, count) => sum + count, 0);
   return { "Recalibrated by": `${format.count(n, "outcome")}, from ${format.short(record.from)}` };
-}
-
-/** Names and values; those that are unknown are left out. */
-function Facts({ entries }) {
-  return html`<dl class="facts">${entries.filter(([, text]) => text !== "–").map(([name, text]) => html`<div key=${name}>
-    <dt>${name}</dt><dd>${text}</dd></div>`)}</dl>`;
 }
 
 /** Jobs among the listed ones that evaluated a checkpoint. */
@@ -224,6 +217,6 @@ function flat(value, prefix = "") {
 
 function latestRates(one, jobs) {
   const found = evaluations(one, jobs).reverse().flatMap((job) =>
-    rates(job).map(([name, text]) => [`${job.spec.protocol}: ${name}`, text]));
+    rates(job).map(([name, text]) => [`Success in ${job.spec.protocol}: ${name}`, text]));
   return Object.fromEntries(found);
 }

@@ -2,12 +2,11 @@
 import { html } from "../vendor/htm-preact-standalone.module.js";
 import { post } from "../api.js";
 import * as format from "../format.js";
-import { Loading, OWN, parsed, StartForm, useForm, useItems } from "./formfields.js";
+import { Loading, OWN, parsed, protocolField, StartForm, useForm, useItems } from "./formfields.js";
 
 const SEED = { ...OWN[0], default: 11 };
 
-export function EvaluateForm({ link, onStarted, onClose }) {
-  const protocols = useItems(link, "v1/protocols");
+export function EvaluateForm({ link, protocols, onStarted, onClose }) {
   const checkpoints = useItems(link, "v1/checkpoints?limit=200");
   const recordings = useItems(link, "v1/recordings");
   const form = useForm({
@@ -34,8 +33,8 @@ export function EvaluateForm({ link, onStarted, onClose }) {
   }, key);
   return html`<${StartForm} form=${form} title="New evaluation" send=${send} start="Start evaluation"
     note="Runs in its own process, beside the cell." onClose=${onClose}>
-    ${form.row({ name: "protocol", choices: protocols.items.map(({ name }) => name),
-      default: protocol.name, help: protocol.title }, { protocol: protocol.name })}
+    ${form.row({ name: "protocol", ...protocolField(protocols.items,
+      protocols.items.map(({ name }) => name), protocol.name) }, { protocol: protocol.name })}
     ${field && form.row(field, { checkpoint })}
     ${form.row({ name: "episodes", default: "", minimum: 1, maximum: protocol.max_episodes,
       help: "Empty for the evaluation's own number" })}
@@ -53,7 +52,7 @@ export function checkpointField(protocol, checkpoints) {
     [one.aliases[0] ?? format.short(one.sha256), one.preset ?? one.manifest.preset?.name,
       format.count(one.step ?? one.manifest.step, "step")].filter(Boolean).join(" · ")]));
   return {
-    name: "checkpoint", choices: ["", ...fitting.map(({ sha256 }) => sha256)], default: "",
+    name: "checkpoint", wide: true, choices: ["", ...fitting.map(({ sha256 }) => sha256)], default: "",
     labels: { "": `default: ${protocol.checkpoint}`, ...labels },
     help: fitting.length ? "" : "No stored checkpoint is of the kind that this protocol takes",
   };

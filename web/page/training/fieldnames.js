@@ -11,7 +11,8 @@ export function fieldOf(presets, path, preset = null) {
   const field = [...own, ...known].flatMap(({ fields }) => fields)
     .find(({ name }) => `.${path}`.endsWith(`.${name}`));
   if (field && field.name !== "cell") return { title: field.title, unit: field.unit };
-  return { title: OTHERS[path] ?? format.capital(path.replaceAll("_", " ").replaceAll(".", ": ")), unit: "" };
+  const named = path.includes(" ") ? path : path.replaceAll("_", " ").replaceAll(".", ": ");
+  return { title: OTHERS[path] ?? format.capital(named), unit: "" };
 }
 
 /** A field's title with its unit, and its dotted name as a hint, or below it with `named`. */
@@ -19,6 +20,12 @@ export function FieldName({ presets, path, preset, named = false }) {
   const { title, unit } = fieldOf(presets, path, preset);
   return html`<span title=${path}>${title}${unit && html`<span class="unit"> [${unit}]</span>`}</span>
     ${named && path.includes(".") && html`<code class="raw-name">${path}</code>`}`;
+}
+
+/** Names and values, and hints at the names; values that are unknown are left out. */
+export function Facts({ entries }) {
+  return html`<dl class="facts">${entries.filter(([, text]) => text !== "–").map(([name, text, hint]) => html`
+    <div key=${hint ?? name}><dt title=${hint}>${name}</dt><dd>${text}</dd></div>`)}</dl>`;
 }
 
 /** A field's value; numbers with all their digits. */

@@ -4,6 +4,7 @@ import { get, Unreachable } from "../api.js";
 import { capital, grouped, sentence } from "../format.js";
 import { Alert, Close } from "../icons.js";
 
+export const PURPOSES = { "choosing tasks": "task selection", "reaching goals": "reach", sorting: "sorting" };
 const AGAIN_MS = 3000; // pause before a request that failed is sent again
 
 /**
@@ -34,9 +35,9 @@ export function useForm({ typed: first = {}, names, onDone, prefix = "train" }) 
     }
     setBusy(false);
   };
-  const row = (field, values = typed) => html`<${Field} key=${field.name} field=${field}
-    text=${values[field.name]}
-    fault=${faults[field.name]} prefix=${prefix} onText=${(text) => type(field.name, text)} />`;
+  const row = (field, values = typed, onText = (text) => type(field.name, text)) => html`<${Field}
+    key=${field.name} field=${field} text=${values[field.name]}
+    fault=${faults[field.name]} prefix=${prefix} onText=${onText} />`;
   const start = (values) => {
     setTyped(values);
     setProblem(null);
@@ -111,24 +112,57 @@ export function StartForm({ form, title, send, start, note, onClose, children })
   </form>`;
 }
 
-/** One field with its unit, help and fault; `prefix` keeps the fields of several forms apart. */
+/** The choice of a preset by its title, as a field of a form. */
+export function presetField(presets, preset, disabled = false) {
+  return { name: "preset", default: preset.name, choices: presets.map(({ name }) => name),
+    labels: Object.fromEntries(presets.map(({ name, title }) => [name, title])), wide: true, named: true, disabled };
+}
+
+/** What a protocol evaluates, without the verb. */
+export function protocolTitle({ title }) {
+  return capital(title.replace(/^Evaluate /, "").replace(/\.$/, ""));
+}
+
+/** The choice of a protocol by what it evaluates; `names` are the choices. */
+export function protocolField(protocols, names, chosen) {
+  const known = (protocols ?? []).filter(({ name }) => names.includes(name));
+  return { default: chosen, choices: names, wide: true, named: true,
+    labels: Object.fromEntries(known.map((one) => [one.name, protocolTitle(one)])),
+    groups: Object.fromEntries(known.map(({ name, purpose }) => [name, capital(PURPOSES[purpose] ?? "safety layer")])) };
+}
+
+/**
+ * One field with its unit, help and fault; `prefix` keeps the fields of several forms apart.
+ * A `wide` one has a line for its choices; `named` shows the chosen one's own name below its label.
+ */
 export function Field({ field, text, fault, onText, prefix }) {
   const id = `${prefix}-${field.name.replaceAll(".", "-")}`;
   const own = text !== undefined && changed(field, { [field.name]: text });
-  const described = [fault && `${id}-error`, `${id}-help`].filter(Boolean).join(" ");
-  return html`<div class=${`field ${own ? "is-changed" : ""}`}>
+  const help = helpText(field);
+  const described = [fault && `${id}-error`, field.named && `${id}-name`, help && `${id}-help`].filter(Boolean).join(" ");
+  return html`<div class=${`field ${own ? "is-changed" : ""} ${field.wide ? "is-wide" : ""}`}>
     <label for=${id}>${field.title ?? capital(field.name)}${field.unit && html`<span class="unit"> [${field.unit}]</span>`}</label>
     ${isChoice(field)
       ? html`<select id=${id} name=${field.name} value=${text ?? String(field.default)}
-          aria-describedby=${described} aria-invalid=${String(Boolean(fault))}
-          onChange=${(e) => onText(e.target.value)}>
-          ${choices(field).map((c) => html`<option key=${c} value=${c}>${field.labels?.[c] ?? c}</option>`)}</select>`
+          aria-describedby=${described} aria-invalid=${String(Boolean(fault))} disabled=${field.disabled}
+          title=${field.labels?.[text ?? field.default]}
+          onChange=${(e) => onText(e.target.value)}><${Options} field=${field} /></select>`
       : html`<input id=${id} name=${field.name} type="text" inputmode=${keyboard(field)} spellcheck="false"
           autocomplete="off" value=${text ?? grouped(field.default)} aria-describedby=${described}
           aria-invalid=${String(Boolean(fault))} onInput=${(e) => onText(e.target.value)} />`}
+    ${field.named && html`<code class="raw-name" id=${`${id}-name`}>${text ?? field.default}</code>`}
     ${fault && html`<p class="field-error" id=${`${id}-error`} role="alert">${fault}</p>`}
-    <p class="field-help" id=${`${id}-help`}>${helpText(field)}</p>
+    ${help && html`<p class="field-help" id=${`${id}-help`}>${help}</p>`}
   </div>`;
+}
+
+/** The choices of a field by their labels, in groups where it has some. */
+function Options({ field }) {
+  const options = (group) => choices(field).filter((c) => field.groups?.[c] === group)
+    .map((c) => html`<option key=${c} value=${c}>${field.labels?.[c] ?? c}</option>`);
+  const groups = [...new Set(Object.values(field.groups ?? {}))];
+  return html`${options(undefined)}${groups.map((group) => html`<optgroup key=${group}
+    label=${group}>${options(group)}</optgroup>`)}`;
 }
 
 /** What the field does and its range, as sentences. */

@@ -5,8 +5,9 @@ import * as format from "../format.js";
 import { Alert, Icon } from "../icons.js";
 import { CurvePlot } from "../plots.js";
 import { EndedByBudget } from "./budgets.js";
-import { FieldName, fieldValue } from "./fieldnames.js";
+import { Facts, fieldOf, fieldValue } from "./fieldnames.js";
 import { MAX_JOBS } from "./compare.js";
+import { protocolTitle } from "./formfields.js";
 import { isActive } from "./jobactions.js";
 import { JobFrame } from "./jobframe.js";
 import { Follow } from "./follow.js";
@@ -25,6 +26,7 @@ const OUTCOMES = [
 ];
 const KINDS = { evaluate: "evaluation", sweep: "sweep" };
 const UNITS = { evaluate: "rows", sweep: "trials", report: "evaluations" };
+const SHA_256 = 64; // characters; a shorter name is an alias
 const REWARD = [{ key: "reward", label: "mean reward of an episode", colour: "accent" }];
 
 /** Newest jobs, asked for again every two seconds while the server is there; parts of others, too. */
@@ -248,10 +250,15 @@ function rate(v, n) {
 }
 
 /** An evaluation has no curve: its rows, once all are known. */
-function Evaluation({ job, ...rest }) {
+function Evaluation({ job, protocols, ...rest }) {
+  const { protocol, checkpoint, episodes } = job.spec;
+  const known = protocols.items?.find(({ name }) => name === protocol);
   const rows = job.result?.results ?? [];
   const rates = (row) => OUTCOMES.filter(({ key }) => row[key]);
   return html`<${JobFrame} job=${job} ...${rest}>
+    <p class="uses" title=${protocol}>${known ? protocolTitle(known) : protocol}</p>
+    <${Facts} entries=${[["Checkpoint", checkpoint?.length === SHA_256 ? format.short(checkpoint) : checkpoint ?? "–"],
+      ["Episodes", format.number(episodes)]]} />
     ${rows.length === 0 && !job.error && html`<p class="empty">${job.state === "queued"
       ? "Waiting for its turn; one job runs at a time."
       : isActive(job) ? "The rows are shown once all are known."
@@ -276,8 +283,11 @@ function Speed({ job, row, presets }) {
   const changed = Object.entries(job.overrides ?? {}).flatMap(([group, value]) =>
     typeof value === "object" && value !== null
       ? Object.entries(value).map(([name, v]) => [`${group}.${name}`, v]) : [[group, value]]);
-  return html`<dl class="facts">
-    ${row && [
+  const shown = (name, v) => {
+    const { title, unit } = fieldOf(presets, name, job.preset);
+    return [title, [fieldValue(v), unit].filter(Boolean).join(" "), name];
+  };
+  return html`${row && html`<${Facts} entries=${[
       ["Updates", format.steps(row.updates)],
       ["Updates per s", format.number(row.updates_per_s)],
       ["Steps per s", format.steps(row.steps_per_s)],
@@ -285,12 +295,9 @@ function Speed({ job, row, presets }) {
       ["Step budget", format.steps(job.step_budget)],
       ["Time budget", job.time_budget_s === null ? "–"
         : `${format.duration(job.run_s)} of ${format.duration(job.time_budget_s)}`],
-    ].filter(([, text]) => text !== "–").map(([name, text]) => html`<div key=${name}>
-      <dt>${name}</dt><dd>${text}</dd></div>`)}
-    ${changed.map(([name, v]) => html`<div key=${name}><dt><${FieldName}
-      presets=${presets} path=${name} preset=${job.preset} /></dt>
-      <dd>${fieldValue(v)}</dd></div>`)}
-  </dl>`;
+    ]} />`}
+    ${changed.length > 0 && html`<h3 class="facts-title">Changed fields</h3>
+      <${Facts} entries=${changed.map(([name, v]) => shown(name, v))} />`}`;
 }
 
 /** The curve of one job: what is stored, then what its event stream adds. */

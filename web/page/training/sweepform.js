@@ -3,7 +3,7 @@ import { html, useState } from "../vendor/htm-preact-standalone.module.js";
 import { post } from "../api.js";
 import { Close, Icon } from "../icons.js";
 import { byGroup } from "./fieldnames.js";
-import { Loading, OWN, parsed, StartForm, useForm } from "./formfields.js";
+import { Loading, OWN, parsed, presetField, protocolField, StartForm, useForm } from "./formfields.js";
 
 const MAX_RANGES = 8;
 const COUNTS = [
@@ -22,7 +22,7 @@ const PRUNE = { name: "prune", title: "Pruning", default: "true", choices: ["tru
   labels: { true: "median rule", false: "none" },
   help: "Stops trainings that are below the median of those before" };
 
-export function SweepForm({ presets: { items: presets, error }, cell, onStarted, onClose }) {
+export function SweepForm({ protocols, presets: { items: presets, error }, cell, onStarted, onClose }) {
   const [name, setName] = useState(null);
   const [ranges, setRanges] = useState([{ path: "learning.lr_start" }]);
   const preset = presets?.find((p) => p.name === name)
@@ -55,13 +55,11 @@ export function SweepForm({ presets: { items: presets, error }, cell, onStarted,
   const free = drawable.filter((f) => !ranges.some((r) => r.path === f.name));
   return html`<${StartForm} form=${form} title="New sweep" send=${send} start="Start sweep"
     note="Its trainings wait in the queue like others." onClose=${onClose}>
-    <div class="field"><label for="sweep-preset">Preset</label>
-      <select id="sweep-preset" value=${preset.name} onChange=${(e) => {
-        setName(e.target.value);
-        setRanges([{ path: "learning.lr_start" }]);
-        form.start({});
-      }}>${presets.map((p) => html`<option key=${p.name} value=${p.name}>${p.name}</option>`)}</select>
-    </div>
+    ${form.row(presetField(presets, preset), {}, (chosen) => {
+      setName(chosen);
+      setRanges([{ path: "learning.lr_start" }]);
+      form.start({});
+    })}
     ${OWN.map((field) => form.row(field))}
     ${form.row(total)}
     <fieldset class="field-list"><legend>Drawn fields</legend>
@@ -76,8 +74,8 @@ export function SweepForm({ presets: { items: presets, error }, cell, onStarted,
         <${Icon} name="plus" />Add a field</button>`}
     </fieldset>
     ${COUNTS.map((field) => form.row(field))}
-    ${form.row({ name: "objective.protocol", title: "Evaluation", choices: preset.objectives,
-      default: preset.objectives[0] })}
+    ${form.row({ name: "objective.protocol", title: "Evaluation",
+      ...protocolField(protocols.items, preset.objectives, preset.objectives[0]) })}
     ${[QUANTITY, EPISODES, PRUNE].map((field) => form.row(field))}
   </${StartForm}>`;
 }

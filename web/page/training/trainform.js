@@ -5,7 +5,7 @@ import { count, grouped } from "../format.js";
 import { Alert, Icon } from "../icons.js";
 import { BUDGETS, budgetBody, budgetTexts } from "./budgets.js";
 import { byGroup } from "./fieldnames.js";
-import { changed, Loading, OWN, parsed, StartForm, useForm } from "./formfields.js";
+import { changed, Loading, OWN, parsed, presetField, StartForm, useForm } from "./formfields.js";
 
 const FIRST_FIELDS = ["cell", "learning.total_steps", "learning.n_envs", "learning.lr_start"];
 /**
@@ -47,18 +47,10 @@ export function TrainForm({ presets: { items: presets, error }, cell, from, onSt
   const row = (field) => form.row(field, values);
   return html`<${StartForm} form=${form} title=${title} send=${send} start="Start training"
     note="Runs in its own process, beside the cell." onClose=${onClose}>
-    <div class="field">
-      <label for="train-preset">Preset</label>
-      <select id="train-preset" value=${preset.name}
-        disabled=${Boolean(from)} aria-invalid=${String(Boolean(form.faults.preset))}
-        onChange=${(e) => {
-          setName(e.target.value);
-          form.start({ seed: values.seed, name: values.name ?? "" });
-        }}>
-        ${presets.map((p) => html`<option key=${p.name} value=${p.name}>${p.name}</option>`)}
-      </select>
-      ${form.faults.preset && html`<p class="field-error" role="alert">${form.faults.preset}</p>`}
-    </div>
+    ${form.row(presetField(presets, preset, Boolean(from)), {}, (chosen) => {
+      setName(chosen);
+      form.start({ seed: values.seed, name: values.name ?? "" });
+    })}
     ${OWN.map(row)}
     ${fields.filter((f) => FIRST_FIELDS.includes(f.name)).map(row)}
     ${BUDGETS.map(row)}

@@ -17,6 +17,7 @@ const KINDS = { train: ["Training", TrainForm], evaluate: ["Evaluation", Evaluat
 
 export function Training({ link, cell, jobs: newest, error, waiting, refresh, acting, onAct }) {
   const presets = useItems(link, "v1/presets");
+  const protocols = useItems(link, "v1/protocols");
   const [form, setForm] = useState(null);
   const [open, setOpen] = useState(undefined);
   const jobs = useOpened(newest, open);
@@ -35,7 +36,7 @@ export function Training({ link, cell, jobs: newest, error, waiting, refresh, ac
     refresh();
   };
   return html`<div class="training">
-    ${form && html`<${NewJob} key=${form.from?.id} ...${{ link, presets, cell }} from=${form.from}
+    ${form && html`<${NewJob} key=${form.from?.id} ...${{ link, presets, protocols, cell }} from=${form.from}
       onStarted=${started} onClose=${() => setForm(null)} />`}
     <section class="card" aria-labelledby="jobs-title">
       <header class="card-head"><h2 id="jobs-title">Jobs</h2>
@@ -54,7 +55,7 @@ export function Training({ link, cell, jobs: newest, error, waiting, refresh, ac
       ${compared && html`<${Comparison} ids=${compared} presets=${presets}
         onClose=${() => setCompared(null)} />`}
       <${QueueWaits} waiting=${waiting} />
-      <${JobList} jobs=${jobs} presets=${presets} error=${error} open=${open ?? null} onOpen=${setOpen}
+      <${JobList} ...${{ jobs, presets, protocols }} error=${error} open=${open ?? null} onOpen=${setOpen}
         onChanged=${refresh} onAct=${onAct} acting=${acting}
         chosen=${chosen} onChoose=${choose}
         onClone=${(job) => setForm({ from: job })}
