@@ -71,6 +71,20 @@ def test_value_plot_draws_while_its_data_is_older_than_the_history(
     assert names == ["first"]
 
 
+def test_values_of_another_cell_are_forgotten(open_page: Callable[..., Page]) -> None:
+    page = open_page(scene=False)
+    kept = page.evaluate("""async () => {
+      const { History } = await import("./static/live/history.js");
+      const history = new History();
+      for (const [cell, t] of [["one", 1], ["one", 1.05], ["two", 1.1]]) {
+        const candidates = [{ id: cell, value: 1 }];
+        history.add({ cell, t_s: t, decided_s: t, chosen: cell, candidates }, t);
+      }
+      return history.ids([]);
+    }""")
+    assert kept == ["two"]
+
+
 def test_long_names_of_goals_are_cut_beside_their_values_and_given_in_full(
     open_page: Callable[..., Page],
 ) -> None:

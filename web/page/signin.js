@@ -17,7 +17,7 @@ export function SignIn() {
     <p>This server is protected. Enter its token, the setting TANDEM_TOKEN of the server.</p>
     <div class="field">
       <label for="token">Token</label>
-      <input id="token" type="password" autocomplete="current-password" value=${token}
+      <input id="token" type="password" autofocus autocomplete="current-password" value=${token}
         aria-invalid=${String(Boolean(error))} onInput=${(e) => setToken(e.target.value)} />
       ${error && html`<p class="field-error" role="alert">${error.field === "token"
         ? "This is not the token of this server." : sentence(error.message)}</p>`}

@@ -15,12 +15,19 @@ const FRESH_S = 0.06;
  */
 export class History {
   constructor() {
+    this.clear(null);
+  }
+
+  /** Forget all values, those of another cell. */
+  clear(cell) {
     this.samples = [];
     this.last = null;
+    this.cell = cell;
   }
 
   /** Add what a snapshot says, which came at `wall` [s]. */
   add(world, wall = performance.now() / 1000) {
+    if (world.cell !== this.cell) this.clear(world.cell);
     const { last } = this;
     if (last && world.paused && this.isLast(world)) return;
     const cellTime = world.t_s - (last?.world ?? 0);

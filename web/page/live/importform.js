@@ -43,7 +43,7 @@ export function ImportForm({ onDone }) {
   };
   const skeleton = file?.name.toLowerCase().endsWith(".bvh");
   return html`<form class="dock-row import" onSubmit=${send} aria-label="Import a recording">
-    <span class="dock-label">Import</span>
+    <span class="dock-label">Import</span><div>
     <label class="tool" title="BVH, OpenSim or CSV, at most 32 MiB">
       <input class="sr" type="file" accept=${FORMATS} data-role="import-file"
         disabled=${Boolean(answer.busy)} onChange=${choose} />
@@ -71,7 +71,7 @@ export function ImportForm({ onDone }) {
       ${format.sentence(answer.problem.message)}</p>`}
     ${answer.motion && html`<p class="result" role="status" data-role="import-result">
       ${summary(answer.motion)}</p>`}
-  </form>`;
+  </div></form>`;
 }
 
 /** The first frames that were cut out, and why. */

@@ -18,7 +18,7 @@ export function Presets({ label, hint, items, running, tag, send }) {
         ${items.map((one, i) => html`<button key=${one.id} type="button" class="case"
           aria-pressed=${String(running === one.id)} aria-description=${one.text}
           data-case=${one.id} ...${point(one.id)} onClick=${() => send({ tag, id: one.id })}>
-          <b>${i + 1}</b><span>${one.title}</span></button>`)}
+          <b>${i + 1}</b><span title=${one.title}>${one.title}</span></button>`)}
       </div>
       <p class="case-text">${shown ? shown.text : hint}</p>
     </div>

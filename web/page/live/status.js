@@ -33,7 +33,7 @@ export function StatusPanel({ world, chip = null }) {
     </div>
     <p class="sentence">${format.typeset(world.message || "Waiting for the first decision.")}</p>
     ${world.verdict && html`<${Verdict} ...${world.verdict} />`}
-    <${Clearance} metres=${world.clearance_m} people=${world.people ?? []} />
+    <${Clearance} metres=${world.clearance_m} people=${world.people ?? []} safety=${world.safety} />
   </section>`;
 }
 
@@ -54,12 +54,13 @@ function Verdict({ expected, observed, as_expected: agrees }) {
   </dl>`;
 }
 
-function Clearance({ metres, people }) {
+function Clearance({ metres, people, safety }) {
   const nearest = people.length > 1 && people.find((one) => one.nearest);
   const person = nearest ? nameOf(nearest.id) : "the person";
   const known = Number.isFinite(metres);
   const share = known ? Math.min(1, Math.max(0, metres / CLEARANCE_SCALE_M)) : 0;
-  const tone = !known ? "" : metres < 0.05 ? "bad" : metres < 0.15 ? "warn" : "good";
+  const short = safety.on && safety.person !== null && safety.separation < safety.required;
+  const tone = !known ? "" : metres < 0.05 ? "bad" : short || metres < 0.15 ? "warn" : "good";
   return html`<div class="clearance">
     <span class="label">${people.length ? `Separation distance to ${person}` : "No person in the cell"}</span>
     <span class="meter" role="meter" aria-label="Separation distance to the nearest person in metres"

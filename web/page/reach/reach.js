@@ -33,8 +33,9 @@ function Outcomes({ world }) {
       <div><dt>Mean time to a goal</dt><dd>${counters.reached
         ? format.seconds(reach.counters.reaching_s / counters.reached) : "–"}</dd></div>
     </dl>
-    <p class="range"><${Icon} name="alert" /><span>Contact at standstill: a person touched the robot
-      while it stood still. People in this cell do not avoid the robot.</span></p>
+    ${counters.contacts_at_rest > 0 && html`<p class="range"><${Icon} name="alert" /><span>Contact at
+      standstill: a person touched the robot while it stood still. People in this cell do not avoid
+      the robot.</span></p>`}
     <${Provenance} world=${world} />
   </section>`;
 }

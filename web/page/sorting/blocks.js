@@ -21,7 +21,7 @@ export function Blocks({ sorting, cell, send, picked, onPick }) {
       ? html`<${Picked} key=${block.id} block=${block} cells=${cells} cell=${cell}
           sorting=${sorting} send=${send} onPick=${onPick} />`
       : html`<${Shelf} sorting=${sorting} at=${at} cells=${cells} send=${send} />`}
-    ${held && html`<p class="faint" data-role="held">The ${nameOf(held)} is held by the gripper.</p>`}
+    ${held && html`<p class="faint held" data-role="held">The ${nameOf(held)} is held by the gripper.</p>`}
   </section>`;
 }
 
