@@ -26,6 +26,24 @@ def one_person(server: str) -> Iterator[str]:
     patient_http.delete(f"{server}/v1/recordings/visit")
 
 
+def test_double_click_removes_one_person(
+    open_page: Callable[..., Page], one_person: str
+) -> None:
+    page = open_page(scene=False)
+    people = page.locator("[data-person]")
+    for present in (2, 3):
+        page.click('[data-action="add-person"]')
+        expect(people).to_have_count(present)
+    page.locator('[data-action="remove-person"]').hover()
+    for clicks, present in ((1, 2), (2, 2)):
+        page.mouse.down(click_count=clicks)
+        page.mouse.up(click_count=clicks)
+        expect(people).to_have_count(present)
+    page.click('[data-action="add-person"]')
+    expect(people).to_have_count(3)
+    assert page.problems == []  # type: ignore[attr-defined]
+
+
 def test_visitor_adds_a_person_changes_its_size_and_plays_a_recording(
     open_page: Callable[..., Page], one_person: str
 ) -> None:

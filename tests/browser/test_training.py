@@ -193,6 +193,7 @@ def test_ended_job_is_retried_cloned_and_named(
     page.keyboard.press("Enter")
     row.locator('[data-action="delete-yes"]').click()
     expect(row).to_have_count(0)
+    expect(page.locator(".job.is-open")).to_have_count(0)
     assert patient_http.get(f"{server}/v1/jobs/{ended['id']}").status_code == 404
     for job in (clone, again):
         stop(server, job)

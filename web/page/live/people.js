@@ -6,7 +6,7 @@ import * as format from "../format.js";
 import { Icon } from "../icons.js";
 import { ImportForm } from "./importform.js";
 import { VESTS } from "../palette.js";
-import { PedestrianControls } from "./walkers.js";
+import { PedestrianControls, removePerson } from "./walkers.js";
 
 const MAX_PEOPLE = 4;
 const MODES = [
@@ -84,7 +84,7 @@ function MotionSource({ person, send, sized, onSized }) {
           aria-label="Size" title="Stature, arms and shoulders of this person" onClick=${onSized}><${Icon} name="ruler" /><span>Size</span></button>
         <button type="button" class="tool" data-action="remove-person"
           aria-label=${`Remove ${nameOf(id)}`} title=${`${nameOf(id)} leaves the cell`}
-          onClick=${() => send({ tag: "remove-person", person: id })}>
+          onClick=${(event) => removePerson(event, id, send)}>
           <${Icon} name="close" /><span>Remove</span></button>
       </div>
     </div>

@@ -28,8 +28,8 @@ export function Safety({ world }) {
       <h2 id="safety-title">Speed and separation monitoring</h2>
       <span class="hint" tabindex="0" aria-describedby="safety-help">ISO 10218-2
         <span class="tip tip-left" role="tooltip" id="safety-help">The robot must be able to stop
-          before a person ${safety.use_measured_velocity ? "at the measured velocity plus" : "moving at"}
-          ${safety.human_speed.toFixed(1)} m/s can reach it. The layer checks the path ahead; S<sub>p</sub> is the
+          before a person ${safety.use_measured_velocity ? "at the measured velocity plus " : "moving at "}${
+          safety.human_speed.toFixed(1)} m/s can reach it. The layer checks the path ahead; S<sub>p</sub> is the
           bound of the standard, so near the limit the two differ slightly, and a robot that moves
           away may be faster. S<sub>p</sub> is the sum of the distances that person and robot cover until
           the robot has stopped, and of the margins. Not a certified safety function.</span>
@@ -65,7 +65,7 @@ function Gauge({ safety }) {
         stroke-dasharray=${`${ARC * override} 400`} />`}
     </svg>
     <b>${percent}<small> %</small></b>
-    <span>${on ? "speed override" : `disabled, would be ${Math.round(advised * 100)} %`}</span>
+    <span>${on ? "speed override" : `disabled, would be ${format.percent(advised, 0)}`}</span>
   </div>`;
 }
 

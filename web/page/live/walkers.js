@@ -11,6 +11,11 @@ const MODES = [
 const SPEEDS = [["", "Variable"], ["0.25", "0.25 m/s"], ["0.5", "0.5 m/s"], ["1", "1 m/s"],
   ["1.6", "1.6 m/s"]];
 
+/** A person leaves; the second click of a double one would remove the next person. */
+export function removePerson({ detail }, person, send) {
+  if (detail < 2) send({ tag: "remove-person", person });
+}
+
 export function PedestrianControls({ person, name, world, send }) {
   const { id, mode } = person;
   const { walk_speed: speed } = world.reach;
@@ -28,7 +33,7 @@ export function PedestrianControls({ person, name, world, send }) {
       </select></label>
     <div class="transport" role="group" aria-label=${`${name} in the cell`}>
       <button type="button" class="tool" data-action="remove-person" aria-label=${`Remove ${name}`}
-        title=${`${name} leaves the cell`} onClick=${() => send({ tag: "remove-person", person: id })}>
+        title=${`${name} leaves the cell`} onClick=${(event) => removePerson(event, id, send)}>
         <${Icon} name="close" /><span>Remove</span></button>
     </div>
   </div>`;

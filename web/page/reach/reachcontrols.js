@@ -35,8 +35,9 @@ export function ReachControls({ world, send }) {
     <${Segmented} labelledby="goal-label" mark=${marked("goal-mode")} value=${mode} items=${GOAL_MODES}
       onPick=${(one) => send({ tag: "set-goal-mode", mode: one })} />
     <button type="button" class="tool" data-action="new-goal" title="Draw a random goal"
-      onClick=${() => send({ tag: "new-goal" })}><${Icon} name="reset" />Random target</button>
-    <${SafetyControls} world=${world} send=${send} />
+      onClick=${() => send({ tag: "new-goal" })}><${Icon} name="reset" />Random target</button></div>
+    <div class="dock-row dock-wrap"><${SafetyControls} world=${world} send=${send} /></div>
+    ${modes.length > 1 && html`<div class="dock-row dock-wrap"><span class="dock-label">Policy</span>
     ${modes.includes("interpolated") && html`<span class="dock-pair">
       <span class="dock-label dock-label-free" id="between-label">Target interpolation</span>
       <${Segmented} labelledby="between-label" mark=${marked("between")} value=${between} items=${BETWEEN}
@@ -48,8 +49,7 @@ export function ReachControls({ world, send }) {
     ${modes.includes("distance-weighted") && world.people.length > 1 && html`<span class="dock-pair">
       <span class="dock-label dock-label-free" id="beside-label">Policy sees</span>
       <${Segmented} labelledby="beside-label" mark=${marked("beside")} value=${weighted} items=${BESIDE}
-        onPick=${(one) => ask(one, between, ahead)} /></span>`}
-  </div>`;
+        onPick=${(one) => ask(one, between, ahead)} /></span>`}</div>`}`;
 }
 
 function marked(name) {

@@ -38,7 +38,7 @@ export function JobActions({ job, onChanged, onOpen, onClone }) {
       title="Run a new job with the same values from its start">Retry</button>`}
     ${job.kind === "train" && html`<button type="button" class="tool" data-action="clone"
       onClick=${() => onClone(job)} title="Start a job like this one, with changes">Clone …</button>`}
-    ${FINAL.has(job.state) && html`<${Delete} job=${job} onChanged=${onChanged} />`}
+    ${FINAL.has(job.state) && html`<${Delete} job=${job} onDone=${() => (onOpen(null), onChanged())} />`}
     ${isActive(job) && html`<${Cancel} job=${job} onChanged=${onChanged} />`}
     <${Fault} error=${again.error} />`;
 }
@@ -51,9 +51,9 @@ function Cancel({ job, onChanged }) {
     onYes=${() => post(`v1/jobs/${job.id}/cancel`)} />`;
 }
 
-function Delete({ job, onChanged }) {
+function Delete({ job, onDone }) {
   return html`<${Ask} name="delete" label="Delete …" yes="Delete the job" no="Keep it"
-    question="Delete it? Its curve and its checkpoints go with it." action=${useAction(onChanged)}
+    question="Delete it? Its curve and its checkpoints go with it." action=${useAction(onDone)}
     onYes=${() => remove(`v1/jobs/${job.id}`)} />`;
 }
 

@@ -65,15 +65,15 @@ export function useJobs(link) {
   return { ...state, refresh: useCallback(() => refresh.current(), []) };
 }
 
-/** The jobs with the open one, which may be older than they are. */
-export function useOpened(jobs, id) {
+/** The jobs with the open one, which may be older than they are; `onGone` if it was deleted. */
+export function useOpened(jobs, id, onGone) {
   const [found, setFound] = useState(null);
   const missing = Boolean(id && jobs && !jobs.some((one) => one.id === id));
   useEffect(() => {
     if (!missing) return undefined;
     const stop = new AbortController();
     get(`v1/jobs/${id}`, { signal: stop.signal }).then(setFound,
-      (error) => error.status === 404 && setFound(null));
+      (error) => error.status === 404 && onGone());
     return () => stop.abort();
   }, [missing, id, jobs]);
   return missing && found?.id === id ? [...jobs, found].sort(byNumber) : jobs;

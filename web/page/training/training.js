@@ -20,7 +20,7 @@ export function Training({ link, cell, jobs: newest, error, waiting, refresh, ac
   const protocols = useItems(link, "v1/protocols");
   const [form, setForm] = useState(null);
   const [open, setOpen] = useState(undefined);
-  const jobs = useOpened(newest, open);
+  const jobs = useOpened(newest, open, () => setOpen(null));
   useLayoutEffect(() => { // before any click: one on a job drawn closed would close it
     const own = jobs?.filter((job) => !job.part_of);
     if (open === undefined && own?.length) setOpen((own.find(isActive) ?? own[0]).id);
