@@ -26,9 +26,8 @@ def one_person(server: str) -> Iterator[str]:
     patient_http.delete(f"{server}/v1/recordings/visit")
 
 
-def test_double_click_removes_one_person(
-    open_page: Callable[..., Page], one_person: str
-) -> None:
+@pytest.mark.usefixtures("one_person")
+def test_double_click_removes_one_person(open_page: Callable[..., Page]) -> None:
     page = open_page(scene=False)
     people = page.locator("[data-person]")
     for present in (2, 3):
