@@ -101,6 +101,8 @@ def test_kind_of_job_obeys_the_arrow_keys(open_page: Callable[..., Page]) -> Non
     page.keyboard.press("ArrowLeft")
     expect(page.locator('[data-kind="train"]')).to_be_focused()
     expect(page.locator("#train-seed")).to_be_visible()
+    page.get_by_role("button", name="Close the form").press("Enter")
+    expect(page.locator('[data-action="new-job"]')).to_be_focused()
 
 
 def test_evaluation_is_started_with_choices_of_the_server(

@@ -51,6 +51,7 @@ def test_each_window_has_its_own_view_settings(open_page: Callable[..., Page]) -
     assert not shown_by_viewer(one, "Values")
     one.keyboard.press("Escape")
     expect(one.locator('[data-view="Values"]')).to_have_count(0)
+    expect(one.locator('[data-action="view"]')).to_be_focused()
     assert one.problems == []  # type: ignore[attr-defined]
 
 

@@ -40,7 +40,11 @@ export function ViewMenu({ frame }) {
     if (!open) return undefined;
     const inside = (one) => one instanceof Node && box.current?.contains(one);
     const away = (event) => inside(event.target) || setOpen(false);
-    const key = (event) => event.key === "Escape" && setOpen(false);
+    const key = (event) => {
+      if (event.key !== "Escape") return;
+      setOpen(false);
+      box.current.querySelector("button").focus();
+    };
     const heard = [["pointerdown", away], ["keydown", key], ["blur", away]];
     heard.forEach(([name, act]) => addEventListener(name, act));
     return () => heard.forEach(([name, act]) => removeEventListener(name, act));

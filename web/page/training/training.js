@@ -1,5 +1,5 @@
 // The training side: jobs with their curves, and the form that starts one.
-import { html, useLayoutEffect, useState } from "../vendor/htm-preact-standalone.module.js";
+import { html, useEffect, useLayoutEffect, useRef, useState } from "../vendor/htm-preact-standalone.module.js";
 import { Segmented } from "../choice.js";
 import { Icon } from "../icons.js";
 import { Comparison, MAX_JOBS } from "./compare.js";
@@ -19,6 +19,11 @@ export function Training({ link, cell, jobs: newest, error, waiting, refresh, ac
   const presets = useItems(link, "v1/presets");
   const protocols = useItems(link, "v1/protocols");
   const [form, setForm] = useState(null);
+  const had = useRef(null);
+  useEffect(() => { // a form that was closed had the focus
+    if (had.current && !form) document.querySelector('[data-action="new-job"]')?.focus();
+    had.current = form;
+  }, [form]);
   const [open, setOpen] = useState(undefined);
   const jobs = useOpened(newest, open, () => setOpen(null));
   useLayoutEffect(() => { // before any click: one on a job drawn closed would close it
