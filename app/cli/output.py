@@ -27,7 +27,7 @@ def write_output(path: Path, content: bytes) -> None:
         InvalidInput: It cannot be written.
         StorageFull: No room is left; the present file stays.
     """
-    from app.policies.training.file_store import write_durably
+    from app.durable_files import write_durably
 
     try:
         if path.exists() and not path.is_file():

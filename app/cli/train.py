@@ -163,7 +163,7 @@ def require_same(
 
 def cut_curve(path: Path, step: int) -> None:
     """Delete the points of a learning curve beyond a step, which are measured again."""
-    from app.policies.training.file_store import write_durably
+    from app.durable_files import write_durably
 
     if path.exists():
         lines = path.read_text(encoding="utf-8").splitlines(keepends=True)

@@ -10,8 +10,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TypeVar
 
+from app.durable_files import sync_folder, write_durably
 from app.policies.checkpoints.checkpoint import TensorFile
-from app.policies.training.file_store import sync_folder, write_durably
 
 Content = TypeVar("Content")
 

@@ -1,15 +1,11 @@
 """Stores of files that are named by their SHA-256; a folder is one."""
 
-import errno
-import os
 from collections.abc import Collection
 from pathlib import Path
 from typing import Protocol
 
-from app.storage_errors import StorageFull
+from app.durable_files import write_durably
 
-FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
-"""Errors of a full disk."""
 SUFFIX = ".safetensors"
 
 
@@ -65,34 +61,3 @@ class FileFolder:
     def size(self) -> int:
         """Return the size of all files [bytes]."""
         return sum(path.stat().st_size for path in self._folder.glob("*"))
-
-
-def write_durably(path: Path, content: bytes) -> None:
-    """Write a file that exists wholly or not at all, also after a power failure.
-
-    Raises:
-        StorageFull: No room is left.
-    """
-    unfinished = path.with_name(f"{path.name}.unfinished")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with unfinished.open("wb") as file:
-            file.write(content)
-            file.flush()
-            os.fsync(file.fileno())
-        unfinished.replace(path)
-        sync_folder(path.parent)
-    except OSError as error:
-        unfinished.unlink(missing_ok=True)
-        if error.errno in FULL:
-            raise StorageFull(str(path.parent)) from error
-        raise
-
-
-def sync_folder(path: Path) -> None:
-    """Keep the names of a folder's files also after a power failure."""
-    folder = os.open(path, os.O_RDONLY)
-    try:
-        os.fsync(folder)
-    finally:
-        os.close(folder)

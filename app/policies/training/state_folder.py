@@ -11,8 +11,9 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from app.digests import has_digest
+from app.durable_files import write_durably
 from app.errors import Damaged, InvalidInput
-from app.policies.training.file_store import FileFolder, write_durably
+from app.policies.training.file_store import FileFolder
 from app.policies.training.memory_files import MemoryFiles
 from app.policies.training.state import TrainingState, load
 

@@ -1,0 +1,41 @@
+"""Files that exist wholly or not at all, also after a power failure."""
+
+import errno
+import os
+from pathlib import Path
+
+from app.storage_errors import StorageFull
+
+FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+"""Errors of a full disk."""
+
+
+def write_durably(path: Path, content: bytes) -> None:
+    """Write a file; one of that name stays until then.
+
+    Raises:
+        StorageFull: No room is left.
+    """
+    unfinished = path.with_name(f"{path.name}.unfinished")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with unfinished.open("wb") as file:
+            file.write(content)
+            file.flush()
+            os.fsync(file.fileno())
+        unfinished.replace(path)
+        sync_folder(path.parent)
+    except OSError as error:
+        unfinished.unlink(missing_ok=True)
+        if error.errno in FULL:
+            raise StorageFull(str(path.parent)) from error
+        raise
+
+
+def sync_folder(path: Path) -> None:
+    """Keep the names of a folder's files also after a power failure."""
+    folder = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(folder)
+    finally:
+        os.close(folder)
