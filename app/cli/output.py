@@ -10,6 +10,7 @@ from typing import Any
 
 import typer
 
+from app.durable_files import write_durably
 from app.errors import BadCell, BadRecording, InvalidInput
 
 
@@ -27,8 +28,6 @@ def write_output(path: Path, content: bytes) -> None:
         InvalidInput: It cannot be written.
         StorageFull: No room is left; the present file stays.
     """
-    from app.durable_files import write_durably
-
     try:
         if path.exists() and not path.is_file():
             path.write_bytes(content)

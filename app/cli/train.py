@@ -17,6 +17,7 @@ import typer
 
 from app.cli.options import Json, prepared_settings
 from app.cli.output import print_result
+from app.durable_files import write_durably
 from app.errors import CheckpointMismatch, InvalidInput
 
 if TYPE_CHECKING:
@@ -163,8 +164,6 @@ def require_same(
 
 def cut_curve(path: Path, step: int) -> None:
     """Delete the points of a learning curve beyond a step, which are measured again."""
-    from app.durable_files import write_durably
-
     if path.exists():
         lines = path.read_text(encoding="utf-8").splitlines(keepends=True)
         kept = [line for line in lines if line.endswith("\n")]

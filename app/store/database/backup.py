@@ -18,6 +18,7 @@ from datetime import UTC, datetime
 from pathlib import Path, PurePosixPath
 from typing import Any
 
+from app.durable_files import sync_folder
 from app.errors import Conflict, InvalidInput
 from app.storage_errors import StorageDamaged, StorageFull, StorageUnavailable
 from app.store.database.archive import (
@@ -110,7 +111,7 @@ def write_backup(store: Store, data_dir: Path, path: Path) -> BackupSummary:
         }
         write_archive(part, head, files)
         _publish(part, path)
-        _sync(path.parent)
+        sync_folder(path.parent)
     return _summary(path, head)
 
 
@@ -155,7 +156,7 @@ def restore_backup(
                     _restore_file(archive, head, name, data_dir, target)
             kept = _keep(target)
             part.replace(target)
-            _sync(target.parent)
+            sync_folder(target.parent)
     finally:
         lock.release()
     return _summary(path, head), kept
@@ -290,7 +291,7 @@ def _restore_file(
     part = target.with_name(f"{target.name}.part")
     unpack(archive, head, name, part)
     part.replace(target)
-    _sync(target.parent)
+    sync_folder(target.parent)
 
 
 def _keep(target: Path) -> Path | None:
@@ -310,14 +311,6 @@ def _keep(target: Path) -> Path | None:
     for suffix in ("-wal", "-shm"):
         target.with_name(target.name + suffix).unlink(missing_ok=True)
     return kept
-
-
-def _sync(folder: Path) -> None:
-    file = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(file)
-    finally:
-        os.close(file)
 
 
 def _summary(path: Path, head: Mapping[str, Any]) -> BackupSummary:
