@@ -25,7 +25,7 @@ _MOST_STEPS = 80
 
 @kernel(error_model="numpy", fastmath=FAST)
 def cylinder_clearance(
-    robot: Vec, first: int, x: float, y: float, r: float, top: float
+    robot: Vec, first: int, x: float, y: float, r: float, top: float, within: float = FAR
 ) -> tuple[float, int]:
     """Return the least distance of capsules to a cylinder [m] and the nearest capsule.
 
@@ -39,11 +39,12 @@ def cylinder_clearance(
         y: Axis [m].
         r: Radius of the cylinder [m].
         top: Height of its top [m].
+        within: Distance that counts as far away [m].
 
     Returns:
-        Distance and column; (FAR, first) where all are farther away than that.
+        Distance and column; (within, first) where all are farther away than that.
     """
-    best, near = FAR, first
+    best, near = within, first
     for k in range(first, robot.shape[1]):
         ux, uy = robot[UX, k], robot[UY, k]
         wx, wy = robot[X, k] - x, robot[Y, k] - y

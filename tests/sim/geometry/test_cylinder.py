@@ -74,6 +74,9 @@ def test_least_of_many_is_the_least_of_each() -> None:
         ]
         d, k = cylinder_clearance(columns, 0, 0.1, 0.2, 0.3, top)
         assert d == min(each) and k == np.argmin(each)
+        for within in (d - 0.01, d + 0.01):
+            found, _ = cylinder_clearance(columns, 0, 0.1, 0.2, 0.3, top, within)
+            assert found == min(d, within)
 
 
 @pytest.mark.parametrize("kind", KINDS)

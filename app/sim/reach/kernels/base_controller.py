@@ -15,16 +15,27 @@ import math
 from app.sim.core.arrays import Vec
 from app.sim.core.jit import kernel
 from app.sim.geometry.capsules import RADIUS, UX, UY, X, Y
-from app.sim.geometry.cylinder import cylinder_clearance
 from app.sim.reach.kernels.observation_workspace import ReachObservationWorkspace, ReachQuery
 from app.sim.robot.kernels import kinematics
-from app.sim.robot.kernels.arm import Arm, RobotPose, place_robot
+from app.sim.robot.kernels.arm import Arm, RobotPose
+from app.sim.robot.kernels.configuration_lanes import (
+    AXIS_R,
+    AXIS_X,
+    AXIS_Y,
+    CLEARANCE,
+    JOINTS,
+    N_LANES,
+    measure_lanes,
+    place_lanes,
+)
 from app.sim.scenario.kernels.person_observation import BASE_GAIN, HORIZONS, Obs
 
 DAMPING = 0.1
 """Damping of the least squares [m/rad]."""
 SCALE = 0.5
-"""Unit of distances [m]; they are clipped at three units."""
+"""Unit of distances [m]."""
+FARTHEST = 3.0
+"""Distances are clipped at this many units."""
 APPROACH_HORIZON = 2.0
 """Horizon of the closest approach, and unit of its time [s]."""
 GROUPS = (1, 5, 8, 12)
@@ -101,7 +112,7 @@ def base_motion(
 
 @kernel(inline="always")
 def _scaled(d: float) -> float:
-    return min(3.0, d / SCALE)
+    return min(FARTHEST, d / SCALE)
 
 
 @kernel(error_model="numpy")
@@ -147,6 +158,33 @@ def _write_groups(robot: Vec, person: Vec, k: int, out: Obs) -> None:
 
 
 @kernel()
+def _measure_ahead(
+    arm: Arm, top_z: float, q: Vec, rate: float, work: ReachObservationWorkspace
+) -> None:
+    """Measure the clearances of the robot along the base motion, at the horizons, in lanes.
+
+    Args:
+        top_z: Height of people's tops [m].
+        q: Joint positions [rad], shape (6,).
+        rate: Share of ``work.step`` made per second [1/s].
+        work: Holds ``step`` and ``observed``; ``lanes`` is filled.
+    """
+    lanes, person, n = work.lanes, work.observed, len(HORIZONS) + 1
+    for m in range(n):  # the last one twice: whole vectors
+        t = HORIZONS[min(m, len(HORIZONS) - 1)]
+        share = min(1.0, rate * t)
+        for j in range(6):
+            lanes[JOINTS + j * N_LANES + m] = q[j] + share * work.step[j]
+        lanes[AXIS_X + m], lanes[AXIS_Y + m] = (
+            person[0] + t * person[2],
+            person[1] + t * person[3],
+        )
+        lanes[AXIS_R + m] = person[4]
+    place_lanes(arm.lengths, n, lanes)
+    measure_lanes(arm, top_z, n, FARTHEST * SCALE, work.q, work.moved, lanes)
+
+
+@kernel()
 def write_approach_features(
     arm: Arm,
     top_z: float,
@@ -165,18 +203,14 @@ def write_approach_features(
         out: Filled, shape (>= k + N_APPROACH,).
     """
     q, qd, goal, person = query.q, query.qd, query.goal, work.observed
-    robot, moved = work.robot, work.moved
+    robot, moved, lanes = work.robot, work.moved, work.lanes
     rate = base_motion(arm, robot, goal, work)
     for j in range(6):
         out[k + j] = work.base[j]
+    _measure_ahead(arm, top_z, q, rate, work)
     for i in range(3):
-        share = min(1.0, rate * HORIZONS[i])
-        for j in range(6):
-            work.q[j] = q[j] + share * work.step[j]
-        place_robot(arm, work.q, moved)
-        x, y = person[0] + HORIZONS[i] * person[2], person[1] + HORIZONS[i] * person[3]
-        d, _ = cylinder_clearance(moved.columns, 0, x, y, person[4], top_z)
-        out[k + 6 + i] = _scaled(d)
+        x, y = lanes[AXIS_X + i], lanes[AXIS_Y + i]
+        out[k + 6 + i] = _scaled(lanes[CLEARANCE + i])
         out[k + 19 + i] = _scaled(math.hypot(x - goal[0], y - goal[1]) - person[4])
     out[k + 9] = 2.0 * person[5]
     out[k + 18] = _scaled(math.hypot(person[0] - goal[0], person[1] - goal[1]) - person[4])

@@ -45,7 +45,9 @@ LAG_S = 0.05
 ROLL_S = 0.1
 """Time in which a joint loses its present speed [s]."""
 NEAR = 0.2
-"""Unit of clearances [m]; they are clipped at -1 and 2 units."""
+"""Unit of clearances [m]."""
+FARTHEST = 2.0
+"""Clearances are clipped at -1 and this many units."""
 AFTER_S = 0.15
 """Time after the arrival for which the base motion counts [s]."""
 SCALE = 0.5
@@ -117,7 +119,7 @@ def _predict_person(
 
 @kernel(inline="always")
 def _cut(d: float) -> float:
-    return max(-1.0, min(2.0, d / NEAR))
+    return max(-1.0, min(FARTHEST, d / NEAR))
 
 
 @kernel()
@@ -136,7 +138,7 @@ def _measure_people(arm: Arm, top_z: float, n: int, work: ReachObservationWorksp
             there = work.predicted[LOOKS[m % N_LOOKS] - 1, p]
             lanes[AXIS_X + m], lanes[AXIS_Y + m] = there[0], there[1]
             lanes[AXIS_R + m] = there[2]
-        measure_lanes(arm, top_z, n, work.q, work.moved, lanes)
+        measure_lanes(arm, top_z, n, FARTHEST * NEAR, work.q, work.moved, lanes)
 
 
 @kernel()

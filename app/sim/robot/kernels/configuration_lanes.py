@@ -142,7 +142,9 @@ def _approach_capsule(arm: Arm, k: int, frame: Vec, n: int, lanes: Vec) -> None:
 
 
 @kernel()
-def measure_lanes(arm: Arm, top: float, n: int, q: Vec, pose: RobotPose, lanes: Vec) -> None:
+def measure_lanes(
+    arm: Arm, top: float, n: int, within: float, q: Vec, pose: RobotPose, lanes: Vec
+) -> None:
     """Lower the clearances of the first ``n`` configurations to those to their cylinders.
 
     Where a point nearest to the axis is above the cylinder, the configuration is placed alone.
@@ -150,6 +152,8 @@ def measure_lanes(arm: Arm, top: float, n: int, q: Vec, pose: RobotPose, lanes: 
     Args:
         top: Height of the tops of the cylinders [m].
         n: Number of configurations.
+        within: Distance that counts as far away [m]; clearances above it may be too small, but
+            stay above it.
         q: Work space, shape (6,).
         pose: Work space.
         lanes: The configurations, placed by :func:`place_lanes`, and the cylinders.
@@ -161,7 +165,7 @@ def measure_lanes(arm: Arm, top: float, n: int, q: Vec, pose: RobotPose, lanes: 
         _approach_capsule(arm, k, lanes[first : first + _FRAME], n, lanes)
     for m in range(n):
         d = lanes[_NOW + m]
-        if lanes[_HIGHEST + m] > top:
+        if lanes[_HIGHEST + m] > top and d < within:
             for j in range(6):
                 q[j] = lanes[JOINTS + j * N_LANES + m]
             place_robot(arm, q, pose)

@@ -5,6 +5,8 @@ import pytest
 
 from app.sim.cells.cell import load_cell
 from app.sim.core.arrays import Vec
+from app.sim.core.jit import FAR
+from app.sim.core.jit import FAR
 from app.sim.geometry.cylinder import cylinder_clearance
 from app.sim.reach.kernels.observation_workspace import N_ASIDE, N_LOOKS
 from app.sim.robot.kernels import configuration_lanes as kernel
@@ -45,10 +47,10 @@ def placed(q: Vec) -> Vec:
     return lanes
 
 
-def lowered(lanes: Vec, cylinders: Vec, top: float) -> Vec:
+def lowered(lanes: Vec, cylinders: Vec, top: float, within: float = FAR) -> Vec:
     put(cylinders, lanes)
     n = len(cylinders)
-    kernel.measure_lanes(ARM, top, n, np.zeros(6), new_robot_pose(ARM), lanes)
+    kernel.measure_lanes(ARM, top, n, within, np.zeros(6), new_robot_pose(ARM), lanes)
     return lanes[kernel.CLEARANCE : kernel.CLEARANCE + n].copy()
 
 
@@ -59,6 +61,19 @@ def test_clearances_are_those_of_configurations_placed_alone(n: int, top: float)
         q, cylinders = drawn(seed, n)
         found = lowered(placed(q), cylinders, top)
         np.testing.assert_allclose(found, alone(q, cylinders, top), rtol=0.0, atol=1e-14)
+
+
+@pytest.mark.parametrize("within", [0.2, 0.4])
+def test_clearances_beyond_a_limit_stay_beyond_it_and_others_are_exact(within: float) -> None:
+    left_out = 0
+    for seed in range(20):
+        q, cylinders = drawn(seed, N)
+        found, exact = lowered(placed(q), cylinders, 0.4, within), alone(q, cylinders, 0.4)
+        np.testing.assert_allclose(
+            found.clip(max=within), exact.clip(max=within), rtol=0.0, atol=1e-14
+        )
+        left_out += np.sum(exact > found + 1e-6)
+    assert left_out > 0
 
 
 def test_the_nearest_of_several_cylinders_counts() -> None:
@@ -79,3 +94,14 @@ def test_an_upright_segment_counts_from_its_lower_end() -> None:
 
 def test_there_are_lanes_for_all_options_of_an_observation() -> None:
     assert N_ASIDE * N_LOOKS <= N
+
+
+@pytest.mark.parametrize("within", [0.2, 0.4])
+def test_clearances_above_a_limit_stay_above_it_and_others_are_exact(within: float) -> None:
+    beyond = 0
+    for seed in range(20):
+        q, cylinders = drawn(seed, N)
+        found, exact = lowered(placed(q), cylinders, 0.4, within), alone(q, cylinders, 0.4)
+        np.testing.assert_allclose(found.clip(max=within), exact.clip(max=within), atol=1e-9)
+        beyond += np.sum(exact - found > 1e-6)
+    assert beyond > 0  # distances over the top that were left out

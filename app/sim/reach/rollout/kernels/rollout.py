@@ -139,18 +139,21 @@ def _query_policy(
 
 @kernel(inline="always")
 def _people_clearance(
-    world: ReachCell, step: int, share: float, work: RolloutWorkspace
+    world: ReachCell, step: int, share: float, within: float, work: RolloutWorkspace
 ) -> float:
-    """Return the clearance of the placed robot to people between two steps [m]."""
-    least, places = FAR, work.people.places
+    """Return the clearance of the placed robot to people between two steps [m].
+
+    Args:
+        step: The earlier step.
+        share: Share of the time to the later one that has passed.
+        within: The most that is returned [m].
+    """
+    least, places, top = within, work.people.places, world.people.top_z
     for p in range(work.people.n[0]):
         a, b = places[step, p], places[step + 1, p]
         x, y = a[0] + share * (b[0] - a[0]), a[1] + share * (b[1] - a[1])
         r = a[2] + share * (b[2] - a[2])
-        d, _ = cylinder_clearance(
-            work.observation.robot.columns, 0, x, y, r, world.people.top_z
-        )
-        least = min(least, d)
+        least, _ = cylinder_clearance(work.observation.robot.columns, 0, x, y, r, top, least)
     return least
 
 
@@ -158,7 +161,7 @@ def _people_clearance(
 def _clearance_at(world: ReachCell, t: float, work: RolloutWorkspace) -> float:
     """Return the clearance of the placed robot to people at time ``t`` from now [m]."""
     step = int(t / STEP_S)
-    return _people_clearance(world, step, t / STEP_S - step, work)
+    return _people_clearance(world, step, t / STEP_S - step, FAR, work)
 
 
 @kernel()
@@ -340,7 +343,7 @@ def simulate_candidate(
             before = now // periods
             now += 1
             t, share = now * arm.dt, now / periods - before
-            clearance = _people_clearance(world, before, share, work)
+            clearance = _people_clearance(world, before, share, ENOUGH_CLEARANCE, work)
             least = min(least, clearance)
             if _collides(arm, _margin_left(world, clearance, t, beginning.margin, work), work):
                 return COLLISION, COLLISION_SCORE + time_cost * t - detour
