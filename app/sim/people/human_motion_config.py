@@ -32,6 +32,8 @@ TRACK_DT = 0.02
 """Sampling step of tracks [s]; 50 Hz, above the bandwidth of hand motion."""
 NEEDED_S = 10.0
 """Desired length of a track after the start of an episode [s]."""
+DRAWN_S = 0.1
+"""Recorded duration per entry in the list from which runs are drawn [s]."""
 LOOPED_S = 22.0
 """Length to which shorter recorded runs are played back and forth [s]: the longest episode of
 an evaluation from any place of the first run."""
@@ -120,6 +122,7 @@ def with_human_motion(shared: People, cell: Cell, settings: HumanMotionConfig) -
         if settings.loop:
             runs = tuple(back_and_forth(run, LOOPED_S) for run in runs)
         tracks, lengths = tracks_of(runs, cell.floor_z)
+        tracks = _drawn_by_duration(tracks, settings.recorded)
         return shared._replace(tracks=tracks, track_share=1.0, bodies=lengths)
     if settings.off_task > 0.0:
         tracks, _ = tracks_of(off_task_recordings(cell, settings.seed), cell.floor_z)
@@ -204,6 +207,15 @@ def tracks_of(motions: Sequence[Motion], floor_z: float) -> tuple[Tracks, Vec]:
         NEEDED_S,
     )
     return tracks, np.stack([motion.size.vector(floor_z) for motion in motions])
+
+
+def _drawn_by_duration(tracks: Tracks, runs: Sequence[Motion]) -> Tracks:
+    """Return tracks of runs that are drawn in proportion to the recorded duration.
+
+    Gaps in a recording split it into short runs, which would count as much as long ones.
+    """
+    counts = [max(1, round(float(run.times[-1]) / DRAWN_S)) for run in runs]
+    return tracks._replace(spans=np.repeat(tracks.spans, counts, axis=0))
 
 
 def back_and_forth(run: Motion, seconds: float) -> Motion:

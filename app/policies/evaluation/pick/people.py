@@ -205,6 +205,8 @@ def beside_recordings(
 ) -> PickSettings:
     """Return settings with recorded people, placed at the table of a cell.
 
+    An episode draws a run in proportion to its duration, and a moment of it.
+
     Raises:
         InvalidInput: There is more than ``MAX_RECORDED_S`` of motion.
     """
