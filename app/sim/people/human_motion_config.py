@@ -32,8 +32,6 @@ TRACK_DT = 0.02
 """Sampling step of tracks [s]; 50 Hz, above the bandwidth of hand motion."""
 NEEDED_S = 10.0
 """Desired length of a track after the start of an episode [s]."""
-DRAWN_S = 0.1
-"""Recorded duration per entry in the list from which runs are drawn [s]."""
 LOOPED_S = 22.0
 """Length to which shorter recorded runs are played back and forth [s]: the longest episode of
 an evaluation from any place of the first run."""
@@ -73,7 +71,8 @@ class HumanMotionConfig:
     variants: int = VARIANTS
     """Keyframes per body, place and hand."""
     recorded: tuple[Motion, ...] = ()
-    """Runs placed in the cell, for ``recorded``."""
+    """Runs placed in the cell, for ``recorded``; one that is given twice is drawn twice as
+    often."""
     loop: bool = True
     """Whether recorded runs shorter than an episode are played back and forth; otherwise the
     person rests at the end."""
@@ -120,9 +119,9 @@ def with_human_motion(shared: People, cell: Cell, settings: HumanMotionConfig) -
     if settings.motion == "recorded":
         runs = settings.recorded
         if settings.loop:
-            runs = tuple(back_and_forth(run, LOOPED_S) for run in runs)
+            longer = {id(run): back_and_forth(run, LOOPED_S) for run in runs}
+            runs = tuple(longer[id(run)] for run in runs)
         tracks, lengths = tracks_of(runs, cell.floor_z)
-        tracks = _drawn_by_duration(tracks, settings.recorded)
         return shared._replace(tracks=tracks, track_share=1.0, bodies=lengths)
     if settings.off_task > 0.0:
         tracks, _ = tracks_of(off_task_recordings(cell, settings.seed), cell.floor_z)
@@ -178,19 +177,21 @@ def off_task_recordings(cell: Cell, seed: int) -> tuple[Motion, ...]:
 def tracks_of(motions: Sequence[Motion], floor_z: float) -> tuple[Tracks, Vec]:
     """Return runs as resampled tracks, and the sizes of their people.
 
-    Joints may exceed the model's limits, as recorded.
+    Joints may exceed the model's limits, as recorded. A run that is given several times is
+    several tracks with the same samples and body.
 
     Args:
         motions: Runs, placed in the cell (``importer.placed``).
         floor_z: Height of the cell's floor [m].
 
     Returns:
-        Tracks, and sizes [m], shape (n_tracks, 12).
+        Tracks, and sizes of the different runs [m], shape (n, 12).
     """
+    different = {id(motion): motion for motion in motions}
     rows: list[Vec] = []
-    spans: list[tuple[int, int, int]] = []
+    spans: dict[int, tuple[int, int, int]] = {}
     first = 0
-    for number, motion in enumerate(motions):
+    for number, (key, motion) in enumerate(different.items()):
         # The last frame is kept; the tolerance absorbs rounding.
         n = max(2, math.ceil(motion.times[-1] / TRACK_DT - 1e-6) + 1)
         at = np.minimum(np.arange(n) * TRACK_DT, motion.times[-1])
@@ -198,24 +199,15 @@ def tracks_of(motions: Sequence[Motion], floor_z: float) -> tuple[Tracks, Vec]:
         rows.append(
             np.stack([np.interp(at, motion.times, column) for column in values.T], axis=1)
         )
-        spans.append((first, n, number))
+        spans[key] = first, n, number
         first += n
     tracks = Tracks(
         np.ascontiguousarray(np.concatenate(rows)),
-        np.array(spans, dtype=np.int64),
+        np.array([spans[id(motion)] for motion in motions], dtype=np.int64),
         TRACK_DT,
         NEEDED_S,
     )
-    return tracks, np.stack([motion.size.vector(floor_z) for motion in motions])
-
-
-def _drawn_by_duration(tracks: Tracks, runs: Sequence[Motion]) -> Tracks:
-    """Return tracks of runs that are drawn in proportion to the recorded duration.
-
-    Gaps in a recording split it into short runs, which would count as much as long ones.
-    """
-    counts = [max(1, round(float(run.times[-1]) / DRAWN_S)) for run in runs]
-    return tracks._replace(spans=np.repeat(tracks.spans, counts, axis=0))
+    return tracks, np.stack([one.size.vector(floor_z) for one in different.values()])
 
 
 def back_and_forth(run: Motion, seconds: float) -> Motion:

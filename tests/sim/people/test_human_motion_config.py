@@ -56,6 +56,10 @@ def test_tracks_hold_the_positions_at_their_samples(cell: Cell) -> None:
     np.testing.assert_allclose(tracks.rows[296:336, :18], fine.q[::5], atol=1e-9)
     np.testing.assert_array_equal(tracks.rows[336, :18], fine.q[-1])
     assert sizes.shape == (2, 12)
+    again, sizes = tracks_of((coarse, fine, fine), cell.floor_z)
+    assert again.spans.tolist() == [[0, 296, 0], [296, 41, 1], [296, 41, 1]]
+    np.testing.assert_array_equal(again.rows, tracks.rows)
+    assert sizes.shape == (2, 12)
 
 
 def test_a_recorded_joint_may_leave_its_limits(cell: Cell) -> None:
@@ -95,18 +99,9 @@ def test_a_worker_on_a_track_is_where_it_was_recorded_at_that_speed(cell: Cell) 
 def test_every_track_is_played_with_the_body_that_was_recorded(cell: Cell) -> None:
     batch = batch_of(cell, recorded_work(cell), 60)
     people, state = batch.world.people, batch.state.people
-    assert set(state.body[:, 0]) == {0, 1}
-    np.testing.assert_array_equal(people.tracks.spans[state.track, 2], state.body)
+    assert set(state.track[:, 0]) == set(state.body[:, 0]) == {0, 1}
+    np.testing.assert_array_equal(state.track, state.body)
     np.testing.assert_array_equal(state.size[:, 0, 1:], people.bodies[state.body[:, 0], 1:])
-
-
-def test_runs_are_drawn_in_proportion_to_what_was_recorded(cell: Cell) -> None:
-    runs = tuple(at_the_table(run_of(working(n)), cell) for n in (46, 136))
-    batch = batch_of(cell, HumanMotionConfig(motion="recorded", recorded=runs), 2000)
-    lengths = [run.times[-1] for run in runs]
-    share = lengths[1] / sum(lengths)
-    assert share == pytest.approx(0.75)
-    assert batch.state.people.body[:, 0].mean() == pytest.approx(share, abs=0.04)
 
 
 def test_past_the_end_of_a_track_the_person_stands_still(cell: Cell) -> None:

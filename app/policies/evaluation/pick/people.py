@@ -50,6 +50,8 @@ YIELDING_LEVELS = (0.0, 0.5, 1.0)
 """Strengths of yielding."""
 MAX_RECORDED_S = 36_000
 """Maximum duration of recorded motion in one evaluation [s]; its tracks take 274 MB."""
+DRAWN_S = 0.1
+"""Duration of recorded motion for which a run is listed once more [s]."""
 STILL_PACE = 1e-6
 """Pace of people who stand still."""
 ALONE_M = 0.5
@@ -205,7 +207,8 @@ def beside_recordings(
 ) -> PickSettings:
     """Return settings with recorded people, placed at the table of a cell.
 
-    An episode draws a run in proportion to its duration, and a moment of it.
+    An episode draws a run in proportion to its duration: gaps of a recording split it into
+    short runs, which must not count as much as long ones.
 
     Raises:
         InvalidInput: There is more than ``MAX_RECORDED_S`` of motion.
@@ -214,8 +217,11 @@ def beside_recordings(
     if seconds > MAX_RECORDED_S:
         rule = f"s of recorded motion are too much: at most {MAX_RECORDED_S} s per evaluation"
         raise InvalidInput("motions", round(seconds), rule)
-    placed = tuple(at_the_table(motion, cell) for motion in motions)
-    return replace(settings, work=replace(settings.work, motion="recorded", recorded=placed))
+    placed: list[Motion] = []
+    for motion in motions:
+        placed += [at_the_table(motion, cell)] * max(1, round(motion.times[-1] / DRAWN_S))
+    work = replace(settings.work, motion="recorded", recorded=tuple(placed))
+    return replace(settings, work=work)
 
 
 def run_mocap(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:

@@ -7,9 +7,11 @@ import pytest
 
 from app.errors import InvalidInput
 from app.policies.checkpoints import pretrained
-from app.policies.evaluation.pick.people import MAX_RECORDED_S
+from app.policies.evaluation.pick.people import MAX_RECORDED_S, beside_recordings
 from app.policies.evaluation.registry import evaluate
+from app.sim.cells.cell import load_cell
 from app.sim.human import model as human
+from app.sim.pick.batch import PickBatch, PickSettings
 from tests.sim.recorded_person import working
 from tests.sim.working_people import run_of
 
@@ -101,6 +103,15 @@ def test_one_recording_has_no_row_of_its_own():
     runs = (run_of(working(100), name="a"), run_of(working(100, seed=1), name="a"))
     result = evaluate("pick-mocap", pretrained.load("pick"), episodes=2, motions=runs)
     assert list(rows_of(result)) == ["library", "recorded"]
+
+
+def test_runs_are_drawn_in_proportion_to_what_was_recorded():
+    cell, runs = load_cell(), tuple(run_of(working(n)) for n in (51, 151))
+    batch = PickBatch(cell, 2000, 5, beside_recordings(PickSettings(), runs, cell))
+    batch.reset()
+    people = batch.world.people
+    assert len(people.bodies) == 2 and len(people.tracks.spans) == 40
+    assert batch.state.people.body[:, 0].mean() == pytest.approx(0.75, abs=0.04)
 
 
 def test_more_recorded_motion_than_memory_is_refused():

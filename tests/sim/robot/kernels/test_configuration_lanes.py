@@ -6,7 +6,6 @@ import pytest
 from app.sim.cells.cell import load_cell
 from app.sim.core.arrays import Vec
 from app.sim.core.jit import FAR
-from app.sim.core.jit import FAR
 from app.sim.geometry.cylinder import cylinder_clearance
 from app.sim.reach.kernels.observation_workspace import N_ASIDE, N_LOOKS
 from app.sim.robot.kernels import configuration_lanes as kernel
