@@ -106,8 +106,9 @@ def evaluate(inputs: JobInputs, worker: JobWorker) -> dict[str, Any]:
 
 
 def _rates(row: Row) -> dict[str, float | None]:
-    """Return the rates of a row by name, without their intervals."""
-    return {name: one["mean"] for name, one in row.items() if isinstance(one, Mapping)}
+    """Return the rates of a row by name, without their intervals and without other fields."""
+    given = {name: one for name, one in row.items() if isinstance(one, Mapping)}
+    return {name: one["mean"] for name, one in given.items() if "mean" in one}
 
 
 def runners(inputs: JobInputs) -> Mapping[str, Runner]:

@@ -207,6 +207,23 @@ def test_evaluation_beside_stored_recordings_tells_row_by_row(store: Store) -> N
 
 @pytest.mark.usefixtures("supervisor")
 @SQLITE_ONLY
+def test_evaluation_of_the_case_studies_tells_the_rates_of_each_case(store: Store) -> None:
+    policy = pretrained.load("pick")
+    checkpoints.put_checkpoint(store, to_store(policy))
+    body = {"kind": "evaluate", "protocol": "pick-cases", "checkpoint": policy.sha256}
+    spec = parse_spec({**body, "episodes": 2}).new_job()
+    job = wait_until_final(store, jobs.create_job(store, spec).id)
+    assert (job.state, job.error, job.step) == ("succeeded", None, 4)
+    assert job.result is not None
+    points = metrics.list_metrics(store, job.id)
+    for point, row in zip(points, job.result["results"], strict=True):
+        assert point.values["success"] == row["success"]["mean"]
+        assert "mean" not in row["expected"]  # what the case expects, no rate
+        assert "expected" not in point.values
+
+
+@pytest.mark.usefixtures("supervisor")
+@SQLITE_ONLY
 def test_evaluation_beside_a_recording_that_is_gone_fails_by_name(store: Store) -> None:
     policy = pretrained.load("pick")
     checkpoints.put_checkpoint(store, to_store(policy))
