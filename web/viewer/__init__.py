@@ -1,12 +1,10 @@
 """The 3D scene on viser.
 
-capsules_view  The shapes the simulator sees, translucent over what is drawn; red where they
-               touched
+capsules_view  Collision capsules over the drawn bodies: translucent, red in contact
 loop           Live cell: the thread that owns a live world and draws its scene
 poses          Conversion of rotations to and from viser's order of quaternions
-server         Viser's server behind a Unix socket, which no browser and no other user can
-               reach
-view_settings  What each visitor shows or hides in the scene, for that browser only
+server         Viser's server behind a Unix socket, unreachable for browsers and other users
+view_settings  Parts of the scene that each visitor can show or hide in one browser
 people/        People in the scene
 robot/         The robot in the scene
 scene/         The work cell in the scene

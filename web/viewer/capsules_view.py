@@ -1,4 +1,4 @@
-"""The shapes the simulator sees, translucent over what is drawn; red where they touched."""
+"""Collision capsules over the drawn bodies: translucent, red in contact."""
 
 from collections.abc import Collection
 
@@ -10,19 +10,19 @@ from trimesh.geometry import align_vectors
 from web.viewer.poses import Vec, orientation
 
 STIFF_M = 1e-3
-"""Change of a capsule's length that is not shown [m]."""
+"""Largest change of a capsule's length that is not shown [m]."""
 SHAPES, TOUCHED = "/shapes", "/touched"
-"""Nodes of all capsules: what a visitor may hide, and what touched, which everybody sees."""
+"""Parent nodes: capsules that a visitor may hide, and capsules in contact, always shown."""
 SHAPE, HIT = (64, 150, 190), (224, 44, 40)
 OPACITY, HIT_OPACITY = 0.32, 0.65
 
 
 class CapsulesView:
-    """Capsules that are placed by their ends; one that changes its length is stretched.
+    """Capsules placed by their end points, and stretched when their length changes.
 
     Args:
         server: Where to draw.
-        owner: Whose they are; names their nodes.
+        owner: Name of the body that they belong to; part of the names of their nodes.
     """
 
     def __init__(self, server: viser.ViserServer, owner: str) -> None:
@@ -34,7 +34,7 @@ class CapsulesView:
         self._placed = False
 
     def clear(self) -> None:
-        """Take all capsules away."""
+        """Remove all capsules."""
         for handle in (*self._handles.values(), *self._hits.values()):
             handle.remove()
         self._handles, self._hits, self._sizes, self._ends = {}, {}, {}, None
@@ -43,7 +43,7 @@ class CapsulesView:
         """Add a capsule, hidden at first.
 
         Args:
-            name: Its name, unique here.
+            name: Name, unique in this view.
             radius: Radius [m].
             length: Distance of its ends [m].
         """
@@ -67,7 +67,7 @@ class CapsulesView:
         )
 
     def place(self, ends: Vec) -> None:
-        """Say where the capsules are; poses are sent only while they are seen.
+        """Place the capsules; poses are sent only while the capsules are shown.
 
         Args:
             ends: End points in world [m], shape (n, 2, 3), in the order they were added.
@@ -75,7 +75,7 @@ class CapsulesView:
         self._ends, self._placed = ends, False
 
     def show(self, visible: bool, touched: Collection[str]) -> None:
-        """Show all or none; those named ``touched`` are seen in any case, in red."""
+        """Show all or none; those named in ``touched`` are always shown, in red."""
         for handle in self._handles.values():
             handle.visible = visible
         for name in self._hits.keys() - set(touched):

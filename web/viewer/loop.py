@@ -158,7 +158,7 @@ class LiveCell:
             draw(snapshot)
 
     def _refuse(self, reason: str) -> None:
-        """Name the command that is being applied in the next snapshots."""
+        """List the present command as refused in the next snapshots, with the reason."""
         self._refused.append(RefusedCommand(number=self._done, reason=reason))
 
     def _draw(
@@ -168,7 +168,7 @@ class LiveCell:
         views: ViewSettings,
         snapshot: WorldSnapshot,
     ) -> None:
-        """Draw a snapshot, where a viewer is there to see it."""
+        """Draw a snapshot if a viewer is connected."""
         if not server.has_viewers:
             server.is_current.clear()
             scene.note(snapshot)
@@ -179,14 +179,14 @@ class LiveCell:
         server.is_current.set()
 
     def _risk_map(self, views: ViewSettings) -> RiskMap | None:
-        """Return the newest risk map; None where nobody looks at it."""
+        """Return the newest risk map; None if no visitor shows it."""
         if not isinstance(self._world, LivePickWorld) or not views.is_seen(RISK_MAP):
             return None
         self._risk.offer(self._world.risk_query)
         return self._risk.newest
 
     def _submit(self, command: Command) -> None:
-        """Queue a command of the scene, unless what it is about has left meanwhile."""
+        """Queue a command of the scene; drop it if its person, block or station is gone."""
         try:
             self.handle.submit(command)
         except ServiceError as error:

@@ -1,7 +1,7 @@
-"""Rotations on their way to viser and back: the one place that knows its quaternion order.
+"""Conversion of rotations to and from viser's quaternion order.
 
-Inside Tandem a pose is a homogeneous matrix. viser wants quaternions as w, x, y, z (Pinocchio
-stores x, y, z, w); they are made from matrices here and nowhere else.
+Tandem represents poses by homogeneous matrices. viser expects quaternions as w, x, y, z
+(Pinocchio stores x, y, z, w); only this module creates them.
 """
 
 import math
@@ -19,12 +19,12 @@ def orientation(rotation: Vec) -> Vec:
 
 
 def upright(yaw: float) -> Vec:
-    """Return viser's quaternion of a turn about z by ``yaw`` [rad], shape (4,)."""
+    """Return viser's quaternion of a rotation about z by ``yaw`` [rad], shape (4,)."""
     return np.array([math.cos(0.5 * yaw), 0.0, 0.0, math.sin(0.5 * yaw)])
 
 
 def yaw_of(quaternion: Vec) -> float:
-    """Return the turn about z [rad] of a quaternion that came from viser."""
+    """Return the rotation about z [rad] of a quaternion from viser (w, x, y, z)."""
     w, x, y, z = (float(value) for value in quaternion)
     return math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
 

@@ -1,14 +1,14 @@
-"""viser's server behind a Unix socket, which no browser and no other user can reach.
+"""viser's server behind a Unix socket, unreachable for browsers and other users.
 
 viser (1.1.1) listens on a TCP port and checks neither token nor ``Origin`` nor ``Host``: any
 page in a browser of this machine could open that port and drag a person of the live cell. Here
-it listens on a Unix socket in a directory of mode 0700 instead. The kernel lets only processes
-of the same user connect, browsers cannot address a Unix socket at all, and the one way in is
-the proxy in :mod:`app.api.routes.viewer`, behind the service's own checks.
+it listens on a Unix socket in a directory of mode 0700 instead. Only processes of the same user
+can connect, browsers cannot address a Unix socket, and the only access is the proxy in
+:mod:`app.api.routes.viewer`, behind the service's own checks.
 
-viser hands no listening option on, so ``serve`` of :mod:`websockets.asyncio.server`, which it
-looks up while it starts, is replaced for the time of its constructor; calls for another host
-pass through. The message that asks for a public tunnel has no handler.
+viser has no option for the socket. ``serve`` of :mod:`websockets.asyncio.server`, which viser
+looks up at its start, is therefore replaced during its constructor; calls for another host are
+unchanged. The message that asks for a public tunnel has no handler.
 """
 
 import asyncio
@@ -57,7 +57,7 @@ class ViewerServer(viser.ViserServer):
 
     @property
     def has_viewers(self) -> bool:
-        """Whether a viewer is connected or about to be."""
+        """Whether a viewer is connected or connecting."""
         return bool(self._websock_server._client_state_from_id)
 
     async def _wait_until_current(self, _: viser.infra.WebsockClientConnection) -> None:
@@ -66,7 +66,7 @@ class ViewerServer(viser.ViserServer):
             await asyncio.to_thread(self.is_current.wait, CURRENT_S)
 
     def request_share_url(self, verbose: bool = True) -> str | None:
-        """Refuse: a public tunnel would pass the service's checks by."""
+        """Refuse: a public tunnel would bypass the checks of the service."""
         return None
 
     def stop(self) -> None:

@@ -1,8 +1,8 @@
-"""What visitors may show or hide over the scene, each in their own window.
+"""Parts of the scene that each visitor can show or hide in one browser.
 
-Everything that can be hidden lies below a node of its own. A visitor's setting is a check box
-of that visitor's connection, and hides the node in that visitor's scene only. The viewer's own
-panel is never shown: the page has the boxes' doubles and sets them (``viewer_extra.html``).
+Every part that can be hidden has a node. A setting is a check box of one visitor's connection
+and hides the node in the scene of this visitor only. The panel of viser is never shown: the
+page has the same check boxes and sets those of viser (``viewer_extra.html``).
 """
 
 from dataclasses import dataclass
@@ -16,19 +16,19 @@ from web.viewer.capsules_view import SHAPES
 from web.viewer.scene.risk_view import NODE as RISK
 
 PREFIX = "view: "
-"""What the labels of these check boxes begin with, so that the page knows them."""
+"""Prefix of the labels of these check boxes, by which the page finds them."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Setting:
-    """Something that can be shown or hidden."""
+    """A part of the scene that can be shown or hidden."""
 
     label: str
-    """Name for people."""
+    """Label for display."""
     node: str
-    """What it is in the scene."""
+    """Node in the scene."""
     shown: bool = True
-    """Whether it is shown at first."""
+    """Whether it is shown initially."""
 
 
 COLLISION_SHAPES = Setting(label="Collision shapes", node=SHAPES, shown=False)
@@ -51,14 +51,14 @@ REACH = (
 
 
 def settings_of(cell: Cell) -> tuple[Setting, ...]:
-    """Return what can be shown or hidden in a cell's scene."""
+    """Return the parts of a cell's scene that can be shown or hidden."""
     if is_sorting(cell):
         return (COLLISION_SHAPES, *SORTING)
     return (COLLISION_SHAPES, *(REACH if is_reaching(cell) else CHOICE))
 
 
 class ViewSettings:
-    """Gives every visitor check boxes, and hides what each of them unchecks."""
+    """Check boxes of every visitor; an unchecked part is hidden for that visitor."""
 
     def __init__(self, server: viser.ViserServer, cell: Cell) -> None:
         self._settings = settings_of(cell)
@@ -70,7 +70,7 @@ class ViewSettings:
         server.on_client_disconnect(self._forget)
 
     def is_seen(self, setting: Setting) -> bool:
-        """Whether any visitor looks at it."""
+        """Whether any visitor shows it."""
         return bool(self._seen_by.get(setting))
 
     async def _greet(self, visitor: viser.ClientHandle) -> None:

@@ -1,7 +1,7 @@
-"""Steps of the mannequin's feet: cosmetic, so that a person who is moved does not slide.
+"""Steps of the mannequin's feet; for display only.
 
-Each foot stays where it is until the body has moved away from it, then swings to its new place
-while the other one stands. The simulator knows vertical leg capsules only.
+A foot rests until the body is farther from it than ``STRIDE``, then swings to its new position
+while the other foot rests. The simulator knows vertical leg capsules only.
 """
 
 import math
@@ -12,11 +12,11 @@ from web.viewer.people.skeleton import SIDES, rest_feet
 from web.viewer.poses import Vec
 
 STRIDE = 0.11
-"""Distance from its place beyond which a foot takes a step [m]."""
+"""Distance of a foot from its rest position beyond which it takes a step [m]."""
 TURN = 0.45
-"""Angle from its direction beyond which a foot takes a step [rad]."""
+"""Angle of a foot from its rest direction beyond which it takes a step [rad]."""
 FAR = 0.3
-"""Distance beyond which a foot is put in place at once [m]."""
+"""Distance beyond which a foot is placed without a step [m]."""
 SWING_S, LIFT = 0.26, 0.06
 
 
@@ -68,7 +68,7 @@ class Gait:
         return moved
 
     def _offset(self, side: str, goal: Vec) -> float:
-        """Return how far a standing foot is from its place, 1 where it steps."""
+        """Return the distance of a resting foot from its rest pose; it steps from 1 on."""
         foot = self._planted[side]
         away = float(np.linalg.norm(goal[:3, 3] - foot[:3, 3])) / STRIDE
         cosine = float(np.clip(goal[:3, 0] @ foot[:3, 0], -1.0, 1.0))

@@ -1,7 +1,7 @@
-"""Handles on a person: pelvis and both hands, for a visitor to drag in manual mode.
+"""Handles by which a visitor drags pelvis and hands of a person in manual mode.
 
 Callbacks run on viser's event loop and only queue a command. A gizmo that is not held follows
-the body it belongs to, so that it shows what was reached.
+its body part and so shows the reached position.
 """
 
 import time
@@ -18,19 +18,19 @@ from web.viewer.poses import Vec, upright, yaw_of
 
 HANDS = {"right": "hand_r", "left": "hand_l"}
 SETTLE_S = 0.6
-"""How long a released gizmo stays where it was let go [s]."""
+"""Time for which a released gizmo stays where it was released [s]."""
 HOLD_S = 5.0
-"""How long a held gizmo stays without moving; its visitor may have left [s]."""
+"""Time without motion after which a held gizmo counts as released [s]."""
 
 
 class Gizmos:
     """Gizmos of one person; poses are written by the live cell's thread only.
 
     Args:
-        server: Where to draw.
+        server: Viser server of the scene.
         person: Id of the person.
-        submit: Takes the command of a drag.
-        jointed: Whether the person has hands, and a side to turn.
+        submit: Called with the command of a drag.
+        jointed: Whether the person has hands and a yaw (a worker).
     """
 
     def __init__(
@@ -98,11 +98,11 @@ class Gizmos:
         return time.monotonic() >= self._released.get(name, 0.0)
 
     def remove(self) -> None:
-        """Take the gizmos out of the scene."""
+        """Remove the gizmos from the scene."""
         self._frame.remove()
 
     def draw(self, person: PersonSnapshot) -> None:
-        """Show the gizmos in manual mode, each where its body is."""
+        """Show the gizmos in manual mode, each at its body part."""
         manual = person.mode == "manual"
         for gizmo in (self._pelvis, *self._hands.values()):
             gizmo.visible = manual
@@ -118,9 +118,9 @@ class Gizmos:
 
 
 def _within_range(position: Vec) -> tuple[float, float, float]:
-    """Return the nearest position that a command takes [m].
+    """Return the nearest position that a command accepts [m].
 
-    A gizmo that is dragged toward the horizon goes kilometres away.
+    A gizmo that is dragged toward the horizon is kilometres away.
     """
     x, y, z = np.clip(position, -FARTHEST_M, FARTHEST_M).tolist()
     return x, y, z

@@ -1,7 +1,7 @@
-"""What the person looks like: eleven parts, ready to be drawn.
+"""Surfaces, colours and skin weights of the drawn person, in eleven parts.
 
 The surfaces come from ``data/mannequin.npz``, written by :mod:`tools.model_mannequin`; colours
-and skin weights are given here, and the surfaces for people of other sizes (:func:`fitted`).
+and skin weights are defined here; :func:`fitted` adapts the surfaces to other body sizes.
 Positions are stored as 16-bit shares of each part's box (steps below 0.03 mm).
 """
 
@@ -39,13 +39,13 @@ class Part:
     """One piece of the mannequin."""
 
     name: str
-    """Name in the scene."""
+    """Name of the node in the scene."""
     surface: Surface
-    """In the bind pose for soft parts, in the bone's own frame for rigid ones."""
+    """Surface: in the bind pose for soft parts, in the frame of the bone for rigid ones."""
     color: Rgb
     """Colour, 0 to 255."""
     bone: str | None = None
-    """Bone a rigid part follows; None for soft parts."""
+    """Bone that a rigid part is attached to; None for soft parts."""
     weights: dict[str, Vec] = field(default_factory=dict)
     """Skin weights by bone for soft parts, each of shape (n_vertices,)."""
 
@@ -121,15 +121,15 @@ def parts() -> tuple[Part, ...]:
 
 
 def color_of(part: Part, person: int) -> Rgb:
-    """Return the colour of a part of the person of an id."""
+    """Return the colour of a part, 0 to 255, for the person with an id."""
     return VESTS[person % len(VESTS)] if part.name == "vest" else part.color
 
 
 def fitted(part: Part, size: Vec) -> Vec:
     """Return a soft part's vertices for a person of another size [m], shape (n, 3).
 
-    Each vertex is moved and scaled with its bones, weighted as when they move: what joins two
-    bones stays joined.
+    Each vertex is moved and scaled with its bones by its skin weights, so that the surface is
+    connected between two bones.
 
     Args:
         part: A soft part.

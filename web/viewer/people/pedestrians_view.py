@@ -1,4 +1,7 @@
-"""Pedestrians in the scene, as cylinders: what counts of people, around their mannequins."""
+"""Cylinders of pedestrians in the scene, around their mannequins.
+
+The simulator and the policies use the cylinders only.
+"""
 
 import numpy as np
 import viser
@@ -12,15 +15,15 @@ from web.viewer.scene.stations_view import HIT
 OPACITY, HIT_OPACITY = 0.16, 0.4
 FLOOR_OPACITY = 0.3
 SAME_M = 2e-3
-"""Changes of place and radius that are not shown [m]."""
+"""Largest change of position and radius that is not shown [m]."""
 
 
 class PedestriansView:
     """Draws the cylinders; used by the live cell's thread only.
 
     Args:
-        server: Where to draw.
-        cell: Says where the floor is.
+        server: Viser server of the scene.
+        cell: Work cell with the height of the floor.
     """
 
     def __init__(self, server: viser.ViserServer, cell: Cell) -> None:
@@ -28,7 +31,7 @@ class PedestriansView:
         self._drawn: dict[int, _Cylinder] = {}
 
     def draw(self, snapshot: WorldSnapshot) -> None:
-        """Show the cylinders of a snapshot; the one that was touched in red."""
+        """Show the cylinders of a snapshot, the one in contact in red."""
         here = {one.id for one in snapshot.people if one.cylinder is not None}
         for id in self._drawn.keys() - here:
             self._drawn.pop(id).remove()
@@ -44,7 +47,7 @@ class PedestriansView:
 
 
 class _Cylinder:
-    """One cylinder of radius 1, stretched to the person's."""
+    """One cylinder of unit radius, scaled to the person's radius."""
 
     def __init__(self, scene: viser.SceneApi, person: PersonSnapshot, floor: float) -> None:
         assert person.cylinder is not None
@@ -85,11 +88,11 @@ class _Cylinder:
         ]
 
     def remove(self) -> None:
-        """Take it out of the scene."""
+        """Remove it from the scene."""
         self._frame.remove()
 
     def draw(self, person: PersonSnapshot, *, hit: bool) -> None:
-        """Show it where the person is."""
+        """Show it at the position of the person."""
         one = person.cylinder
         assert one is not None
         key = (one.x, one.y, one.radius)

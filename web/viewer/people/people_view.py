@@ -1,4 +1,4 @@
-"""The people in the scene: each is drawn while present, and hidden afterwards."""
+"""All people in the scene, created when they enter and hidden when they leave."""
 
 from collections.abc import Callable
 
@@ -12,7 +12,7 @@ from web.viewer.people.person_view import PersonView
 
 
 class PeopleView:
-    """Draws everyone, each with handles; used by the live cell's thread only."""
+    """Draws all people with their handles; used by the live cell's thread only."""
 
     def __init__(
         self, server: viser.ViserServer, cell: Cell, submit: Callable[[MovePerson], object]
@@ -26,9 +26,9 @@ class PeopleView:
         """Show the people of a snapshot.
 
         Args:
-            snapshot: What to show.
+            snapshot: Snapshot to show.
             dt: Time since the last call [s].
-            shapes: Whether the capsules that the simulator sees are shown.
+            shapes: Whether the collision capsules are shown.
         """
         here = {person.id for person in snapshot.people}
         for id in self._drawn.keys() - here:
@@ -47,7 +47,7 @@ class PeopleView:
             gizmos.draw(person)
 
     def _add(self, person: PersonSnapshot) -> tuple[PersonView, Gizmos]:
-        """Show a person that was not there at the last call."""
+        """Show a person that was absent at the last call."""
         view = self._hidden.pop(person.id, None)
         if view is None:
             view = PersonView(self._server, self._cell, person)

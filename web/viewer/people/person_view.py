@@ -1,10 +1,10 @@
-"""One person in the scene: the mannequin, its feet, and the simulator's capsules over it.
+"""One person in the scene: mannequin, feet and collision capsules.
 
-A skinned mesh is never removed. viser's client (1.1.1) takes the bones off the mesh's node when
-the mesh goes, tests that node against ``undefined`` where it is ``null``, and the error ends
-the drawing in every open window. So a person that leaves is hidden and shown again once its
-number is given to somebody else (numbers are reused, so there are few), and a person that grows
-gets its meshes by adding them under the same names, which the client takes as an update.
+A skinned mesh is never removed. When one is removed, viser's client (1.1.1) compares its
+node with ``undefined`` although it is ``null``, and the error ends the drawing in every open
+window. A person that leaves is therefore hidden, and shown again when its number is reused. For
+a person of another size the meshes are added under the same names, which the client handles as
+an update.
 """
 
 import numpy as np
@@ -20,7 +20,7 @@ from web.viewer.people.gait import Gait
 from web.viewer.poses import Vec, orientation
 
 SAME_M = 1e-4
-"""Lengths that differ by less are the same [m]."""
+"""Difference below which two lengths are equal [m]."""
 
 
 class PersonView:
@@ -39,12 +39,12 @@ class PersonView:
         self._fit(person)
 
     def hide(self) -> None:
-        """Take the person out of sight."""
+        """Hide the person."""
         self._frame.visible = False
         self.show_capsules(False, None)
 
     def show(self, person: PersonSnapshot) -> None:
-        """Show a person that was hidden, or another one of the same number."""
+        """Show a hidden person, or another person with the same number."""
         self._gait = Gait(self._cell.floor_z)
         self._drawn = None
         self._lengths = _lengths(person.size)
@@ -53,7 +53,7 @@ class PersonView:
         self._frame.visible = True
 
     def _fit(self, person: PersonSnapshot) -> None:
-        """Give the mannequin the person's size."""
+        """Fit the mannequin to the size of the person."""
         self._fitted = _lengths(person.size)
         bind = skeleton.bind_bones(person.size)
         self._skins = [
@@ -103,7 +103,7 @@ class PersonView:
         """Show the person in a posture.
 
         Args:
-            person: What is known of it.
+            person: Read model of the person.
             dt: Time since the last call [s], for the steps of the feet.
         """
         self._follow_size(person)
@@ -126,19 +126,19 @@ class PersonView:
         self._capsules.place(human.capsules(q, size, self._cell.floor_z))
 
     def _follow_size(self, person: PersonSnapshot) -> None:
-        """Fit the skin once the size stands still; until then the bones alone move."""
+        """Fit the skin when the size is constant; before that only the bones move."""
         lengths, before = _lengths(person.size), self._lengths
         self._lengths = lengths
         if _same(lengths, before) and not _same(lengths, self._fitted):
             self._fit(person)
 
     def show_capsules(self, visible: bool, touched: str | None) -> None:
-        """Show or hide the simulator's capsules; the one that was touched stays, red."""
+        """Show or hide the collision capsules; the one in contact is always shown, in red."""
         self._capsules.show(visible, () if touched is None else (touched,))
 
 
 def _lengths(size: Vec) -> Vec:
-    """Return a size without the pelvis's height, which changes as the person moves."""
+    """Return a size without the pelvis height, which changes during motion."""
     return np.delete(size, PELVIS_Z)
 
 

@@ -1,13 +1,14 @@
-"""The bones inside the mannequin: where each is for a posture, and which skin follows which.
+"""Bones of the mannequin: poses for a posture, and skin weights.
 
-The simulator's person has six moving bodies; skin needs more. Between two bodies that turn
-against each other a bone turns half-way (two along the spine), which keeps elbows, shoulders
-and waist round. Legs follow the feet that :mod:`web.viewer.people.gait` puts on the floor.
+The simulator's person has six moving bodies; the skin needs more bones. Between two bodies that
+rotate relative to each other an additional bone has half of the rotation (two bones along the
+spine), so that elbows, shoulders and waist keep their cross-section. Legs follow the feet that
+:mod:`web.viewer.people.gait` places on the floor.
 
 Frames: in the bind pose the pelvis is the origin, x forward, y left, z up, as in
-``app.sim.human.model``. The mannequin is modelled as the median person; for another one its
-skin is scaled bone by bone (:func:`scales`), along the bone as its length and across it as the
-girth. Legs are as long as the girth says, which goes with the stature.
+``app.sim.human.model``. The mannequin is the median person; for another size its skin is scaled
+bone by bone (:func:`scales`): along the bone by its length, across it by the girth. The length
+of the legs is proportional to the girth, which increases with the stature.
 """
 
 import math
@@ -24,13 +25,13 @@ Bones = dict[str, Vec]
 """T_world_bone by name, each of shape (4, 4)."""
 
 PELVIS_HEIGHT = 0.95
-"""Height of the pelvis the mannequin is modelled with [m]."""
+"""Pelvis height of the mannequin in the bind pose [m]."""
 HIP_SIDE, HIP_DROP = 0.09, 0.05
-"""Half the distance of the hips and how far they lie below the pelvis, at girth 1 [m]."""
+"""Half of the distance between the hips, and their depth below the pelvis, at girth 1 [m]."""
 THIGH, SHIN = 0.42, 0.42
 """Lengths of the median person's legs [m]."""
 ANKLE_HEIGHT = 0.09
-"""Of the median person's ankle above the sole [m]."""
+"""Height of the median person's ankle above the sole [m]."""
 SIDES = ("r", "l")
 MEDIAN_SIZE = MEDIAN.vector(-MEDIAN.pelvis)
 MEDIAN_SIZE.setflags(write=False)
@@ -74,7 +75,7 @@ def _turned(yaw: float) -> Vec:
 
 
 def _leg(pelvis: Vec, foot: Vec, side: str, size: Vec) -> tuple[Vec, Vec]:
-    """Return thigh and shin frames that connect hip and ankle, the knee to the front."""
+    """Return the frames of thigh and shin between hip and ankle, with the knee in front."""
     sign, girth = -1.0 if side == "r" else 1.0, float(size[lengths.GIRTH])
     thigh, shin = THIGH * girth, SHIN * girth
     hip = pelvis[:3, 3] + pelvis[:3, :3] @ [0.0, sign * size[lengths.HIP], -HIP_DROP * girth]
@@ -103,7 +104,7 @@ def _pointing(origin: Vec, tip: Vec, forward: Vec) -> Vec:
 
 
 def bones(q: Vec, size: Vec, feet: Mapping[str, Vec]) -> Bones:
-    """Return every bone's pose.
+    """Return T_world_bone of every bone by name, shape (4, 4) each.
 
     Args:
         q: Joint positions [m, rad], shape (18,).
@@ -133,7 +134,7 @@ def bones(q: Vec, size: Vec, feet: Mapping[str, Vec]) -> Bones:
 
 
 def bind_bones(size: Vec = MEDIAN_SIZE) -> Bones:
-    """Return the bones in the pose the mannequin is modelled in, pelvis at the origin.
+    """Return the bones in the bind pose, with the pelvis at the origin.
 
     Args:
         size: The person's size [m], shape (12,); the median person's by default.
@@ -144,11 +145,12 @@ def bind_bones(size: Vec = MEDIAN_SIZE) -> Bones:
 
 
 def scales(size: Vec, shoulder: str = "r") -> dict[str, Vec]:
-    """Return by how much a person's skin is larger along each bone's axes, shape (3,) each.
+    """Return the scale factors of a person's skin along each bone's axes, shape (3,) each.
 
     Args:
         size: The person's size [m], shape (12,).
-        shoulder: Side of the trunk, ``"r"`` or ``"l"``: its width is that of this shoulder.
+        shoulder: Side of the shoulder that determines the width of the trunk, ``"r"`` or
+            ``"l"``.
     """
     ratio = size / np.where(MEDIAN_SIZE == 0.0, 1.0, MEDIAN_SIZE)
     girth, trunk = float(ratio[lengths.GIRTH]), float(ratio[lengths.TRUNK])
@@ -187,7 +189,7 @@ def _hat(share: Vec, index: int, count: int) -> Vec:
 
 
 def _along_arm(vertices: Vec, origin: Vec, tip: Vec) -> tuple[Vec, Vec]:
-    """Return distance along and away from the line origin-tip [m], each of shape (n,)."""
+    """Return the distances along and from the line origin-tip [m], each of shape (n,)."""
     direction = (tip - origin) / np.linalg.norm(tip - origin)
     along = (vertices - origin) @ direction
     away = np.linalg.norm(vertices - origin - along[:, None] * direction, axis=1)
@@ -219,7 +221,7 @@ def upper_weights(vertices: Vec) -> dict[str, Vec]:
 
 
 def spine_weights(vertices: Vec) -> dict[str, Vec]:
-    """Return skin weights of what covers the trunk only, by bone, each of shape (n,)."""
+    """Return skin weights of vertices on the trunk by bone, each of shape (n,)."""
     share = _ramp(vertices[:, 2], -0.10, 0.26)
     names = ("pelvis", "spine_1", "spine_2", "torso")
     return {name: _hat(share, i, 4) for i, name in enumerate(names)}

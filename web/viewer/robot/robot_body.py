@@ -1,7 +1,7 @@
-"""What the UR10 looks like: its visual meshes, repainted, and a two-finger gripper.
+"""Visual meshes of the UR10, of the gripper and of the magnet.
 
 The meshes are example-robot-data's ``.dae`` visuals in each link's frame, read once per
-process. The gripper is ours, drawn around the tool capsule the simulator uses.
+process. They are repainted. The gripper is drawn around the tool capsule of the simulator.
 """
 
 from functools import lru_cache
@@ -28,15 +28,15 @@ STEEL = material((150, 155, 162), metallic=0.3, roughness=0.35)
 ACCENT = material((255, 138, 52), roughness=0.5)
 
 _PAINT = {57: ALUMINIUM, 100: CAP, 118: RUBBER, 95: RUBBER, 167: STEEL, 20: RUBBER}
-"""Material by the red channel of the file's own colour, which tells the parts apart."""
+"""Material by the red channel of the colour in the file, which identifies the part."""
 DENSE, KEPT = 4000, 0.15
-"""Pieces of more triangles than the first keep the second share of them.
+"""Number of triangles above which a piece is simplified, and the share that it keeps.
 
-The files have a triangle per 2 mm of a bolt. The scene is drawn four times per picture, three
-times for shadows; a computer without a graphics processor draws these pieces 7 times faster.
+The files resolve bolts to 2 mm. The scene is drawn four times per picture, three times for
+shadows; without a graphics processor the simplified pieces are drawn 7 times faster.
 """
 CREASE = 0.6
-"""Angle from which on an edge stays sharp [rad]."""
+"""Angle between two faces from which their edge is shaded as a crease [rad]."""
 
 
 @lru_cache(maxsize=1)
@@ -57,8 +57,8 @@ def link_meshes() -> dict[str, bytes]:
 def _welded(mesh: trimesh.Trimesh) -> trimesh.Trimesh:
     """Return the mesh with shared vertices, few triangles, shaded smoothly except at creases.
 
-    The files give every face its own vertices. Here faces that meet at less than ``CREASE``
-    share one vertex per place; its normal is the mean of theirs, weighted by area.
+    In the files every face has its own vertices. Here faces that meet at less than ``CREASE``
+    share a vertex, whose normal is the mean of their normals, weighted by area.
     """
     points, index = np.unique(mesh.vertices.round(4), axis=0, return_inverse=True)
     faces = index.reshape(-1)[mesh.faces]

@@ -1,4 +1,4 @@
-"""The robot in the scene: link meshes placed from Pinocchio, and the gripper or magnet."""
+"""The robot in the scene: link meshes at the poses of Pinocchio, and gripper or magnet."""
 
 import numpy as np
 import viser
@@ -12,9 +12,9 @@ from web.viewer.robot.robot_body import gripper_body, gripper_finger, link_meshe
 from web.viewer.scene.solid_meshes import torus
 
 LAMP = (38, 196, 182)
-"""Colour of the ring that is seen while the magnet is on."""
+"""Colour of the ring that is shown while the magnet is on."""
 OPEN, CLOSED = 0.044, 0.036
-"""Half the distance of the fingers [m]; a cube's side lies between."""
+"""Half of the distance between the fingers, open and closed [m]."""
 
 
 class RobotView:
@@ -92,7 +92,7 @@ class RobotView:
         )
 
     def show_capsules(self, visible: bool, touched: str | None) -> None:
-        """Show or hide the simulator's capsules; those that touched stay in view, red."""
+        """Show or hide the collision capsules; those in contact are always shown, in red."""
         self._capsules.show(visible, () if touched is None else touched.split(" and "))
 
     def grip(self, closed: bool) -> None:

@@ -1,4 +1,4 @@
-"""A dashed arc in the scene, from where something is to where it goes."""
+"""Dashed arc from the position of an object to its target."""
 
 import numpy as np
 import viser
@@ -13,7 +13,7 @@ class Arc:
     """One dashed arc; used by the live cell's thread only.
 
     Args:
-        server: Where to draw.
+        server: Viser server of the scene.
         name: Name of its node in the scene.
         lift: Greatest height over the straight line [m].
     """
@@ -26,7 +26,7 @@ class Arc:
         self._key: tuple[object, ...] = ()
 
     def hide(self) -> None:
-        """Take it out of sight."""
+        """Hide the arc."""
         self._lines.visible = False
 
     def show(self, start: Vec, end: Vec) -> None:

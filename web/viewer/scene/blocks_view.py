@@ -18,8 +18,8 @@ class BlocksView:
     """Draws all blocks; used by the live cell's thread only.
 
     Args:
-        server: Where to draw.
-        submit: Takes the command of a click: the block comes into the goal, or out of it.
+        server: Viser server of the scene.
+        submit: Called with the command of a click: add the block to the goal, or remove it.
     """
 
     def __init__(
@@ -29,7 +29,7 @@ class BlocksView:
         self._drawn: dict[str, tuple[viser.GlbHandle, Vec]] = {}
 
     def draw(self, blocks: tuple[BlockSnapshot, ...]) -> None:
-        """Show the blocks where they are."""
+        """Show the blocks at their positions."""
         here = {block.id for block in blocks}
         for id in self._drawn.keys() - here:
             self._drawn.pop(id)[0].remove()

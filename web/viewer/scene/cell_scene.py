@@ -1,6 +1,6 @@
-"""The live cell as a picture: everything that moves, drawn from one snapshot.
+"""Scene of a live cell, drawn from one snapshot.
 
-Only the thread that owns the world draws; clicks and drags leave as commands.
+Only the thread that owns the world draws; clicks and drags become commands.
 """
 
 from collections.abc import Callable
@@ -46,7 +46,7 @@ class CellScene:
             self._path = Arc(server, "/path/arc", lift=PATH_LIFT)
 
     def note(self, snapshot: WorldSnapshot) -> None:
-        """Remember a snapshot that no viewer is there to see, for the trail of the tool."""
+        """Add a snapshot that is not drawn to the trail of the tool."""
         if self._reach is not None:
             self._reach.note(snapshot)
 
@@ -62,7 +62,7 @@ class CellScene:
 
         Args:
             dt: Time since the last call [s].
-            shapes: Whether anybody looks at the capsules that the simulator sees.
+            shapes: Whether a visitor shows the collision capsules.
             risk: Risk map of a pick cell.
         """
         with self._server.atomic():

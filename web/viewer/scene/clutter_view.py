@@ -1,4 +1,4 @@
-"""The clutter slots in the scene: a map of where grasps fail, as tiles on a tray."""
+"""Clutter slots in the scene, coloured by failure probability: tiles on a tray."""
 
 import numpy as np
 import viser
@@ -8,15 +8,15 @@ from web.viewer.poses import Vec
 from web.viewer.scene.sorting_bodies import failure_color, tile, tray
 
 GAP = 0.012
-"""Between two tiles [m]."""
+"""Distance between two tiles [m]."""
 LONE_M = 0.18
-"""Side of a cell that has no neighbour [m]."""
+"""Side of the tile of a slot without neighbours [m]."""
 DRAWN_M = 0.004
 """Least height of the tray over the table [m]."""
 
 
 def tray_height(cell: Cell) -> float:
-    """Return how high blocks stand over the table in clutter and towers [m].
+    """Return the height of the tray above the table, that of the lowest blocks' underside [m].
 
     The tool reaches a block's top at its station; a block is one level high.
     """
@@ -29,8 +29,8 @@ class ClutterView:
     """Draws the clutter slots; used by the live cell's thread only.
 
     Args:
-        server: Where to draw.
-        cell: Says where they are.
+        server: Viser server of the scene.
+        cell: Work cell with the slots.
     """
 
     def __init__(self, server: viser.ViserServer, cell: Cell) -> None:
@@ -65,7 +65,7 @@ class ClutterView:
         self._shown: tuple[float, ...] | None = None
 
     def draw(self, failure: tuple[float, ...]) -> None:
-        """Show the chance of failure by cell."""
+        """Show the failure probability of each slot."""
         if failure == self._shown:
             return
         self._shown = failure
@@ -75,6 +75,6 @@ class ClutterView:
 
 
 def _spacing(values: Vec) -> float:
-    """Return the least distance of two different coordinates [m]."""
+    """Return the smallest difference between two different coordinates [m]."""
     steps = np.diff(np.unique(values.round(3)))
     return float(steps.min()) if len(steps) else LONE_M

@@ -1,7 +1,7 @@
-"""The goal of a reach cell in the scene: a point, its tolerance, and a handle to drag it with.
+"""Goal of a reach cell in the scene: point, tolerance and handle for dragging.
 
 Callbacks run on viser's event loop and only queue a command. A handle that is not held follows
-the goal; one that is dragged out of the goal region comes back to its edge.
+the goal; one that is dragged out of the goal region returns to its boundary.
 """
 
 import time
@@ -60,12 +60,12 @@ class GoalGizmo:
                 self._submit(MoveGoal(position=self._inside(self._handle.position)))
 
     def _inside(self, position: Vec) -> tuple[float, float, float]:
-        """Return the point of the goal region nearest to where the handle is [m]."""
+        """Return the point of the goal region nearest to the handle [m]."""
         x, y, z = np.clip(position, self._low, self._high).tolist()
         return x, y, z
 
     def draw(self, view: ReachSnapshot, *, reached: bool) -> None:
-        """Show the goal, and bring a handle that nobody holds to it."""
+        """Show the goal, and move the handle to it unless a visitor holds the handle."""
         color = REACHED if reached else GOAL
         self._frame.position = view.goal
         self._around.scale = view.tolerance

@@ -1,7 +1,7 @@
-"""A reach cell in the scene: goal, targets, the way of the tool, the separation zone.
+"""Scene of a reach cell: goal, targets, path of the tool, separation zone.
 
-The zone on the floor is where a person would be nearer than the protective separation distance
-S_p; its colour, and the ring around the robot's base, say how fast the robot may go.
+In the zone on the floor a person is nearer than the protective separation distance S_p. Its
+colour and the ring around the robot's base show the speed override.
 """
 
 from collections import deque
@@ -35,31 +35,31 @@ DOT: Rgb = (150, 164, 178)
 GAUGE_M, GAUGE_Z = 0.21, 0.012
 N_GAUGE, N_TRAIL = 60, 90
 TRAIL_M = 4e-3
-"""Way of the tool that is worth a piece of trail [m]."""
+"""Least length of a piece of the trail [m]."""
 BACK: Rgb = (226, 230, 235)
 
 
 def override_color(safety: SafetySnapshot) -> Rgb:
-    """Return the colour of the robot's rate; grey where the layer is off."""
+    """Return the colour of the override; grey while the safety layer is disabled."""
     if not safety.on:
         return OFF
     return blend(OVERRIDES, safety.override)
 
 
 def blend(ramp: tuple[tuple[float, Rgb], ...], x: float) -> Rgb:
-    """Return the colour at ``x`` of a ramp."""
+    """Return the colour at ``x`` in [0, 1] of a colour scale."""
     places = [at for at, _ in ramp]
     channels = [np.interp(x, places, [color[k] for _, color in ramp]) for k in range(3)]
     return int(channels[0]), int(channels[1]), int(channels[2])
 
 
 class ReachScene:
-    """Draws what a reach cell has; used by the live cell's thread only.
+    """Draws goal, targets, trail and zone; used by the live cell's thread only.
 
     Args:
-        server: Where to draw.
+        server: Viser server of the scene.
         cell: Reach cell.
-        submit: Takes the command of a drag of the goal.
+        submit: Called with the command of a drag of the goal.
     """
 
     def __init__(
@@ -74,7 +74,7 @@ class ReachScene:
         self._path = Arc(server, "/path", lift=0.05)
 
     def note(self, snapshot: WorldSnapshot) -> None:
-        """Remember a snapshot for the trail without drawing."""
+        """Add a snapshot to the trail without drawing."""
         if snapshot.reach is not None:
             self._trail.note(snapshot)
 
@@ -135,7 +135,7 @@ class _Zone:
 
 
 class _Gauge:
-    """A ring around the robot's base that is as full as the override."""
+    """Ring around the robot's base, filled in proportion to the override."""
 
     def __init__(self, server: viser.ViserServer) -> None:
         angles = -0.5 * np.pi - 2.0 * np.pi * np.arange(N_GAUGE + 1) / N_GAUGE
@@ -161,7 +161,7 @@ class _Gauge:
 
 
 class _Trail:
-    """Where the tool has been, in the colour of the rate at which it went there."""
+    """Trail of the tool, coloured by the override at each position."""
 
     def __init__(self, server: viser.ViserServer) -> None:
         self._points: deque[tuple[Vec, Rgb]] = deque(maxlen=N_TRAIL + 1)
@@ -172,7 +172,7 @@ class _Trail:
         self._n = 0
 
     def note(self, snapshot: WorldSnapshot) -> None:
-        """Remember where the tool is."""
+        """Add the position of the tool."""
         tcp, points = np.array(snapshot.tcp), self._points
         assert snapshot.reach is not None
         if points and float(np.linalg.norm(tcp - points[-1][0])) > 0.3:
@@ -182,7 +182,7 @@ class _Trail:
             self._n += 1
 
     def draw(self) -> None:
-        """Show what was noted."""
+        """Show the recorded positions."""
         seen = len(self._points) > 1
         self._lines.visible = seen
         if not seen or self._sent == self._n:

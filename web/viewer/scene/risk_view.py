@@ -1,4 +1,4 @@
-"""Risk map in the scene: the probability of a contact by the place where the person stands."""
+"""Risk map in the scene: probability of contact over positions of a person."""
 
 import numpy as np
 import viser
@@ -16,7 +16,7 @@ COLOURS = np.array([(56, 158, 98), (240, 196, 66), (206, 56, 46)], dtype=np.floa
 """Colours of the scale, equally spaced."""
 ALPHA = 150
 NOTHING = (120, 124, 130, 90)
-"""Colour of places where robot and person touch."""
+"""Colour of positions at which robot and person touch."""
 BAR_M = (0.8, 0.04)
 """Length and width of the legend [m]."""
 
@@ -69,7 +69,7 @@ class RiskView:
         self._shown: RiskMap | None = None
 
     def draw(self, found: RiskMap | None) -> None:
-        """Show a map; sends nothing if it is the one that is shown."""
+        """Show a map; sends nothing if it is shown already."""
         if found is self._shown:
             return
         self._shown = found

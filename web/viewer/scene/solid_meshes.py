@@ -1,4 +1,4 @@
-"""Plain solids with soft edges, painted with physical materials, as binary glTF."""
+"""Solids with bevelled edges and physically based materials, as binary glTF."""
 
 from collections.abc import Sequence
 
@@ -12,7 +12,7 @@ from web.viewer.poses import Vec
 def material(
     color: tuple[int, int, int], *, metallic: float = 0.0, roughness: float = 0.6
 ) -> PBRMaterial:
-    """Return a physical material.
+    """Return a physically based material.
 
     Args:
         color: Base colour, sRGB 0 to 255.
@@ -36,7 +36,7 @@ def creased(mesh: trimesh.Trimesh, angle: float) -> trimesh.Trimesh:
 
 
 def block(size: Sequence[float], center: Sequence[float], bevel: float) -> trimesh.Trimesh:
-    """Return a box with soft edges; sizes and centre in [m], shape (3,)."""
+    """Return a box with bevelled edges; sizes and centre in [m], shape (3,)."""
     return slab(size, center, 1.5 * bevel, bevel, sections=16)
 
 

@@ -1,7 +1,7 @@
-"""What blocks, towers and clutter slots look like, and the colours of the failure map.
+"""Meshes and colours of blocks, towers and clutter slots.
 
-Colours are the same as in ``web/page/palette.js``. The map of failures runs in one hue from
-light to dark, so that it reads without seeing colours, and none of its shades is a block's.
+Colours are the same as in ``web/page/palette.js``. Failure probabilities have one hue from
+light to dark, readable without colour vision and different from the colours of the blocks.
 """
 
 from functools import lru_cache
@@ -22,17 +22,17 @@ FAILURES: tuple[tuple[float, Rgb], ...] = (
     (0.7, (176, 108, 48)),
     (1.0, (112, 62, 24)),
 )
-"""Colour of a clutter slot by the chance that a grasp in it fails."""
+"""Colour of a clutter slot by its failure probability."""
 TRAY = material((206, 210, 214), roughness=0.6)
 RIM = material((160, 167, 175), metallic=0.3, roughness=0.45)
 PLATE_SIDE = 0.16
 """Side of a tower's base plate [m]."""
 GHOST_GROWTH = 1.02
-"""How much larger a wanted block is drawn than a real one, to be seen around it."""
+"""Factor by which a goal block is drawn larger, to be visible around a real block."""
 
 
 def failure_color(chance: float) -> Rgb:
-    """Return the colour of a clutter slot where a grasp fails with this chance."""
+    """Return the colour of a clutter slot with a failure probability."""
     channels = [
         np.interp(chance, [x for x, _ in FAILURES], [color[k] for _, color in FAILURES])
         for k in range(3)
@@ -45,7 +45,7 @@ def block_body(color: Rgb, half_size: tuple[float, float, float]) -> bytes:
     """Return a block with a steel disc on top for the magnet, as binary glTF.
 
     Args:
-        color: Its colour.
+        color: Colour of the block, 0 to 255.
         half_size: Half of length, width and height [m]; the origin is the centre.
     """
     x, y, z = half_size
@@ -60,7 +60,7 @@ def block_body(color: Rgb, half_size: tuple[float, float, float]) -> bytes:
 
 @lru_cache(maxsize=16)
 def ghost_body(half_size: tuple[float, float, float]) -> trimesh.Trimesh:
-    """Return the surface of a block that is wanted; sizes as in :func:`block_body`."""
+    """Return the surface of a missing goal block; sizes as in :func:`block_body`."""
     x, y, z = half_size
     return _block((GHOST_GROWTH * x, GHOST_GROWTH * y, 0.98 * z))
 
@@ -98,9 +98,9 @@ def tray(points: Vec, height: float, margin: float) -> bytes:
     """Return the plate under all clutter slots as binary glTF.
 
     Args:
-        points: Places of the cells [m], shape (n, 2).
+        points: Positions of the slots [m], shape (n, 2).
         height: Its top over the table [m].
-        margin: From the outermost places to its edges [m].
+        margin: Distance from the outermost slots to its edges [m].
     """
     low, high = points.min(axis=0) - margin, points.max(axis=0) + margin
     size, center = high - low, 0.5 * (low + high)

@@ -1,6 +1,6 @@
-"""A sorting cell in the scene: clutter, towers, blocks, and the move that is carried out.
+"""Scene of a sorting cell: clutter slots, towers, blocks and the current move.
 
-Rings mark where the block is taken from and where it goes; between them runs a dashed arc.
+Rings mark the start and the target of the block; a dashed arc connects them.
 """
 
 from collections.abc import Callable
@@ -26,12 +26,12 @@ RING_M = 0.078
 
 
 class SortingScene:
-    """Draws what is sorted; used by the live cell's thread only.
+    """Draws slots, towers, blocks and move; used by the live cell's thread only.
 
     Args:
-        server: Where to draw.
-        cell: Work cell that sorts.
-        submit: Takes the command of a click on a block.
+        server: Viser server of the scene.
+        cell: Sorting cell.
+        submit: Called with the command of a click on a block.
     """
 
     def __init__(
@@ -68,7 +68,7 @@ class SortingScene:
 
 
 def _ends(view: SortingSnapshot, cell: Cell, floor: float) -> tuple[Vec, Vec, bool] | None:
-    """Return where the block is and where it will stand [m], and whether it is held."""
+    """Return present and final position of the block [m], and whether it is held."""
     if view.move is None or view.phase == "idle":
         return None
     block = next((one for one in view.blocks if one.id == view.move.block), None)
@@ -80,7 +80,7 @@ def _ends(view: SortingSnapshot, cell: Cell, floor: float) -> tuple[Vec, Vec, bo
 
 
 def _place(view: SortingSnapshot, cell: Cell, floor: float) -> Vec:
-    """Return the middle of the free place that the move ends on [m], shape (3,)."""
+    """Return the centre of the free place at which the move ends [m], shape (3,)."""
     assert view.move is not None
     station = cell.station(view.move.place)
     level = sum(one.place == station.id and not one.held for one in view.blocks)

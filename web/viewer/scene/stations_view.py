@@ -1,7 +1,7 @@
-"""Cubes and docks in the scene: each in its own colour, labelled, and clickable.
+"""Cubes and docks in the scene: coloured, labelled, clickable.
 
-A label has rank and value of a candidate. What is no candidate is grey. A ring marks the chosen
-one.
+A label shows rank and value of a candidate. Other stations are grey. A ring marks the selected
+candidate.
 """
 
 import time
@@ -35,7 +35,7 @@ GOALS: tuple[Rgb, ...] = (
 """Colours of the goals, in the cell's order; the same as GOALS in ``web/page/palette.js``."""
 IDLE: Rgb = (196, 202, 210)
 PERIOD_S = 0.25
-"""Time between two drawings of values that change all the time [s]."""
+"""Time between two updates of the values in labels [s]."""
 MARK: Rgb = (11, 127, 119)
 HIT: Rgb = (214, 52, 46)
 
@@ -44,9 +44,9 @@ class StationsView:
     """Draws the stations of one cell; used by the live cell's thread only.
 
     Args:
-        server: Where to draw.
-        cell: Says what stands where.
-        submit: Takes the command of a click.
+        server: Viser server of the scene.
+        cell: Work cell with the stations.
+        submit: Called with the command of a click.
     """
 
     def __init__(
@@ -111,7 +111,7 @@ class StationsView:
         return marker
 
     def draw(self, snapshot: WorldSnapshot) -> None:
-        """Show what the critic says; at once who is chosen, a few times a second how sure."""
+        """Show the selected candidate at once, and ranks and values every ``PERIOD_S``."""
         key = (snapshot.chosen, tuple(c.id for c in snapshot.candidates))
         if key == self._key and time.monotonic() < self._next:
             return

@@ -1,4 +1,4 @@
-"""Towers in the scene: their base plates, and what they shall be as translucent blocks."""
+"""Towers in the scene: base plates, and missing goal blocks as translucent blocks."""
 
 import numpy as np
 import viser
@@ -9,15 +9,15 @@ from web.viewer.scene.clutter_view import tray_height
 from web.viewer.scene.sorting_bodies import BLOCKS, ghost_body, tower_plate
 
 Kind = tuple[str, tuple[float, ...], tuple[float, ...]]
-"""Colour, half sizes and centre of a wanted block."""
+"""Colour, half sizes [m] and centre [m] of a missing goal block."""
 
 
 class TowersView:
     """Draws the towers of one cell; used by the live cell's thread only.
 
     Args:
-        server: Where to draw.
-        cell: Says where they are.
+        server: Viser server of the scene.
+        cell: Work cell with the towers.
     """
 
     def __init__(self, server: viser.ViserServer, cell: Cell) -> None:
@@ -33,7 +33,7 @@ class TowersView:
         self._ghosts: dict[tuple[str, int], tuple[Kind, viser.MeshHandle]] = {}
 
     def draw(self, goal: tuple[GoalBlockSnapshot, ...]) -> None:
-        """Show what is wanted and not there yet."""
+        """Show the blocks of the goal that are not in place."""
         wanted = {(one.tower, one.level): one for one in goal if not one.done}
         for place in self._ghosts.keys() - wanted.keys():
             self._ghosts.pop(place)[1].remove()

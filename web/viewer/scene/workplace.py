@@ -1,4 +1,4 @@
-"""What stands still in the scene: floor, table, light, background and the first camera."""
+"""Static parts of the scene: floor, table, light, background, initial camera."""
 
 import math
 
@@ -59,7 +59,7 @@ def table_body(cell: Cell) -> bytes:
 
 
 def table_trim(cell: Cell) -> bytes:
-    """Return what is too thin to cast a shadow, as binary glTF: edge band, robot plate."""
+    """Return edge band and robot plate, too thin to cast a shadow, as binary glTF."""
     t = cell.table
     width, depth = t.x_max - t.x_min, t.y_max - t.y_min
     center = (0.5 * (t.x_min + t.x_max), 0.5 * (t.y_min + t.y_max), -0.5 * t.thickness - 0.003)
@@ -101,7 +101,7 @@ def _floor(server: viser.ViserServer, cell: Cell) -> None:
 
 
 def _light(server: viser.ViserServer) -> None:
-    """Light without an environment map: the viewer hides the scene until one is decoded."""
+    """Add lights but no environment map: the viewer hides the scene until one is decoded."""
     scene = server.scene
     scene.configure_environment_map(None)
     scene.configure_default_lights(enabled=True, cast_shadow=True)
@@ -114,7 +114,7 @@ def _light(server: viser.ViserServer) -> None:
 
 
 def _camera(server: viser.ViserServer, cell: Cell) -> None:
-    """Look at the people's hands; at blocks from nearer, at walkers from farther off."""
+    """Set the initial camera: nearer for blocks, farther for pedestrians."""
     camera = server.initial_camera
     if cell.stations_of("clutter"):
         camera.position, camera.look_at = (2.14, -0.88, 1.58), (-0.02, 0.58, 0.1)
