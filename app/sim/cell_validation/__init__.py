@@ -1,10 +1,8 @@
 """Reading and checking work cells.
 
-checks        Everything that can be wrong with a work cell whose fields have the right types
+checks        Validation of a work cell whose fields have the right types
 places        Support of stations and people: the table, an obstacle or the floor
-reachability  Whether the robot reaches a point of its cell, in a posture that touches nothing
-reader        Reading a work cell that anybody may have written: bytes in, a cell or all its
-              faults out
-units         Numbers of a work cell against the values they may have, with a guess at the unit
-              meant
+reachability  Reachability of points of a cell by collision-free configurations
+reader        Reader of work cells from untrusted bytes
+units         Bounds of the numbers of a work cell, with a guess of the unit
 """

@@ -26,7 +26,7 @@ MIN_SPACING = 0.05
 MAX_OVERLAP = 0.01
 """Obstacles may share this much [m], so that boxes can be put together."""
 MAX_MISSED = 12
-"""The search for postures ends after so many grid targets without one: it is slow in vain."""
+"""Number of grid targets without a configuration after which the search ends: it is slow."""
 FIELDS_OF_KIND = {
     "cube": (),
     "dock": (),
@@ -224,7 +224,7 @@ def _home_contacts(cell: Cell, found: list[ContactPair]) -> Iterator[Fault]:
             yield Fault(
                 place=f"obstacles.{box.id}.center",
                 value=shown(box.center),
-                rule="must keep clear of the robot at its home posture",
+                rule="must not touch the robot in its home configuration",
                 hint=touching[0],
             )
     own = [one.text for one in found if one.kind != "obstacle"]
@@ -232,7 +232,7 @@ def _home_contacts(cell: Cell, found: list[ContactPair]) -> Iterator[Fault]:
         yield Fault(
             place="robot.home_q",
             value=shown(cell.robot.home_q),
-            rule="must be a posture that touches nothing",
+            rule="must be a collision-free configuration",
             hint=own[0],
         )
 
@@ -259,7 +259,7 @@ def _station_reach(reach: Reach, station: Station) -> Iterator[Fault]:
 def _region_reach(reach: Reach, region: GoalRegion) -> Iterator[Fault]:
     targets, missed = region.targets(), []
     for target in targets:
-        found = reach.any_posture(target)
+        found = reach.any_configuration(target)
         if found.q is None:
             missed.append((target, found.reason))
         if len(missed) == MAX_MISSED:

@@ -32,7 +32,7 @@ DAMPING, LONGEST_STEP = 0.05, 0.4
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ContactPair:
-    """Two things that touch."""
+    """Contact of a robot capsule with another body."""
 
     link: str
     """Capsule of the robot."""
@@ -56,13 +56,13 @@ class ReachResult:
     """Result of an attempt to reach a point."""
 
     q: Vec | None
-    """Joint positions [rad], shape (6,); None where no posture does it."""
+    """Joint positions [rad], shape (6,); None if no configuration was found."""
     reason: str = ""
-    """Reason why none does."""
+    """Reason, if none was found."""
 
 
 class Reach:
-    """The robot of one cell, looking for postures; not thread-safe.
+    """Search for configurations of the robot in one cell; not thread-safe.
 
     Args:
         cell: A cell whose robot and obstacles have no faults.
@@ -112,11 +112,11 @@ class Reach:
         far = float(np.hypot(point[0], point[1]))
         loose = np.full(6, 2.0 * np.pi)
         if self._robot.ik_vertical(point, -loose, loose) is not None:
-            return "the posture it takes is outside the joint limits"
+            return "its configuration is outside the joint limits"
         side = "too far from" if far > 0.6 else "too near to"
         return f"it lies {far:.2f} m from the robot's base, {side} it at that height"
 
-    def any_posture(self, point: Vec) -> ReachResult:
+    def any_configuration(self, point: Vec) -> ReachResult:
         """Find any configuration with the tcp at ``point`` [m], shape (3,)."""
         if np.linalg.norm(point - SHOULDER) > self._longest:
             return ReachResult(q=None, reason="it is farther than the arm is long")
@@ -125,7 +125,7 @@ class Reach:
             return down
         rng = np.random.default_rng(0)
         starts = [self._home, *rng.uniform(self._q_min, self._q_max, (N_STARTS, 6))]
-        reason = "no posture inside the joint limits was found"
+        reason = "no configuration inside the joint limits was found"
         for start in starts:
             q = self._solve(point, start)
             if q is None:
@@ -133,7 +133,7 @@ class Reach:
             found = next(self.contacts(q), None)
             if found is None:
                 return ReachResult(q=q)
-            reason = f"in every posture found it touches something: {found.text}"
+            reason = f"every configuration found is in contact: {found.text}"
         return ReachResult(q=None, reason=reason)
 
     def _solve(self, point: Vec, start: Vec) -> Vec | None:

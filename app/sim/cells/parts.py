@@ -168,10 +168,10 @@ class GoalRegion(CellData):
 
 
 class RobotMount(CellData):
-    """The robot in this cell: home posture, limits and tool. Its base is the frame."""
+    """The robot in this cell: home configuration, limits and tool. Its base is the frame."""
 
     model: Literal["ur10"] = Field(default="ur10", description="robot model")
-    home_q: Angles = Field(description="home posture, base to wrist 3 [rad]")
+    home_q: Angles = Field(description="home configuration, base to wrist 3 [rad]")
     q_min: Angles = Field(description="lower joint limits [rad]")
     q_max: Angles = Field(description="upper joint limits [rad]")
     qd_max: Annotated[

@@ -50,7 +50,7 @@ OUTCOMES = (
 """``solved``: a free path to a goal. ``approximate``: a free path that ends short of all goals.
 ``out-of-time``: no path within the budget. ``start-in-contact``, ``goal-in-contact``: the
 start, or every goal, is nearer to something than the margin. ``start-outside-limits``: of the
-joints. ``no-goal``: no posture was given, or none within the limits."""
+joints. ``no-goal``: no goal was given, or none is within the limits."""
 
 SAME = 1e-6
 """Difference below which two lengths, or two positions of a joint, are one [rad]."""
@@ -90,7 +90,7 @@ class MotionPlan:
     planner: str
     """Name of the planner."""
     path: Vec
-    """Postures joined by straight motions [rad], shape (n, 6); n = 0 without a path."""
+    """Configurations joined by straight motions [rad], shape (n, 6); n = 0 without a path."""
     goal: int
     """Index of the reached goal; -1 where none is reached."""
     planning_s: float
@@ -115,10 +115,10 @@ def plan(
     """Plan from one configuration to any of several.
 
     Args:
-        checker: People, margins and the robot; people stand still while it plans.
+        checker: People, margins and the robot; people are at rest during planning.
         start: Joint positions [rad], shape (6,).
-        goals: Joint positions to reach one of [rad], shape (k, 6); of the joints that stay, the
-            start's values count.
+        goals: Goal configurations, of which one is to be reached [rad], shape (k, 6); joints
+            that do not move are set to the value of the start.
         settings: Settings of the planner.
         seed: Seed, at least 1.
 

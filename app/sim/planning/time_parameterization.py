@@ -115,14 +115,14 @@ def time_path(
     """Time a path within limits, from a state in motion or at rest to rest.
 
     Args:
-        path: Postures joined by straight motions [rad], shape (n, 6), n >= 1. For a start in
-            motion the first one is :func:`stopping_point`.
+        path: Configurations joined by straight motions [rad], shape (n, 6), n >= 1. For a
+            start in motion the first one is :func:`stopping_point`.
         qd0: Joint speeds at the start [rad/s], shape (6,), inside the limits; at rest if None.
         stops: Corners (places in ``path``) to stop at; 0 means to brake before anything else,
             as it also does where turning at once would take longer.
 
     Raises:
-        InvalidInput: The path has no posture, or a number is NaN or infinite.
+        InvalidInput: The path is empty, or a number is NaN or infinite.
     """
     path = np.array(path, dtype=np.float64)
     if path.ndim != 2 or path.shape[1:] != (6,) or len(path) == 0:

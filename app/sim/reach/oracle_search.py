@@ -46,7 +46,7 @@ LONGEST_WAIT = 4.0
 SIGMAS = (0.0, 0.1, 0.3)
 """Standard deviations of the noise on a policy's actions."""
 CORRELATION = 0.9
-"""Correlation of the noise between control cycles."""
+"""Correlation of the noise between control periods."""
 
 Index = NDArray[np.int64]
 Acts = Callable[[ReachBatch], NDArray[np.float32]]
@@ -196,9 +196,9 @@ class OracleSearch:
         return [every[k : k + n] for k in range(0, len(every), n)]
 
     def _at_goal(self, rows: Index) -> Vec:
-        """Draw a posture at the goal of each replay [rad], shape (k, 6)."""
-        postures = [self._configurations[self._which[row]] for row in rows]
-        return np.stack([each[self._rng.integers(len(each))] for each in postures])
+        """Draw a configuration at the goal of each resimulation [rad], shape (k, 6)."""
+        choices = [self._configurations[self._which[row]] for row in rows]
+        return np.stack([each[self._rng.integers(len(each))] for each in choices])
 
     def _simulate(
         self,
@@ -239,7 +239,7 @@ def future_cylinders(batch: ReachBatch, n_periods: int) -> Vec:
 
     Args:
         batch: Environments at the start of their episodes; simulated to the end.
-        n_periods: Number of control cycles.
+        n_periods: Number of control periods.
     """
     still = np.zeros((batch.n_envs, 6), dtype=np.float32)
     found = [batch.state.people.cylinders.copy()]
@@ -255,7 +255,7 @@ def presumably_unsolvable(
 ) -> NDArray[np.bool_]:
     """Return which episodes presumably cannot be solved, shape (n,).
 
-    Either a person covers every position of success in every control cycle in which the tool
+    Either a person covers every position of success in every control period in which the tool
     could be there, or a person touches the fixed base before the earliest possible arrival.
 
     Args:

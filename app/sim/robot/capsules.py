@@ -89,9 +89,10 @@ SELF_PAIRS = (
 )
 """Capsules that can touch although their links are not neighbours.
 
-All other pairs of non-adjacent links stay apart in every posture of the cells' joint ranges
-(least clearance by search 4 mm), but for base and upper arm, whose capsules overlap where the
-meshes never meet, and wrist_2 and the tool, which are bolted together through wrist_3.
+All other pairs of non-adjacent links have a clearance in every configuration within the cells'
+joint ranges (at least 4 mm, by search). Two pairs are excluded: base and upper arm, whose
+capsules overlap although the meshes do not, and wrist_2 and the tool, which only wrist_3
+separates.
 """
 
 
@@ -104,7 +105,7 @@ def self_pairs(capsules: RobotCapsules) -> Index:
 
 LEVERS = (1.4432, 1.4319, 0.8199, 0.2476, 0.2123, 0.0469)
 """Greatest distance of any point of the capsules from each joint's axis [m], with a tool of
-0.12 m and radius 0.04 m; found by search over all postures, rounded up."""
+0.12 m and radius 0.04 m; found by search over all configurations, rounded up."""
 
 
 def levers(tool_length: float = 0.12, tool_radius: float = 0.04) -> Vec:

@@ -70,7 +70,7 @@ def test_cell_that_passes_can_be_sorted_in(chance: float) -> None:
         (station(kind="clutter"), "stations.cube0.failure_probability", "is missing"),
         (station(id="cube1"), "stations.cube1.id", "given once, not 2 times"),
         (robot(home_q=[0, -2.3, -3.0, 0, 0, 0]), "robot.home_q[2]", "limits (-2.8, 2.8)"),
-        (robot(home_q=[1, -0.1, 0.3, 0, -1.57, 0]), "robot.home_q", "touches nothing"),
+        (robot(home_q=[1, -0.1, 0.3, 0, -1.57, 0]), "robot.home_q", "collision-free"),
         (robot(q_max=[3.1, -3.4, 2.8, 6.2, 6.2, 6.2]), "robot.q_min[1]", "q_max[1] = -3.4"),
         (robot(qd_max=[2.2, 1, 1, 1, 1, 1]), "robot.qd_max[0]", "[0.01, 2.16] rad/s"),
         (robot(q_max=[180, 0.2, 2.8, 6.2, 6.2, 6.2]), "robot.q_max[0]", "degrees"),
@@ -86,7 +86,7 @@ def test_cell_that_passes_can_be_sorted_in(chance: float) -> None:
         (
             obstacle(box([0.0, 0.0, 0.2], [0.1, 0.1, 0.2])),
             "obstacles.box.center",
-            "clear of the robot at its home posture",
+            "touch the robot in its home configuration",
         ),
         (
             obstacle(box([-0.5, 0.7, 0.1], [0.08, 0.08, 0.1])),

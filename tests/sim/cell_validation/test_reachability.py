@@ -30,22 +30,22 @@ def test_contact_of_the_meshes_is_contact_of_the_capsules(cell: Cell) -> None:
     assert kinds == {"self", "table", "obstacle"}
 
 
-def test_posture_found_reaches_its_point_inside_the_limits(cell: Cell) -> None:
+def test_configuration_found_reaches_its_point_inside_the_limits(cell: Cell) -> None:
     reach, robot = Reach(cell), Robot(cell.robot.tool_length)
     assert cell.goal_region is not None
     for point in cell.goal_region.targets()[::7]:
-        q = reach.any_posture(point).q
+        q = reach.any_configuration(point).q
         assert q is not None
         np.testing.assert_allclose(robot.tcp_pose(q)[:3, 3], point, atol=1e-3)
         assert (q >= cell.robot.q_min).all() and (q <= cell.robot.q_max).all()
         assert list(reach.contacts(q)) == []
 
 
-def test_tilted_posture_is_found_where_no_vertical_one_exists(cell: Cell) -> None:
+def test_tilted_configuration_is_found_where_no_vertical_one_exists(cell: Cell) -> None:
     point = np.array([0.0, 0.9, 0.85])
     reach = Reach(cell)
     assert reach.tool_down(point).q is None
-    assert reach.any_posture(point).q is not None
+    assert reach.any_configuration(point).q is not None
 
 
 @pytest.mark.parametrize(
@@ -65,12 +65,12 @@ def test_point_out_of_reach_says_why(
 
 
 def test_point_farther_than_the_arm_is_refused_at_once(cell: Cell) -> None:
-    assert "farther" in Reach(cell).any_posture(np.array([0.0, 2.0, 0.1])).reason
+    assert "farther" in Reach(cell).any_configuration(np.array([0.0, 2.0, 0.1])).reason
 
 
 def test_point_inside_an_obstacle_is_out_of_reach(cell: Cell) -> None:
     around = cell.model_copy(update={"obstacles": (box((0.1, 0.8, 0.3)),)})
-    found = Reach(around).any_posture(np.array([0.1, 0.8, 0.3]))
+    found = Reach(around).any_configuration(np.array([0.1, 0.8, 0.3]))
     assert found.q is None
     assert "touches the obstacle box" in found.reason
 
