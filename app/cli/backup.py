@@ -26,7 +26,7 @@ def backup(file: File, as_json: Json = False) -> None:
         found = write_backup(store, settings.data, file)
     finally:
         store.close()
-    print_result(f"{_text(found)}\nis written to {file}", _data(found), as_json=as_json)
+    print_result(f"{_text(found)}\nwritten to {file}", _data(found), as_json=as_json)
 
 
 def restore(file: File, as_json: Json = False) -> None:
@@ -41,9 +41,9 @@ def restore(file: File, as_json: Json = False) -> None:
         found, kept = restore_backup(store, settings.data, file)
     finally:
         store.close()
-    text = f"{_text(found)}\nis restored to {store.shown_url}"
+    text = f"{_text(found)}\nrestored to {store.shown_url}"
     if kept is not None:
-        text += f"\nthe database that was there is kept as {kept}"
+        text += f"\nprevious database kept as {kept}"
     data = {**_data(found), "kept": None if kept is None else str(kept)}
     print_result(text, data, as_json=as_json)
 

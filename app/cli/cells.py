@@ -54,9 +54,9 @@ def show(name: Name, as_json: Json = False) -> None:
 
 @app.command()
 def check(file: File, as_json: Json = False) -> None:
-    """Check a file; every fault is printed on a line."""
+    """Check a file; print one line per fault."""
     prepared_settings()
-    _print_description(_read(file, as_json), "is a sound work cell", as_json)
+    _print_description(_read(file, as_json), "is a valid work cell", as_json)
 
 
 @app.command()

@@ -21,7 +21,7 @@ app = typer.Typer(help="Import, list, show or remove recorded human motion.")
 Name = Annotated[str, typer.Argument(show_default=False)]
 NOUN = "stored recording"
 MAX_LINES = 12
-"""Longest list of artifacts, and of runs, that is printed as text; JSON has all."""
+"""Longest list of artefacts, and of runs, that is printed as text; JSON has all."""
 
 
 @app.command("import")
@@ -53,7 +53,7 @@ def import_recording(
             with opened(settings, NOUN, create=True) as store:
                 record, new = RecordingCatalog(store).add(content, file.name, name, options)
             data = {**_data(record), "new": new}
-            stored = "is stored" if new else "was stored already"
+            stored = "stored" if new else "already stored"
             text = f"{_description(data)}\n{stored} as {record.name}"
         else:
             found = read_motion(content, file.name, options)
@@ -81,7 +81,7 @@ def list_recordings(as_json: Json = False) -> None:
         with opened(settings, NOUN) as store:
             found = RecordingCatalog(store).all()
     lines = [
-        f"{one.name:24} {one.duration:8.2f} s, {one.n_runs} clean runs, wrists p99 "
+        f"{one.name:24} {one.duration:8.2f} s, clean runs: {one.n_runs}, wrists p99 "
         f"{one.summary['error_mm']['wrists']['p99']:.2f} mm"
         for one in found
     ]
@@ -91,7 +91,7 @@ def list_recordings(as_json: Json = False) -> None:
 
 @app.command()
 def show(name: Name, as_json: Json = False) -> None:
-    """Print what is known of a stored recording."""
+    """Print the content, errors and clean runs of a stored recording."""
     settings = prepared_settings()
     from app.cli.database import opened
     from jobs.recording_catalog import RecordingCatalog
@@ -175,11 +175,11 @@ def _description(found: Mapping[str, Any]) -> str:
         _row("wrists", error["wrists"]),
         _row("elbows", error["elbows"]),
         _row("pelvis", error["pelvis"]),
-        _row("wrists, pelvis at one height", error["wrists_at_fixed_height"]),
-        _row("wrists of the simulator's body", error["fixed_body"]),
-        f"{found['n_artifacts']} artifacts",
+        _row("wrists, constant pelvis height", error["wrists_at_fixed_height"]),
+        _row("wrists, simulator's body", error["fixed_body"]),
+        f"artefacts: {found['n_artifacts']}",
         *_first_lines([_artifact(one) for one in found["artifacts"]]),
-        f"{len(found['clean_runs'])} clean runs, {found['clean_frames']} frames",
+        f"clean runs: {len(found['clean_runs'])}, {found['clean_frames']} frames",
         *_first_lines([_run(one) for one in found["clean_runs"]]),
     ]
     for name, beyond in found["beyond_limits"].items():

@@ -24,7 +24,7 @@ def test_import_tells_frames_error_and_runs(
     assert main(["recordings", "import", str(clip)]) == 0
     printed = capsys.readouterr().out
     assert "someone: 200 frames, 3.98 s, bvh in mm" in printed
-    assert "0 artifacts" in printed
+    assert "artefacts: 0" in printed
     assert "frames 0 to 199: 3.98 s" in printed
 
 
@@ -62,11 +62,11 @@ def test_kept_recording_is_listed_shown_and_removed(
     assert "no recording is stored" in capsys.readouterr().out
     assert main(["recordings", "import", str(clip), "--keep"]) == 0
     printed = capsys.readouterr().out
-    assert printed.endswith("is stored as someone\n")
+    assert printed.endswith("\nstored as someone\n")
     assert main(["recordings", "import", str(clip), "--keep", "--json"]) == 0
     assert not json.loads(capsys.readouterr().out)["new"]
     assert main(["recordings", "list"]) == 0
-    assert "1 clean runs, wrists p99 0.0" in capsys.readouterr().out
+    assert "clean runs: 1, wrists p99 0.0" in capsys.readouterr().out
     assert main(["recordings", "show", "someone"]) == 0
     assert printed.startswith(capsys.readouterr().out.strip())
     assert main(["recordings", "remove", "someone"]) == 0
