@@ -1,7 +1,8 @@
-"""Tandem: a robot arm and a person share a work cell; learned policies choose and move.
+"""Task selection and motion of a robot arm beside people, by reinforcement learning.
 
-Matrix products for decisions run in one thread, and with the instructions the processor has:
-OpenBLAS takes newer AMD processors for older ones. Both must be set before numpy is imported.
+Importing the package sets two variables of OpenBLAS, before numpy is imported: matrix products
+of decisions use one thread, and the instruction set of the processor, which OpenBLAS detects
+wrongly on newer AMD processors.
 """
 
 import os

@@ -5,8 +5,7 @@ augmentation            Variation of the elbow along the same palm path, an augm
 check_vocabulary        Find words that the glossary replaces, and class names that occur twice
 demonstrations          Synthetic demonstrations: reaches of a person between two places of
                         a cell
-distance_fields         Smooth surfaces from a handful of round cones: how the person is
-                        modelled
+distance_fields         Smooth surfaces from round cones, for the model of the person
 fit_capsules            Fit capsules that contain the UR10's collision meshes; run ``python -m
                         tools.fit_capsules``
 generate_client         Writes ``app/client/operations/`` from the OpenAPI document

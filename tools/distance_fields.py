@@ -1,4 +1,4 @@
-"""Smooth surfaces from a handful of round cones: how the person is modelled.
+"""Smooth surfaces from round cones, for the model of the person.
 
 A body part is the smooth union of round cones (capsules with two radii, optionally flattened),
 sampled as a distance field on a grid and meshed by marching cubes. Each cone is evaluated only

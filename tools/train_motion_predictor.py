@@ -65,9 +65,9 @@ N_UPDATES = 40_000
 BATCH = 1024
 LR = 2e-3
 MOST_PERIODS = 250
-"""Latest moment [control cycles]."""
+"""Latest moment [control periods]."""
 DT = 0.02
-"""Control cycle [s]."""
+"""Control period [s]."""
 CONSTANT_SHARE, SHORT_SHARE, NOISY_SHARE = 0.1, 0.1, 0.2
 MOST_NOISE = 0.02
 """Largest standard deviation of the noise of radii [m]; five times that for speeds [m/s]."""
@@ -103,7 +103,7 @@ def _watch(
     stream: NDArray[np.uint64],
     out: Moments,
 ) -> None:
-    """Fill ``out`` with pedestrians of given kinds after given numbers of control cycles."""
+    """Fill ``out`` with pedestrians of given kinds after given numbers of control periods."""
     rows = state.rows
     for n in range(kinds.shape[0]):
         p = kinds[n]

@@ -36,7 +36,7 @@ SEED = 6
 WIDTH = 128
 """Units of each hidden layer."""
 N_PEOPLE, N_STEPS = 512, 600
-"""People who are observed side by side, and for how long [control cycles]."""
+"""People who are observed side by side, and for how long [control periods]."""
 N_UPDATES, BATCH, LR = 15_000, 1024, 2e-3
 HUBER = 0.2
 """Change of a joint from which its error counts linearly [m, rad]."""
@@ -58,7 +58,7 @@ class PostureMoments(NamedTuple):
 
 
 def watched(settings: PickSettings, n_people: int, n_steps: int, seed: int) -> PostureMoments:
-    """Return the motion of people, observed at every control cycle."""
+    """Return the motion of people, observed at every control period."""
     batch = PickBatch(load_cell(PickPreset().cell), n_people, seed, settings)
     batch.reset()
     people, rest = batch.state.people, np.zeros((n_people, batch.n_act), dtype=np.float32)

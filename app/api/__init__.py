@@ -28,6 +28,6 @@ world_policies    Policies and recordings that commands to a live world name
 motion/           Motion decisions: answers of the route, and sockets for loops with a
                   deadline
 routes/           One router per resource
-schemas/          What goes over the wire: one pydantic model per direction, units in the
+schemas/          Bodies of requests and answers: one pydantic model per direction, units in
                   descriptions
 """

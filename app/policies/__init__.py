@@ -1,4 +1,4 @@
-"""Learning and deciding: torch and Stable-Baselines3. Knows sim; nothing of web, api, store.
+"""Policies: training, inference and evaluation. Imports ``app.sim``, not web, api or store.
 
 algorithms/   TD3 and DQN on Stable-Baselines3
 checkpoints/  Checkpoint files and what they state

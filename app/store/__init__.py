@@ -1,4 +1,4 @@
-"""The database: jobs, curves, events, checkpoints. The only SQL of the project lives here.
+"""The database: jobs, curves, events, checkpoints; the only package with SQL.
 
 engine       The connection to the database: SQLite by default, PostgreSQL by URL
 database/    The database as a whole: tables, their version, lease, lock, backups

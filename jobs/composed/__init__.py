@@ -1,4 +1,4 @@
-"""Jobs made of jobs: the supervisor advances them, their parts run like any other job.
+"""Jobs that consist of other jobs; the supervisor advances them, their parts run as jobs.
 
 composer   Base class: advances the open jobs of one kind, at most once in a period
 reports    Reports: their evaluations as jobs, and their pages

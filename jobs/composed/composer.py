@@ -1,4 +1,4 @@
-"""Base class of what advances jobs that are made of jobs."""
+"""Base class: advances the open jobs of one kind, at most once in a period."""
 
 import logging
 import time

@@ -10,12 +10,12 @@ job_actions     Actions on jobs: cancel, resume, retry, clone, label, delete
 jobs            Training and evaluation as jobs: post, list, follow
 metrics         Metrics for Prometheus
 presets         Presets of training jobs, with the limits of every field
-protocols       Protocols of evaluations, with what each takes
+protocols       Protocols of evaluations, with the inputs of each
 recordings      Recordings of human motion: import a file, list, show, remove
 reference       ``/docs``: the API description as one static page without external scripts
 results         Results of jobs: evaluations; comparison of fields and curves, CSV
 session         Sign-in of a browser: exchanges the token for a session cookie
 trackers        Trackers of key-points, updated frame by frame
 viewer          Proxy for the 3D viewer of a world, on the service's port
-worlds          Live worlds: their state, their stream, and what may be done to them
+worlds          Live worlds: state, stream and commands
 """

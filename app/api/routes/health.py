@@ -1,6 +1,6 @@
 """Liveness and readiness, for monitors.
 
-Both routes are open; without the token they tell nothing else.
+Both routes need no token; without it they answer the status only.
 """
 
 from typing import Literal
@@ -56,7 +56,7 @@ async def ready(request: Request, services: ServicesDep) -> ReadinessPublic:
     """Answer 200 once the kernels are compiled, a 503 problem until then.
 
     With the token, the problem contains the present activity. ``degraded`` names damaged
-    checkpoints (all others can be used), and says why the queue of jobs waits.
+    checkpoints (all others can be used) and gives the reason if the queue of jobs waits.
     """
     if not _is_trusted(request, services):
         return ReadinessPublic(status="ready")

@@ -1,4 +1,4 @@
-"""Protocols of evaluations, with what each takes."""
+"""Protocols of evaluations, with the inputs of each."""
 
 from fastapi import APIRouter
 

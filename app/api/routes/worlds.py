@@ -1,4 +1,4 @@
-"""Live worlds: their state, their stream, and what may be done to them."""
+"""Live worlds: state, stream and commands."""
 
 import asyncio
 from collections.abc import AsyncIterator

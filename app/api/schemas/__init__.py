@@ -1,4 +1,4 @@
-"""What goes over the wire: one pydantic model per direction, units in the descriptions.
+"""Bodies of requests and answers: one pydantic model per direction, units in descriptions.
 
 cells           Work cells as they are shown and posted
 checkpoints     Checkpoints as they are shown

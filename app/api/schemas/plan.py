@@ -178,9 +178,9 @@ class PlanAnswer(Answer):
         description="target of the tool in the present motion [m]; null when solved"
     )
     segment: SegmentPublic | None = Field(
-        description="trajectory of the first control cycle; null when solved"
+        description="trajectory of the first control period; null when solved"
     )
-    dt: float = Field(description="control cycle [s]")
+    dt: float = Field(description="control period [s]")
     because: str = Field(description="the reason as a sentence")
     moves: list[PlannedMove] = Field(
         description="reachable moves within the margin, the planner's own first"

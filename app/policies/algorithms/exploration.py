@@ -2,7 +2,7 @@
 
 The scale of the AR(1) noise grows from 0 in the first, greedy environments to ``sigma_max`` in
 the last. In half of the noisy environments a random *option* takes over from time to time, for
-4 to 29 control cycles: hold still, move home, move to a configuration nearby or to that of
+4 to 29 control periods: hold still, move home, move to a configuration nearby or to that of
 another task; in picks, half of the time, move straight to the target. Options reach states near
 people that the policy alone would not visit, and leave states in which it hesitates.
 
@@ -28,7 +28,7 @@ HOLD, HOME, NEARBY, ELSEWHERE = range(4)
 STRAIGHT_ON = 0.5
 """Share of the options that move straight to the target, as the base motion does."""
 OPTION_STEPS = (4, 30)
-"""Shortest duration of an option and end of the range [control cycles]."""
+"""Shortest duration of an option and end of the range [control periods]."""
 
 
 class Exploration(Protocol):
@@ -52,7 +52,7 @@ class PerEnvAR1Noise(Stateful):
 
     Args:
         shape: Environments and numbers of an action, (n_envs, n_act).
-        dt: Control cycle [s].
+        dt: Control period [s].
         config: Largest scale, correlation time and greedy share.
     """
 
@@ -120,7 +120,7 @@ class OptionExploration(Stateful):
 
     Args:
         configurations: Goals of options besides home [rad], shape (n, 6).
-        rate: Probability per control cycle that an option starts.
+        rate: Probability per control period that an option starts.
     """
 
     STATE = ("_noise", "_rng", "_left", "_goal")

@@ -1,4 +1,4 @@
-"""Checkpoint files and what they state.
+"""Checkpoint files: format, upload, training cell and training range.
 
 checkpoint      Checkpoint format: tensors as safetensors, everything else as a JSON manifest
 files           Checkpoints as files: a reader gets tensors and manifest of one checkpoint

@@ -208,7 +208,7 @@ class PickReward(FieldGroup):
     c_c_end: float = number(
         10.0, 0.0, 100.0, "", "Final collision cost: c_c grows to it linearly"
     )
-    c_step: float = number(0.02, 0.0, 1.0, "", "Time cost c_step: per control cycle")
+    c_step: float = number(0.02, 0.0, 1.0, "", "Time cost c_step: per control period")
     c_v: float = number(0.0, 0.0, 10.0, "s/m", "Speed cost c_v: TCP speed near the target")
     d_v: float = number(0.1, 0.0, 1.0, "m", "Range d_v of the speed cost")
     c_s: float = number(4.0, 0.0, 100.0, "", "Success bonus c_s")

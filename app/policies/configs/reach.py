@@ -83,7 +83,7 @@ class ReachExploration(NoiseExploration):
     )
     ou_theta: float = number(0.3, 0.0, 1.0, "", "Ornstein-Uhlenbeck rate θ")
     ou_sigma: float = number(0.15, 0.0, 2.0, "", "Ornstein-Uhlenbeck scale σ")
-    ou_dt: float = number(0.01, 1e-4, 1.0, "", "Ornstein-Uhlenbeck time step per control cycle")
+    ou_dt: float = number(0.01, 1e-4, 1.0, "", "Ornstein-Uhlenbeck step per control period")
 
 
 class ReachEpisode(FieldGroup):
@@ -126,7 +126,7 @@ class ReachReward(FieldGroup):
     c_d: float = number(0.0, 0.0, 10.0, "1/m", "Distance cost c_d")
     c_p: float = number(1.0, 0.0, 10.0, "1/m", "Progress reward weight c_p")
     c_a: float = number(0.0, 0.0, 10.0, "s²/rad", "Acceleration cost c_a")
-    c_step: float = number(0.003, 0.0, 1.0, "", "Time cost c_step: per control cycle")
+    c_step: float = number(0.003, 0.0, 1.0, "", "Time cost c_step: per control period")
     c_c: float = number(4.0, 0.0, 100.0, "", "Collision cost c_c")
     c_s: float = number(4.0, 0.0, 100.0, "", "Success bonus c_s")
     c_u: float = number(
@@ -136,7 +136,7 @@ class ReachReward(FieldGroup):
         "added", "Success bonus: added to the other terms, or alone; collision = blocks"
     )
     c_o: float = number(
-        0.0, 0.0, 10.0, "", "Stop cost c_o: per control cycle stopped by the safety layer"
+        0.0, 0.0, 10.0, "", "Stop cost c_o: per control period stopped by the safety layer"
     )
 
 

@@ -108,7 +108,7 @@ class SortingPlan:
     checkpoint: str
     """SHA-256 of the pick policy."""
     dt: float
-    """Control cycle [s]."""
+    """Control period [s]."""
     elapsed_ms: float
     """Duration of the choice [ms]."""
     symbol: Symbol | None = None
@@ -120,7 +120,7 @@ class SortingPlan:
     decision: Decision | None = None
     """Decision of the policy about the present motion; None at the goal."""
     segment: TrajectorySegment | None = None
-    """Trajectory segment of the first control cycle; None at the goal."""
+    """Trajectory segment of the first control period; None at the goal."""
 
     @property
     def chosen(self) -> PlanOption | None:

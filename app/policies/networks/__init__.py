@@ -6,7 +6,7 @@ candidate_values
 ddpg          Networks of DDPG as Stable-Baselines 2 makes them, for the recipes of the thesis
 forward       Forward passes of small networks for decisions, without torch
 large_pages   Arrays in large memory pages
-one_hot       A linear layer over one-hot codes, without the zeros: compiled, with its gradient
+one_hot       Sparse linear layer over one-hot codes, compiled, with its gradient
 outcome       Probabilities of the outcomes of a pick, and its expected time
 pick          Networks of the pick scenario, and the layout of their observations
 quantiles     Truncated quantile critics: distributional critics without the highest quantiles

@@ -7,15 +7,12 @@ memory_files  Replay memory on disk: files of transitions named by their SHA-256
               incrementally
 outcome       Fit of outcome probabilities to episodes of the finished policy
 pick          Training on the pick scenario: settings, networks, exploration and learning curve
-progress      What a training tells while it runs, and how it ended
+progress      Points of the learning curve of a training, and its result
 reach         Training on the reach scenario: settings, networks, exploration and learning curve
 reporter      Reports between two steps of a training: learning curve, checkpoints, stop
-run           One attempt at a training: its counters, checkpoints and states, whatever is
-              trained
-sorting       Training on the sorting task: model, checkpoints, curriculum and what its curve
-              counts
-state         State of a training: all that it needs to continue as if it had not been
-              interrupted
+run           Base class of one attempt at a training: counters, checkpoints and states
+sorting       Training on the sorting task: model, checkpoints, curriculum and learning curve
+state         State of a training, from which it continues with the same result
 state_folder  States of one training in a folder, for trainings without a server
 td3           The TD3 set-up of the pick and the reach scenario: model, checkpoints and
               monitored data

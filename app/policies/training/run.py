@@ -1,4 +1,4 @@
-"""One attempt at a training: its counters, checkpoints and states, whatever is trained."""
+"""Base class of one attempt at a training: counters, checkpoints and states."""
 
 import logging
 import time

@@ -1,4 +1,4 @@
-"""State of a training: all that it needs to continue as if it had not been interrupted.
+"""State of a training, from which it continues with the same result.
 
 Networks, optimisers, environments, exploration, counters, random generators and the window of
 the learning curve are tensors (safetensors) and JSON values; transitions of the replay memory

@@ -1,4 +1,4 @@
-"""People of a work cell: a worker with 18 joints, or one of three walking cylinders.
+"""People of a work cell: a worker with 18 joints, or one of three kinds of pedestrians.
 
 Source: docs/method.md 2.1 (cylinders, with the constants of the authors' code as defaults) and
 3.4 (worker). Initial positions of cylinders are part of the scenario, not of the cell.

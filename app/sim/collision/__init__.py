@@ -3,7 +3,7 @@
 checker        Collision queries of planners: people as shapes at one time, poses and motions
 contact        Contact and clearance of one state, for live cell, decisions, safety layer and
                planners
-fcl_recheck    Second opinion on whole trajectories: does FCL on the raw meshes find a contact?
-fcl_reference  The reference for contact: python-fcl on the UR10's real collision meshes
+fcl_recheck    Verification of whole trajectories by FCL on the raw meshes
+fcl_reference  Reference collision checker: python-fcl on the UR10's collision meshes
 kernels/       Compiled collision checks
 """

@@ -8,7 +8,7 @@ rendering   Images of one environment: table, robot, people, and targets or bloc
 single_env  One environment of a batch as a Gymnasium environment
 solids      Convex solids that rays are intersected with: capsules, upright cylinders and boxes
 sorting     The sorting task as Gymnasium environments: one task, or a batch
-tasks       What single and vector environments ask of a batch of cells
+tasks       Interface of batches for single and vector environments
 vector_env  A batch as a Gymnasium vector environment
 """
 

@@ -32,7 +32,7 @@ class ReachEnv(SingleEnv):
     Orientation and speed of the tool are free.
 
     ## Action space
-    ``Box(-1, 1, (6,), float32)``: desired speeds of the joints at the end of the control cycle
+    ``Box(-1, 1, (6,), float32)``: desired speeds of the joints at the end of the control period
     (0.02 s), as fractions of their limits (1 rad/s). They are clipped to those that a
     second-degree polynomial can reach within position, speed and acceleration limits, now and
     later; no action violates a limit. ``settings.action`` selects other action types
@@ -101,7 +101,7 @@ class ReachEnv(SingleEnv):
 
     ## Reward
     ``c_p (d_old - gamma d) - c_d d - c_a |c| - c_step - c_c [collision] + c_s [success]``, with
-    ``d`` the distance of tcp and goal [m], ``c`` the cycle's second coefficients [rad/s^2].
+    ``d`` the distance of tcp and goal [m], ``c`` the period's second coefficients [rad/s^2].
     Coefficients in ``ReachSettings.weights``: by default those of thesis table 4.1 (c_d 1, c_a
     0.1, c_c 5, c_s 20, others 0); presets have their own (``policies/configs/reach.py``).
 

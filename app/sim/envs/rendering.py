@@ -169,14 +169,14 @@ def worker_solids(cell: Cell, q: Vec, sizes: Vec | None = None) -> list[Solid]:
         q: Their joints [m, rad], shape (W, 18).
         sizes: Their sizes [m], shape (W, body.N_SIZE); None for the cell's person.
     """
-    crowd = people_geometry_of(people_of(cell), q, np.zeros((0, 3)), sizes)
+    geometry = people_geometry_of(people_of(cell), q, np.zeros((0, 3)), sizes)
     n = len(q) * body.N_CAPSULES
     colours = [
         CYLINDERS[w % len(CYLINDERS)] if part in _VEST else _PARTS.get(part, SLEEVE)
         for w in range(len(q))
         for part in range(body.N_CAPSULES)
     ]
-    return _capsules(ends_of(crowd.columns, n), crowd.columns[RADIUS, :n], colours)
+    return _capsules(ends_of(geometry.columns, n), geometry.columns[RADIUS, :n], colours)
 
 
 def standing_workers(cell: Cell) -> list[Solid]:

@@ -58,7 +58,7 @@ class SingleEnv(gymnasium.Env[NDArray[Any], Any]):
         return batch.obs[0].copy(), self._info()
 
     def step(self, action: Any) -> tuple[NDArray[Any], float, bool, bool, dict[str, Any]]:
-        """Execute one control cycle, or one attempt of the sorting task.
+        """Execute one control period, or one attempt of the sorting task.
 
         Raises:
             ResetNeeded: The episode has ended.

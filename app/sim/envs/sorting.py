@@ -96,8 +96,8 @@ class SortingEnv(SingleEnv):
     the batched :class:`SortingVectorEnv`.
 
     ## Task
-    Make every tower what the goal asks for. A goal asks for *a* large blue object, never for a
-    certain one: objects of one colour and size are duplicates.
+    Build the towers of the goal. A goal consists of colours and sizes, such as a large blue
+    object, not of certain objects: objects of one colour and size are duplicates.
 
     ## Action space
     ``Discrete(C (2 K + C))``, with ``K`` clutter slots and ``C`` towers:
@@ -109,38 +109,40 @@ class SortingEnv(SingleEnv):
     | ``2 K C + c C + d`` | top of tower ``c`` to ``d``; ``c == d`` changes nothing |
 
     ``info["action_mask"]`` (int8, as ``Discrete.sample`` takes it) and :meth:`action_masks`
-    (bool, as sb3-contrib asks for it) mark the moves that would change something. Others are
-    allowed and cost.
+    (bool, as sb3-contrib requires it) mark the moves that change the state. Others are
+    allowed and have a cost.
 
     ## Observation space
     ``Box(0, high, (2 K (1 + C),), uint8)``: codes, to be made one-hot inside a network.
 
-    | index | content | most |
-    |-------|---------|------|
+    | index | content | maximum |
+    |-------|---------|---------|
     | ``0..K-1`` | clutter slots | ``C S`` |
     | ``K..K+CK-1`` | towers, each from its lowest level | ``C S`` |
     | ``K+CK..K+2CK-1`` | the goal's towers, likewise | ``C S`` |
-    | ``K+2CK..2K+2CK-1`` | failure probability of a pick from each cell, times 250 | 250 |
+    | ``K+2CK..2K+2CK-1`` | failure probability of a pick from each slot, times 250 | 250 |
 
     Code 0 is no object, others are ``1 + colour S + size``, sizes from the smallest.
 
     ## Dynamics
-    A pick from the clutter fails with its cell's probability and leaves all as it is; picks
-    from towers do not fail. ``settings.localisation_rate`` adds picks of another object than
-    was meant, ``settings.human_rate`` people who add, remove and move objects and change goals.
+    A pick from the clutter fails with the probability of its slot and then changes nothing;
+    picks from towers do not fail. With ``settings.localisation_rate`` another object than the
+    selected one is picked, with ``settings.human_rate`` people add, remove and move objects and
+    change goals.
 
     ## Reward
     ``-0.05`` for an attempt, ``-0.3`` for an empty pick, ``-0.3`` for putting an object back
-    where it was or where there is no room, ``-0.01`` for a failure, ``-0.01`` for sending an
+    where it was or where no place is free, ``-0.01`` for a failure, ``-0.01`` for sending an
     object from a tower to the clutter, ``-0.01 d / K`` for the ``d`` levels that differ from
     the goal afterwards (a wrong colour or a wrong size counts half), ``+1`` for the goal.
     ``settings.weights`` holds the coefficients.
 
     ## Start
     ``K_E`` objects of random types lie in random clutter slots, ``K_G`` of them are the goal,
-    the largest at the bottom of each tower; both are triangular with their mode at the most,
-    K and ``K_E``, unless ``settings`` fix them. ``settings.disturbed_share`` of the episodes
-    start with objects already on towers, rightly or wrongly.
+    the largest at the bottom of each tower. Both numbers have triangular distributions with the
+    mode at their maximum, K and ``K_E``, unless ``settings`` fix them. A share
+    ``settings.disturbed_share`` of the episodes starts with objects on towers, at positions of
+    the goal or not.
 
     ## End
     The goal *terminates*; ``4 K`` attempts *truncate*. ``info["outcome"]`` names the end.
@@ -155,7 +157,7 @@ class SortingEnv(SingleEnv):
         settings: Starts, disturbances, rewards and ends.
         first_env: Number of the equal row of a vector environment.
         render_mode: ``rgb_array`` or None: blocks in clutter and towers, those that the goal
-            asks for translucent; clutter slots are darker the likelier a pick fails.
+            contains translucent; darker clutter slots have higher failure probabilities.
 
     Source: thesis sections 3.3 and 3.4, docs/method.md 1. Deviates: coefficients and failure
     map are not printed and chosen here; the failure map is observed.

@@ -123,7 +123,7 @@ class BatchVectorEnv(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
         self._steps[chosen], self._over[chosen] = 0, False
 
     def step(self, actions: NDArray[Any]) -> Steps:
-        """Execute one control cycle, or one attempt of the sorting task, in every environment.
+        """Execute one control period, or one attempt of the sorting task, in every environment.
 
         Raises:
             ResetNeeded: ``reset`` was never called, or, with ``Disabled``, not after an end.

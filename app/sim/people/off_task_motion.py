@@ -1,4 +1,4 @@
-"""Off-task motion: people that stand, look elsewhere, or reach over the table.
+"""Off-task motion: people that stand, turn away, or hold hands above the table.
 
 Task primitives cover people at work. Recorded people also hold a hand over the table for
 seconds, use both hands, turn away, walk off and return; policies trained on the task alone

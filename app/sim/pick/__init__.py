@@ -4,11 +4,10 @@ batch         The pick scenario of thesis chapter 5: one robot, one person, cube
 candidate_observer
               Observations of one state for each of several candidates
 case_geometry
-              Which goal of a case study is nearer, and when the person blocks which
+              Geometry of a case study: nearer goal, and times at which the person blocks a goal
 case_variants
               Variants of the four case studies, enumerated without a policy
-case_verdict  Whether what happened in a case study is what it is for: expected, observed,
-              verdict
+case_verdict  Verdict on a run of a case study: expected, observed, as expected or not
 cases         The four case studies of task selection (docs/method.md 3.6, thesis table 5.3)
 curriculum_batch
               Pick environments whose robots start part of the path to the target

@@ -269,7 +269,7 @@ def queries(
 def step_robot(
     arm: Arm, q: Vec, qd: Vec, qdd: Vec, act: Vec, action: ActionSettings = DEFAULT_ACTION
 ) -> TrajectorySegment:
-    """Move the robot through one control cycle.
+    """Move the robot through one control period.
 
     Args:
         arm: From :func:`~app.sim.scene.scene.arm_of`.
@@ -315,12 +315,12 @@ def hand_speeds(batch: PickBatch, n_scripts: int = 200) -> dict[str, float]:
     people, tick = batch.world.people._replace(yielding=0.0), 0.01
     state = new_people_state(batch.cell, people, 1)
     n_workers = state.q.shape[1]
-    crowd = new_people_geometry(people, n_workers, state.cylinders.shape[1])
+    geometry = new_people_geometry(people, n_workers, state.cylinders.shape[1])
     palms, rng = np.zeros((int(10.0 / tick), n_workers, 2, 3)), np.zeros(1, dtype=np.uint64)
     rates = []
     for number in range(n_scripts):
         start_stream(batch.seed, 1 << 20, number, rng)
-        record_palms(people, state, rng, batch.arm.columns, tick, crowd, palms)
+        record_palms(people, state, rng, batch.arm.columns, tick, geometry, palms)
         rates.append(np.linalg.norm(np.diff(palms, axis=0), axis=-1).ravel() / tick)
     speeds = np.concatenate(rates)
     moving = speeds[speeds > 0.05]

@@ -1,4 +1,4 @@
-"""Geometry of a case study: which goal is nearer, and when the person blocks which.
+"""Geometry of a case study: nearer goal, and times at which the person blocks a goal.
 
 No policy takes part. The robot is considered at rest at its start, and in the configurations
 over each goal and at its object; the person moves as in the case.

@@ -1,6 +1,6 @@
 """The pick scenario under speed and separation monitoring.
 
-:class:`MonitoredPickBatch` is a :class:`~app.sim.pick.batch.PickBatch` whose control cycles
+:class:`MonitoredPickBatch` is a :class:`~app.sim.pick.batch.PickBatch` whose control periods
 pass through the safety layer (``pick/kernels/monitored_step.py``).
 
 Source: docs/method.md 2.7.

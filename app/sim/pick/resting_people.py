@@ -67,7 +67,7 @@ class RestingPeoplePlanner:
     """Answers of :meth:`free` beside these people."""
 
     def note(self, speed: float) -> bool:
-        """Note one control cycle; return whether people have been at rest for ``REST_S``.
+        """Note one control period; return whether people have been at rest for ``REST_S``.
 
         Args:
             speed: Greatest joint speed of all people [m/s, rad/s]; inf without people.

@@ -125,7 +125,7 @@ class MovedPerson:
 
 
 class ChoiceTerms(NamedTuple):
-    """What a choice depends on beside the state; as in :meth:`TaskPolicy.decide`."""
+    """Terms of a choice beside the state; as in :meth:`TaskPolicy.decide`."""
 
     previous: str | None = None
     """The candidate chosen last."""
@@ -169,10 +169,10 @@ class TaskPolicy(PolicyIdentity, Protocol):
         Args:
             q: Robot joint positions [rad], shape (6,).
             qd: Robot joint speeds [rad/s], shape (6,).
-            people: The people in the cell, at most four. A policy that knows one person sees
-                the one nearest to the robot.
-            candidates: What may be chosen, at least one.
-            previous: The candidate chosen last, for hysteresis; None chooses afresh.
+            people: The people in the cell, at most four. A policy that observes one person
+                observes the one nearest to the robot.
+            candidates: The candidates, at least one.
+            previous: The candidate chosen last, for hysteresis; None: a first choice.
             progress: Progress of the pick of ``previous``. While an object is lifted the
                 choice stays with it.
             time_left_s: Time left to reach a candidate [s].
@@ -198,9 +198,9 @@ class TaskPolicy(PolicyIdentity, Protocol):
             q: Robot joint positions [rad], shape (6,).
             qd: Robot joint speeds [rad/s], shape (6,).
             people: The people in the cell, at most four.
-            candidates: What may be chosen, at least one.
+            candidates: The candidates, at least one.
             moved: The person and the postures.
-            terms: What the choice depends on beside the state.
+            terms: Terms of the choice beside the state.
 
         Raises:
             InvalidInput: A value that no answer can be given for.

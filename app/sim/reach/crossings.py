@@ -83,7 +83,7 @@ class Crossing:
     goal: Vec
     """Goal of the tcp [m], shape (3,)."""
     track: Vec
-    """The person's x, y and radius at the ends of control cycles [m], shape (n + 1, 3)."""
+    """The person's x, y and radius at the ends of control periods [m], shape (n + 1, 3)."""
     arrival: float
     """Time when the axis reaches the segment [s]."""
     speed: float
@@ -116,7 +116,7 @@ def covered(track: Vec, start: Vec, goal: Vec) -> NDArray[np.bool_]:
     """Return when a cylinder covers part of a segment in plan view, shape (n + 1,).
 
     Args:
-        track: x, y, radius at the ends of control cycles [m], shape (n + 1, 3).
+        track: x, y, radius at the ends of control periods [m], shape (n + 1, 3).
         start: Start of the segment [m], shape (>= 2,).
         goal: Its end [m], shape (>= 2,).
     """

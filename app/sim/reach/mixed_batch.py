@@ -64,7 +64,7 @@ class MixedReachBatch(Stateful):
         return np.concatenate([part.reset() for part in self.parts])
 
     def step(self, act: NDArray[np.float32], *, auto_reset: bool = True) -> StepResult:
-        """Move every environment through one control cycle; see :meth:`EnvBatch.step`."""
+        """Move every environment through one control period; see :meth:`EnvBatch.step`."""
         each = [
             part.step(some, auto_reset=auto_reset)
             for part, some in zip(self.parts, np.split(act, self._ends), strict=True)

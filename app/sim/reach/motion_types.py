@@ -105,7 +105,7 @@ class MotionDecision(NamedTuple):
     beyond_reach: float
     """Distance of the goal beyond the reach of the arm [m]; 0 within reach."""
     state_outside: tuple[OutOfRangeValue, ...]
-    """Measured joints outside their limits; the policy observes them clipped."""
+    """Measured joints outside their limits; the policy observes them clamped."""
     outside: tuple[OutOfRangeValue, ...]
     """Inputs outside the training range."""
     checkpoint: str

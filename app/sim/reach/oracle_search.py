@@ -262,7 +262,7 @@ def presumably_unsolvable(
         walks: From :func:`future_cylinders`, shape (n_periods + 1, n, W, 3).
         goals: Goals [m], shape (n, 3).
         soonest: Least time to each goal in an empty cell [s], shape (n,).
-        dt: Control cycle [s].
+        dt: Control period [s].
         tool_radius: Radius of the tool about the tcp [m].
         base_radius: Radius of the base about its axis [m].
     """

@@ -41,7 +41,7 @@ _ROW = np.zeros(1, dtype=np.int64)
 
 
 class QueryState:
-    """One state with a number of bodies and cylinders; not thread-safe.
+    """One state with a number of workers and pedestrians; not thread-safe.
 
     Args:
         cell: Work cell with a goal region.

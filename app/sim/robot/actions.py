@@ -3,11 +3,12 @@
 degree 2   acceleration-limited, closed form           robot/kernels/acceleration_bounds.py
 degree 3   jerk-limited, ends by bisection             robot/kernels/jerk_bounds.py
 
-viable     recursively feasible: never empty, nothing is ever exceeded
+viable     recursively feasible: never empty, and all limits hold
 one-step   the thesis' bounds of one period; they can become empty: *unfeasible*
 
-speed        a in [-1, 1] is a share of the speed limit, met as nearly as is admissible
-coefficient  a in [-1, 1] is a place in the interval, the thesis' map (4.23)
+speed        a in [-1, 1] is a desired share of the speed limit; the nearest admissible
+             speed is reached
+coefficient  a in [-1, 1] is a position in the admissible interval, the thesis' map (4.23)
 """
 
 from dataclasses import dataclass

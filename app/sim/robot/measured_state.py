@@ -26,18 +26,18 @@ from app.sim.robot.kernels.override import stop_time
 from app.sim.robot.ur10 import JOINT_NAMES
 
 SLACK = 1e-6
-"""Excess over a limit that is taken for rounding and not flagged [rad, rad/s, rad/s^2]."""
+"""Excess over a limit that counts as rounding and is not flagged [rad, rad/s, rad/s^2]."""
 POSITION_TOLERANCE = 0.05
 """Tolerance of measured positions outside a limit [rad], besides the distance of a stop
 from the speed limit: a joint that passes its limit while it brakes is still answered."""
 LONGEST_OVERRUN = 0.2
-"""Most that is added for that way [rad]."""
+"""Largest tolerance for the distance of this stop [rad]."""
 RATE_TOLERANCE = 0.05
 """Share of a speed or acceleration limit by which a joint may be measured beyond it."""
 LEAST_TOLERANCE = (0.01, 0.05)
 """Least of these tolerances: speed [rad/s] and acceleration [rad/s^2]."""
 LARGEST = 1e6
-"""Largest acceleration that is taken where none is needed [rad/s^2]."""
+"""Largest acceleration that is accepted where none is needed [rad/s^2]."""
 FREE = 1e3
 """Stands for a position limit that does not bind [rad]."""
 TURN = 2.0 * math.pi
@@ -58,7 +58,7 @@ class Joints(NamedTuple):
 
 
 class MeasuredState(NamedTuple):
-    """A state that is no farther outside the limits than a robot is measured."""
+    """A state whose excess over the limits is within the tolerances."""
 
     measured: Joints
     """As given."""
@@ -94,7 +94,7 @@ class StateLimits:
             self._tolerance[2] = LARGEST
 
     def take(self, q: Vec, qd: Vec, qdd: Vec | None = None) -> MeasuredState:
-        """Return a measured state, and as policies see it.
+        """Return a measured state as given and as policies observe it.
 
         Args:
             q: Joint positions [rad], shape (6,).
@@ -102,8 +102,8 @@ class StateLimits:
             qdd: Joint accelerations [rad/s^2], shape (6,); zeros where None.
 
         Raises:
-            InvalidInput: Another number of joints, a number that is not finite, or one that is
-                farther outside its limits than a robot is measured.
+            InvalidInput: Another number of joints, a number that is not finite, or one whose
+                excess over its limits is above the tolerance.
         """
         given = (q, qd, _AT_REST if qdd is None else qdd)
         values = np.concatenate(

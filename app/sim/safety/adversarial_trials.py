@@ -1,6 +1,6 @@
 """Falsification trials of the safety layer: many episodes with adversarial people.
 
-The robot follows arbitrary policies; people run at it, never faster than a trial allows
+The robot follows arbitrary policies; people run toward it, at most at the speed of the trial
 (``safety/kernels/adversarial_trials.py``). Inside the layer's assumptions no contact may find a
 link in motion; outside them the rate of such contacts is measured.
 """

@@ -130,7 +130,7 @@ class EnvBatch(Stateful, ABC):
     def step(
         self, act: NDArray[np.float32], *, auto_reset: bool = True, features: bool = True
     ) -> StepResult:
-        """Move every environment through one control cycle.
+        """Move every environment through one control period.
 
         Args:
             act: Actions in [-1, 1], shape (n_envs, n_act); the settings choose their type.

@@ -1,6 +1,7 @@
 """Episodes of any scenario under speed and separation monitoring: settings, state, results.
 
-The control cycle is in ``kernels/monitored_motion.py``; each scenario has a batch that uses it.
+``kernels/monitored_motion.py`` moves a robot for a control period; each scenario has a batch
+that uses it.
 
 Source: docs/method.md 2.7.
 """
@@ -103,7 +104,7 @@ def new_monitored_state(
         batch: Environments with a cell.
         safety: Assumptions of the safety layer.
         monitoring: Further settings.
-        tracks: Cylinder of each environment's only person at the ends of control cycles: x, y,
+        tracks: Cylinder of each environment's only person at the ends of control periods: x, y,
             radius [m], shape (n_envs, n + 1, 3); None for people who walk by themselves.
         horizon_s: Largest time left that policies observe [s].
     """
@@ -142,7 +143,7 @@ def monitored_episodes(
 
     Args:
         monitor: Accounts of the environments.
-        dt: Control cycle [s].
+        dt: Control period [s].
     """
     account = monitor.closed
     moving = (account[:, CONTACT] == PERSON) & (account[:, SPEED] > MOVING)

@@ -4,10 +4,9 @@ batch               Batch of sorting tasks
 benchmark_tasks     The six tests of the sorting task: initial states and interference of people
 decision            Decision about the next sorting move, by a policy or the exact planner
 decision_types      Data of a decision about the next sorting move
-layout              The geometry of a sorting cell: where blocks lie, where the tool goes, what
-                    people do there
-names               Names of a sorting task's colours, sizes and places, and states written in
-                    them
+layout              Geometry of a sorting cell: blocks, tool positions, and the work of people
+names               Names of colours, sizes and positions of a sorting task, and states written
+                    in them
 near_optimal_moves  Sorting moves that the exact planner expects to take about as many attempts
                     as its own
 planner             Exact planner of the sorting task: fewest moves, with few expected attempts

@@ -1,6 +1,6 @@
 """Batch of sorting tasks (docs/method.md 1).
 
-A step returns observations of integers (cells, towers, goal, failure probabilities), masks of
+A step returns observations of integers (slots, towers, goal, failure probabilities), masks of
 the moves that change the state, rewards and outcomes. ``human_rate`` includes people that add,
 remove and move objects or change the goal (docs/method.md 1.2).
 """
@@ -42,7 +42,7 @@ class SortingSettings:
     """Starts, disturbances, rewards and ends of episodes."""
 
     horizon_factor: float = 4.0
-    """Attempts per clutter slot after which an episode is cut off."""
+    """Attempts per clutter slot after which an episode is truncated."""
     disturbed_share: float = 0.0
     """Share of episodes that start with any objects on the towers and partly built goals."""
     solved_episodes: float = 0.0
@@ -50,11 +50,11 @@ class SortingSettings:
     solved_share: float = 0.0
     """Share of their goal that is done (g_s)."""
     even_share: float = 0.0
-    """Share of episodes whose K_E and K_G are drawn evenly, not triangular."""
+    """Share of episodes with uniform instead of triangular distributions of K_E and K_G."""
     human_rate: float = 0.0
-    """Chance per attempt that a person interferes."""
+    """Probability per attempt that a person interferes."""
     localisation_rate: float = 0.0
-    """Chance per pick from the clutter that another object is moved than was meant."""
+    """Probability per pick from the clutter that another than the selected object is moved."""
     random_map_share: float = 0.0
     """Share of episodes with a failure map drawn at random."""
     failure_max: float = 0.4
@@ -62,7 +62,7 @@ class SortingSettings:
     n_objects: int = 0
     """Objects per episode, K_E; 0: drawn (docs/method.md 1.4)."""
     n_goal: int = 0
-    """Objects in the goal, K_G; 0 draws it."""
+    """Objects in the goal, K_G; 0: drawn."""
     weights: SortingWeights = field(default_factory=SortingWeights)
     """Reward coefficients."""
 
@@ -127,7 +127,7 @@ def _check_sizes(settings: SortingSettings, shape: SortingShape) -> None:
 class SortingBatch(Stateful):
     """Many sorting tasks, stepped together by one thread.
 
-    Copies (``copy.deepcopy``, ``pickle``) go on bit by bit as the original would.
+    Copies (``copy.deepcopy``, ``pickle``) continue with the same bits as the original.
 
     Args:
         shape: Size of the tasks.
@@ -237,7 +237,7 @@ class SortingBatch(Stateful):
 
         Args:
             act: Actions as ``SortingShape`` numbers them, shape (n_envs,).
-            auto_reset: Start the next episode where one ended; else its row stands still.
+            auto_reset: Start the next episode where one ended; else its row does not change.
 
         Raises:
             InvalidInput: The actions have another shape, or one is no action.

@@ -7,8 +7,8 @@ test-1    5, 5          sort everything
 test-2    10, 10        the same with twice the objects
 test-3    10, 5         every object of the goal has a duplicate in a riskier slot
 test-4    5, 5          at the goal a larger object is added below sorted ones
-test-5    8, 5          an alternative is added on the way, then the goal changes
-test-6    8, 3          three of one colour, then three of another as well
+test-5    8, 5          a duplicate is added during the task, then the goal changes
+test-6    8, 3          three of one colour; the goal is then extended by three of another
 ========= ============= ================================================================
 
 Evaluations and the live cell use the same definitions. Colours go to their own tower, the
@@ -197,7 +197,7 @@ def _add_alternative(state: SortingState, shape: SortingShape, rng: Generator) -
     """Add a duplicate of an object that is missing on the towers.
 
     Raises:
-        InvalidInput: They lack nothing, or there is no room.
+        InvalidInput: No object is missing on the towers, or no slot is free.
     """
     lack = np.bincount(_objects(state.goal), minlength=shape.n_types + 1)
     lack -= np.bincount(_objects(state.towers), minlength=shape.n_types + 1)

@@ -83,7 +83,7 @@ def decide(
 
 
 def outside_goal(goal: Codes, shape: SortingShape) -> tuple[OutsideGoal, ...]:
-    """Return the objects of a goal that goals met in training never ask for.
+    """Return the objects of a goal that no goal of the training contains.
 
     Args:
         goal: Goal of the towers, shape (C, K).
@@ -123,9 +123,9 @@ def rank_by_planner(
 ) -> tuple[RankedMove, ...]:
     """Return the valid moves by the attempts expected if they come first, the plan's own first.
 
-    After any other move the planner's rules are followed, without looking ahead. Where even
-    that would take too long there are no values: the moves that begin a plan of the fewest
-    moves come before the others.
+    After any other move the planner's rules are followed, without rollouts. Where even that
+    would take too long there are no values: moves that begin a plan with the fewest moves
+    precede the others.
     """
     valid = valid_actions(state, shape)
     attempts = attempts_by_action(state, shape, valid)

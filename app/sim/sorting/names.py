@@ -127,7 +127,7 @@ def state_from_names(
         fail: Failure probability of a pick from each clutter slot, shape (K,).
 
     Raises:
-        InvalidInput: It cannot be; names the field as the caller wrote it.
+        InvalidInput: The state is impossible; the error names the field as the caller wrote it.
     """
     n_cells = names.shape.n_cells
     if len(objects) > n_cells:

@@ -1,4 +1,4 @@
-"""The database as a whole: tables, their version, who may write, backups.
+"""The database as a whole: tables, their version, lease, lock, backups.
 
 archive  Archive of a backup: its members, checked by size and SHA-256
 backup   Backups of a data folder, also while the server runs

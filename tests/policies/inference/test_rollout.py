@@ -37,7 +37,7 @@ def batch_of(n_envs: int, *people: str, seed: int = 3) -> ReachBatch:
 
 
 def walked(batch: ReachBatch, cycles: int) -> ReachBatch:
-    """Let the policy move the robots for some control cycles."""
+    """Let the policy move the robots for some control periods."""
     controller = controller_of(ACTOR, "direct")
     for _ in range(cycles):
         batch.step(controller.acts(batch), auto_reset=False)
@@ -149,7 +149,7 @@ def test_sampled_candidates_end_as_simulated() -> None:
 
 
 def test_remaining_plans_end_as_simulated_at_first() -> None:
-    """Simulated in every control cycle, the remainder comes equally near to the goal."""
+    """Simulated in every control period, the remainder comes equally near to the goal."""
     batch = standing(60)
     work, rng = workspace(batch), np.zeros(1, dtype=np.uint64)
     cycles = round(STEP_S / batch.arm.dt)

@@ -46,10 +46,10 @@ def crossing_time(track: Vec, start: Vec, goal: Vec, dt: float) -> float:
     """Return when the axis first crosses a segment in plan view [s]; infinity if never.
 
     Args:
-        track: x, y at the ends of control cycles [m], shape (n + 1, >= 2).
+        track: x, y at the ends of control periods [m], shape (n + 1, >= 2).
         start: Start of the segment [m], shape (>= 2,).
         goal: Its end [m], shape (>= 2,).
-        dt: Control cycle [s].
+        dt: Control period [s].
     """
     segment = goal[:2] - start[:2]
     square = float(segment @ segment)

@@ -21,7 +21,7 @@ with the safety layer between policy and robot.
 
 Contact with a moving link ends an episode, also at a speed that power and force limiting
 admits (``contact_admissible``). A person may touch a robot at standstill: the episode continues
-and counts in ``contact_at_rest``. ``stopped`` is the share of control cycles with override 0,
+and counts in ``contact_at_rest``. ``stopped`` is the share of control periods with override 0,
 ``time_lost_s`` the time to success less that of the same episode without the layer, where both
 succeed.
 """

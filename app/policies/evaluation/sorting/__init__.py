@@ -8,10 +8,9 @@ full_tasks        Results of full sorting tasks, and the throughput that they im
 grid              Protocol ``sorting-grid``: every pair of object and goal numbers
 optimal_baseline  Optimal baseline of sorting episodes: the exact planner's moves and expected
                   attempts
-order_rules       Order rules: which of several near-optimal sorting moves comes next
-                  (docs/method.md 3.1)
-pairs             Episodes of every pair (K_E, K_G): so many objects, of which so many are in
-                  the goal
+order_rules       Order rules: selection among near-optimal sorting moves (docs/method.md 3.1)
+pairs             Episodes of every pair (K_E, K_G): numbers of objects, and of objects in the
+                  goal
 people            Protocol ``sorting-people``: full sorting tasks beside a working person
 planner_fallback  Progress monitor (``app/sim/sorting/progress_monitor.py``) of many sorting
                   tasks at once

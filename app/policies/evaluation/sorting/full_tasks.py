@@ -26,7 +26,7 @@ class FullTasks:
     resting: Index
     """Contacts of the robot at standstill."""
     stopped: NDArray[np.float64]
-    """Share of the control cycles with override 0."""
+    """Share of the control periods with override 0."""
     parts: Index
     """Objects set down in their places."""
     attempts: Index

@@ -1,4 +1,4 @@
-"""Order rules: which of several near-optimal sorting moves comes next (docs/method.md 3.1).
+"""Order rules: selection among near-optimal sorting moves (docs/method.md 3.1).
 
 All rules choose among the same moves: those that the exact planner expects to take about as
 many attempts as its own.

@@ -1,6 +1,6 @@
 """The reach scenario under speed and separation monitoring.
 
-:class:`MonitoredReachBatch` is a :class:`~app.sim.reach.batch.ReachBatch` whose control cycles
+:class:`MonitoredReachBatch` is a :class:`~app.sim.reach.batch.ReachBatch` whose control periods
 pass through the safety layer (``reach/monitored/kernels/step.py``); policies, planners and
 trainings use both alike. Its people may follow given tracks, such as those of ``crossings.py``.
 
@@ -46,7 +46,7 @@ class MonitoredReachBatch(ReachBatch):
         settings: Settings of the scenario; a collision ends the episode.
         safety: Assumptions of the safety layer.
         monitoring: Further settings.
-        tracks: Cylinder of each environment's only person at the ends of control cycles: x, y,
+        tracks: Cylinder of each environment's only person at the ends of control periods: x, y,
             radius [m], shape (n_envs, n + 1, 3); None for people who walk by themselves.
 
     Raises:
@@ -85,13 +85,13 @@ class MonitoredReachBatch(ReachBatch):
 
     @property
     def override(self) -> Vec:
-        """Override of the last control cycle in [0, 1], shape (n_envs,)."""
+        """Override of the last control period in [0, 1], shape (n_envs,)."""
         return self._monitor.override
 
     def step(
         self, act: NDArray[np.float32], *, auto_reset: bool = True, features: bool = True
     ) -> StepResult:
-        """Move every environment through one control cycle under the safety layer.
+        """Move every environment through one control period under the safety layer.
 
         Args:
             act: Actions in [-1, 1], shape (n_envs, 6); the settings choose their type.
@@ -123,7 +123,7 @@ class MonitoredReachBatch(ReachBatch):
         self._call(step.step_rows, *state, envs, commands, results)
 
     def step_speeds(self, env: int, wanted: Vec) -> None:
-        """Move one environment through one control cycle toward joint speeds, for planners.
+        """Move one environment through one control period toward joint speeds, for planners.
 
         Args:
             wanted: Joint speeds after the cycle [rad/s], shape (6,).
