@@ -10,7 +10,7 @@ pick          Training on the pick scenario: settings, networks, exploration and
 progress      Points of the learning curve of a training, and its result
 reach         Training on the reach scenario: settings, networks, exploration and learning curve
 reporter      Reports between two steps of a training: learning curve, checkpoints, stop
-run           Base class of one attempt at a training: counters, checkpoints and states
+run           One attempt at a training of any scenario: counters, checkpoints and states
 sorting       Training on the sorting task: model, checkpoints, curriculum and learning curve
 state         State of a training, from which it continues with the same result
 state_folder  States of one training in a folder, for trainings without a server

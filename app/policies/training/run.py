@@ -1,4 +1,4 @@
-"""Base class of one attempt at a training: counters, checkpoints and states."""
+"""One attempt at a training of any scenario: counters, checkpoints and states."""
 
 import logging
 import time
