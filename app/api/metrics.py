@@ -111,7 +111,7 @@ class Metrics:
         Args:
             endpoint: Path of the socket.
             status: Status of the answer, as of the route.
-            wait_s: Time from the arrival of the message to the begin of the decision [s].
+            wait_s: Time from the arrival of the message to the start of the decision [s].
             total_s: Time from the arrival to the answer [s].
             missed: Whether the answer missed its deadline.
             left: Older messages that were not answered.

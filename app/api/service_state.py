@@ -57,7 +57,7 @@ class ServiceState(Collector):
     def _lateness(self) -> HistogramMetricFamily:
         family = HistogramMetricFamily(
             "tandem_live_tick_lateness_seconds",
-            "Time from the due time of a tick of a live world to its begin.",
+            "Time from the due time of a tick of a live world to its start.",
             labels=("world",),
         )
         for world_id, world in self._services.worlds.copy().items():
