@@ -22,7 +22,7 @@ def accepts_gzip(accepted: str) -> bool:
 
 
 class Compression(GZipMiddleware):
-    """Compression by gzip. Starlette's looks for the word only, whatever its quality is."""
+    """Compression by gzip; Starlette's middleware ignores the quality of the coding."""
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Pass a request on with the word if its client takes gzip, else without codings."""

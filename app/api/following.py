@@ -67,7 +67,7 @@ def start(world_id: str, job: JobRecord, services: Services) -> FollowPublic:
 def deploy_newest(services: Services) -> bool:
     """Let newer checkpoints act; return whether a world still follows a training.
 
-    It follows no longer where another policy was chosen, by whatever submits commands.
+    A world stops following when another policy is chosen by any command.
     """
     follows = services.follows
     with follows.lock:

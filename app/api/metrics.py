@@ -30,7 +30,7 @@ UNROUTED = "none"
 
 
 class Metrics:
-    """What is counted while requests are answered; safe to use from any thread."""
+    """Metrics that are counted while requests are answered; safe to use from any thread."""
 
     def __init__(self, version: str) -> None:
         self.registry = CollectorRegistry()

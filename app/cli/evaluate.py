@@ -113,9 +113,15 @@ def _manifest(path: Path) -> object:
 
 
 def bench(
-    context: typer.Context, name: Annotated[str, typer.Argument(show_default=False)]
+    context: typer.Context,
+    name: Annotated[
+        str,
+        typer.Argument(
+            help="Such as sim-steps; any other word lists all benchmarks.", show_default=False
+        ),
+    ],
 ) -> None:
-    """Run a benchmark of the checkout; further options go to it."""
+    """Run a benchmark of the checkout; further options are passed to it."""
     folder = ROOT / "tests" / "benchmarks"
     scripts = {
         path.stem.removeprefix("bench_").replace("_", "-"): path

@@ -14,7 +14,7 @@ from app.store.records import JobRecord
 logger = logging.getLogger(__name__)
 
 PERIOD_S = 1.0
-"""Least time between two looks at the open jobs [s]."""
+"""Least time between two checks of the open jobs [s]."""
 
 
 class Composer(ABC):
@@ -27,9 +27,9 @@ class Composer(ABC):
         self._next = 0.0
 
     def advance(self, store: Store) -> None:
-        """Do what is due; at most once in a period.
+        """Advance the open jobs; at most once in a period.
 
-        A job that cannot go on fails, so that it keeps no other from its turn.
+        A job that cannot continue fails, so that it does not block others.
 
         Raises:
             StorageFull: No room is left.

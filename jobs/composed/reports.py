@@ -67,7 +67,7 @@ def _evaluation(spec: ReportSpec, protocol: str, checkpoint: str) -> AnySpec:
 
 
 def _written(ended: Mapping[str, JobRecord]) -> dict[str, Any]:
-    """Return the result of a report: its page, and what the page lacks."""
+    """Return the result of a report: its page and the missing measures."""
     measured = {
         file: {**part.result, "job": f"job {part.number}", "machine": describe()}
         for file, part in ended.items()

@@ -234,7 +234,7 @@ def _drawn(spec: SweepSpec, trials: Sequence[SweepTrial], number: int) -> dict[s
     """Return the overrides of a new trial.
 
     Raises:
-        InvalidInput: The drawn fields contradict each other again and again.
+        InvalidInput: The drawn fields contradict each other in every draw.
     """
     study = _study(spec, spec.seed + number)
     for one in trials:
@@ -284,7 +284,7 @@ _STATES: Mapping[TrialPhase, TrialState] = {
 
 
 def _frozen(spec: SweepSpec, trial: SweepTrial, curve: Mapping[int, float]) -> FrozenTrial:
-    """Return a trial as Optuna knows it."""
+    """Return a trial in Optuna's form."""
     return create_trial(
         state=_STATES.get(trial.state, TrialState.RUNNING),
         value=None if trial.value is None else trial.value["mean"],

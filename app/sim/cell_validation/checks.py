@@ -24,7 +24,7 @@ from app.sim.collision.fcl_reference import obstacle_box, touch
 MIN_SPACING = 0.05
 """Least distance of two stations [m]; a cluster counts from its lowest to its top level."""
 MAX_OVERLAP = 0.01
-"""Obstacles may share this much [m], so that boxes can be put together."""
+"""Largest overlap of two obstacles [m], so that boxes can be joined."""
 MAX_MISSED = 12
 """Number of grid targets without a configuration after which the search ends: it is slow."""
 FIELDS_OF_KIND = {
@@ -40,7 +40,7 @@ def check_cell(cell: Cell, known: Sequence[Fault] = ()) -> list[Fault]:
     """Return all faults of a cell.
 
     Args:
-        known: Faults found before, in reading; nothing is built on the values they name.
+        known: Faults found while reading; checks that depend on these values are skipped.
     """
     faults = [*_counts(cell, known), *_ids(cell), *numbers(cell)]
     parts = FaultlessParts(cell, [*known, *faults])

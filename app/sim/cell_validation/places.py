@@ -10,13 +10,13 @@ from app.sim.cells.parts import Obstacle, Station
 from app.sim.cells.people import Worker
 
 HIGHEST_PART = 0.4
-"""A part is gripped at most this far over the table or obstacle that carries it [m]."""
+"""Largest height of a station above the table or obstacle that supports it [m]."""
 FACING = 1.4
 """Greatest angle between a worker's gaze at home and the direction to the table [rad]."""
 
 
 class FaultlessParts:
-    """The parts of a cell that no fault names, for checks that build on them."""
+    """The parts of a cell without faults, for checks that use several parts."""
 
     def __init__(self, cell: Cell, faults: list[Fault]) -> None:
         named = [fault.place for fault in faults]

@@ -161,8 +161,8 @@ def lacks_stations(cell: Cell) -> str | None:
 def lacks_for_pick(cell: Cell) -> str | None:
     """Return the missing parts for training, decisions and display; None if complete.
 
-    The simulator takes 0 to 4 people of any kind; the shipped policies know one worker. Fixed
-    obstacles are not observed: they never move, so a policy learns where they are.
+    A cell describes one worker; presets and arguments of environments set the number and kinds
+    of people, 0 to 4. Fixed obstacles are not observed: a policy learns their positions.
     """
     if len(cell.people) != 1 or not cell.workers:
         return lacks_stations(cell) or "needs exactly one person, of kind worker"
@@ -172,8 +172,8 @@ def lacks_for_pick(cell: Cell) -> str | None:
 def lacks_for_reach(cell: Cell) -> str | None:
     """Return the missing parts for training of a reach policy; None if complete.
 
-    The preset defines the walkers: in a cell without one, people walk in the area of its first
-    person.
+    The preset defines the pedestrians: in a cell without one, they walk in the area of its
+    first person.
     """
     return "needs a goal_region" if cell.goal_region is None else None
 

@@ -105,7 +105,7 @@ class Obstacle(CellData):
 
 
 class Station(CellData):
-    """A named place the robot's tool can be sent to."""
+    """A named place to which the robot's tool can move."""
 
     id: Id = Field(description="name in requests")
     kind: Literal["cube", "dock", "clutter", "cluster"] = Field(

@@ -74,7 +74,7 @@ class _CylinderOnFloor(_Walking):
 
 
 class Walker(_CylinderOnFloor):
-    """A cylinder whose speed and radius change all the time, eq. (4.1), (4.2)."""
+    """A cylinder of continuously varying speed and radius, eq. (4.1), (4.2)."""
 
     kind: Literal["walker"] = Field(description="speed and radius change with time")
     speed_min: Speed = Field(default=0.3, description="slower counts as standing [m/s]")

@@ -26,8 +26,8 @@ from app.sim.robot.capsules import TOOL, RobotCapsules, load_robot_capsules, sel
 from app.sim.robot.ur10 import LINK_NAMES, Robot
 
 MARGIN = 0.03
-"""Clearance of capsules [m] above which meshes are not asked; capsules contain the meshes, so
-0 would do if both were free of mistakes."""
+"""Clearance of capsules above which meshes are not checked [m]. Capsules contain the meshes, so
+that 0 would be sufficient; the margin also finds errors of the capsules."""
 
 Pairs = NDArray[np.bool_]
 

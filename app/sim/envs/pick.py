@@ -37,9 +37,9 @@ class PickEnv(SingleEnv):
     ## Action space
     ``Box(-1, 1, (5,), float32)``: desired speeds of the first five joints at the end of the
     control period (0.05 s), as fractions of their limits (0.5 rad/s). They are clipped to those
-    that a second-degree polynomial can reach within position, speed and acceleration limits,
-    now and later; no action violates a limit. The sixth joint is held at 0. ``settings.action``
-    selects other action types (docs/method.md 2.2).
+    that a second-degree polynomial can reach within position, speed and acceleration limits
+    in this and all later periods; no action violates a limit. The sixth joint is held at 0.
+    ``settings.action`` selects other action types (docs/method.md 2.2).
 
     | index | joint          | limits of the joint [rad] |
     |-------|----------------|---------------------------|

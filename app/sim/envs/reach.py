@@ -34,9 +34,9 @@ class ReachEnv(SingleEnv):
     ## Action space
     ``Box(-1, 1, (6,), float32)``: desired speeds of the joints at the end of the control period
     (0.02 s), as fractions of their limits (1 rad/s). They are clipped to those that a
-    second-degree polynomial can reach within position, speed and acceleration limits, now and
-    later; no action violates a limit. ``settings.action`` selects other action types
-    (docs/method.md 2.2).
+    second-degree polynomial can reach within position, speed and acceleration limits in this
+    and all later periods; no action violates a limit. ``settings.action`` selects other action
+    types (docs/method.md 2.2).
 
     | index | joint          | limits of the joint [rad] |
     |-------|----------------|---------------------------|

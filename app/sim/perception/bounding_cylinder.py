@@ -1,17 +1,17 @@
 """The safety volume of docs/method.md 2.8: an upright cylinder around a person's key-points.
 
 The singular value decomposition of the centred key-points gives the axes of a box; the box is
-the bound of the key-points along them. Seen from above, the box is symmetric about its centre,
-so the smallest vertical cylinder around it has its axis there and the farthest corner as
-radius: closed form. The radius is taken times 1.1. To that comes a flesh margin, for key-points
-lie inside the body and the hands reach beyond the wrists.
+the bound of the key-points along them. In plan view the box is symmetric about its centre, so
+that the axis of the smallest vertical cylinder around it passes through the centre, and its
+radius is the distance of the farthest corner. The radius is multiplied by 1.1 and increased by
+a flesh margin, because key-points lie inside the body and the hands extend beyond the wrists.
 
 Where a key-point of arms or head is unseen for longer than the hold time, the cylinder widens
-to where it can be: every seen key-point bounds it by the length of the bones between them.
+to its possible positions: every seen key-point bounds them by the length of the bones between.
 
 Deviates: the thesis says "minimum-volume bounding box (SVD)"; axes by SVD give a small box, not
-always the least. Flesh margin, hold time and the widening are ours. Unseen legs are taken to
-stand below the hips (tables hide them as a rule).
+always the smallest. Flesh margin, hold time and the widening are ours. Unseen legs, usually
+hidden by a table, are assumed below the hips.
 """
 
 from collections.abc import Sequence
@@ -25,7 +25,7 @@ from app.sim.core.arrays import Vec
 from app.sim.perception.keypoints import BODY_25, N_KEYPOINTS, K
 
 RADIUS_FACTOR = 1.1
-"""docs/method.md 2.8."""
+"""Factor on the radius (docs/method.md 2.8)."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -34,8 +34,8 @@ class CylinderSettings:
 
     flesh_margin: float = 0.17
     """Added to the radius and to the top [m]. Around exact key-points of a person at work,
-    0.131 m hold the whole surface of the median body, 0.145 m that of the 95th percentile
-    (stature, arms and shoulders): crown and fingertips ask for most. The rest is for noise."""
+    0.131 m contain the whole surface of the median body and 0.145 m that of the 95th percentile
+    (stature, arms, shoulders); crown and fingertips determine both. The rest is for noise."""
     growth: float = 1.6
     """Speed at which the radius grows while nothing is seen and the hold time is over [m/s];
     walking speed of ISO 13855."""

@@ -2,7 +2,7 @@
 
 Stance, palms and elbow swivel are random; a *style* is a range of these parameters. The
 demonstrations of the shipped primitives connect two keyframes (``tools/demonstrations.py``) and
-may change their style on the way, like segments between the keyframes of
+may change their style in between, like segments between the keyframes of
 ``primitive_library.py``: queries of a primitive lie in the distribution to which it was fitted.
 
 Source: docs/method.md 3.2 and 3.4. Deviates: the source records people; these postures are
@@ -31,7 +31,7 @@ Range = tuple[float, float]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Style:
-    """Parameters of a manner of reaching; ranges are sampled uniformly."""
+    """Parameters of a style of reaching; ranges are sampled uniformly."""
 
     name: str
     """Name of the style."""

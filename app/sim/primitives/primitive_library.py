@@ -1,4 +1,4 @@
-"""Motion library of a worker: keyframe postures and samples of task primitives.
+"""Primitive library of a worker: keyframe postures and samples of task primitives.
 
 A worker moves between places (stations, cubes first, home last) in segments, each with one
 hand. Both ends of a segment are *keyframe postures*, drawn beforehand for several body sizes.
@@ -113,7 +113,7 @@ def motion_library(
         n_samples: Samples per primitive and direction.
         augmentation: Draw samples from the primitives and vary durations; otherwise the samples
             are the demonstrations, with their mean duration.
-        variants: Nodes for each person, place and hand.
+        variants: Keyframes per body, place and hand.
 
     Raises:
         InvalidInput: The cell has no cube or no dock.

@@ -63,10 +63,6 @@ THESIS_WEIGHTS = ReachWeights(
     c_d=1.0, c_p=0.0, gamma=1.0, c_a=0.1, c_step=0.0, c_c=5.0, c_s=20.0
 )
 """Coefficients of the thesis (docs/method.md 2.3)."""
-PROGRESS_WEIGHTS = ReachWeights(
-    c_d=0.0, c_p=1.0, gamma=1.0, c_a=0.0, c_step=0.004, c_c=4.0, c_s=4.0
-)
-"""Progress instead of distance; in trials it reached 95 % within minutes."""
 DEFAULT_ACTION = ActionSettings()
 
 

@@ -140,7 +140,7 @@ def contact_speeds(settings: SafetySettings, n_columns: int, n_cylinders: int) -
 
     Args:
         settings: Assumptions; without power and force limiting nothing may be touched.
-        n_columns: Capsules; every twelve are a worker, the rest fills up.
+        n_columns: Number of capsules: twelve per worker; further ones are unused.
 
     Returns:
         Capsules first, then cylinders, shape (n_columns + n_cylinders,).

@@ -3,12 +3,13 @@
 import numpy as np
 import pytest
 
-from app.sim.reach.batch import PROGRESS_WEIGHTS, THESIS_WEIGHTS
+from app.sim.reach.batch import THESIS_WEIGHTS
 from app.sim.reach.kernels import reward as kernel
 from app.sim.reach.kernels.reward import ReachWeights
 from app.sim.scenario.kernels.episode import progress
 
 C = np.array([3.0, 0.0, 0.0, -4.0, 0.0, 0.0])
+PROGRESS = ReachWeights(c_d=0.0, c_p=1.0, gamma=1.0, c_a=0.0, c_step=0.004, c_c=4.0, c_s=4.0)
 
 
 def test_progress_is_positive_when_coming_closer() -> None:
@@ -28,8 +29,8 @@ def test_thesis_reward_is_that_of_method_2_3() -> None:
 
 
 def test_progress_reward_has_no_cost_of_distance() -> None:
-    assert kernel.reward(0.5, 0.4, C, False, False, PROGRESS_WEIGHTS) == pytest.approx(0.096)
-    assert kernel.reward(0.5, 0.5, C, True, False, PROGRESS_WEIGHTS) == pytest.approx(-4.004)
+    assert kernel.reward(0.5, 0.4, C, False, False, PROGRESS) == pytest.approx(0.096)
+    assert kernel.reward(0.5, 0.5, C, True, False, PROGRESS) == pytest.approx(-4.004)
 
 
 def test_every_coefficient_matters() -> None:
