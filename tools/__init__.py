@@ -13,7 +13,7 @@ import_contracts        Import-linter contract: compiled kernels import only ker
                         and ``geometry``
 make_primitives         Generate the shipped task primitives: ``python -m
                         tools.make_primitives``
-model_mannequin         Models the person: a worker made of round cones, in a helmet and a vest
+model_mannequin         Model the drawn person: a worker of round cones, in a helmet and a vest
 search_worst_people     Search the hand motions beside which the pick policy succeeds least
 train_motion_predictor  Train the shipped motion predictor of pedestrians
 train_worker_predictor  Train the shipped motion predictor of workers

@@ -6,10 +6,10 @@ part gets the capsule of least volume around its corners, and the union contains
 surface, not just the vertices. The cuts are searched for the least sum of volumes.
 
 The result is committed as ``app/sim/robot/data/ur10_capsules.json``;
-``tests/sim/robot/test_capsules.py``
-checks the containment again.
+``tests/sim/robot/test_capsules.py`` checks the containment again.
 """
 
+import argparse
 import json
 import logging
 import math
@@ -189,5 +189,8 @@ def main() -> None:
 
 
 if __name__ == "__main__":
+    argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    ).parse_args()
     logging.basicConfig(level=logging.INFO, format="%(message)s")
     main()

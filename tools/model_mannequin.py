@@ -1,13 +1,12 @@
-"""Models the person: a worker made of round cones, in a helmet and a vest.
+"""Model the drawn person: a worker made of round cones, in a helmet and a vest.
 
-Run by hand after a change, ``python -m tools.model_mannequin``: writes
-``web/viewer/people/data/mannequin.npz``,
-which :mod:`web.viewer.people.mannequin` loads. Soft parts (jacket, vest, stripes, trousers)
-are in the bind
-pose of :mod:`web.viewer.people.skeleton`, rigid ones in the frame of the bone they follow.
-Needs the
-development extras (scipy, scikit-image).
+``python -m tools.model_mannequin`` writes ``web/viewer/people/data/mannequin.npz``, which
+:mod:`web.viewer.people.mannequin` loads. Soft parts (jacket, vest, stripes, trousers) are in
+the bind pose of :mod:`web.viewer.people.skeleton`, rigid ones in the frame of their bone.
+Requires the development extras (scipy, scikit-image).
 """
+
+import argparse
 
 import numpy as np
 
@@ -198,4 +197,7 @@ def model() -> dict[str, Surface]:
 
 
 if __name__ == "__main__":
+    argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    ).parse_args()
     save(model())

@@ -9,6 +9,7 @@ are written to ``worst_people.json``, which is committed.
 Takes about five minutes on one core.
 """
 
+import argparse
 import json
 import logging
 from collections.abc import Sequence
@@ -126,4 +127,7 @@ def main() -> None:
 
 
 if __name__ == "__main__":
+    argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    ).parse_args()
     main()

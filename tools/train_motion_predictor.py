@@ -5,11 +5,12 @@ remembered motion is the input, the later motion the target. A tenth of them hav
 and radius, a tenth a shorter past, and a fifth a past with noise as of a tracker. The two
 networks are trained on the mean squared error.
 
-Takes about eight minutes on one core and writes ``data/walker.npz``, which is
-committed. A test trains for a moment and checks the errors of the shipped networks on other
+Takes about eight minutes on one core and writes ``app/sim/prediction/data/walker.npz``, which
+is committed. A test trains briefly and checks the errors of the shipped networks on other
 pedestrians.
 """
 
+import argparse
 import logging
 import math
 from pathlib import Path
@@ -271,4 +272,7 @@ def main() -> None:
 
 
 if __name__ == "__main__":
+    argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    ).parse_args()
     main()

@@ -2,13 +2,14 @@
 
 People of the trainings of ``pick-td3`` move beside a robot at rest; their present joints and
 speeds are the input, their joints at the predicted times the target. The error of the hands is
-reported for people with other postures, faster people and people with off-task motion, beside
-that of constant speed.
+reported for people with other postures, faster people and people with off-task motion, and
+compared with that of constant speed.
 
 Takes about two minutes on one core and writes ``app/sim/prediction/data/worker.npz``, which is
 committed.
 """
 
+import argparse
 import logging
 from dataclasses import replace
 from pathlib import Path
@@ -174,4 +175,7 @@ def main() -> None:
 
 
 if __name__ == "__main__":
+    argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    ).parse_args()
     main()
