@@ -63,14 +63,14 @@ def chunk(number: int) -> Iterator[Case]:
         person_at[:, None, :, 1],
     )
     expected = expected - RADII[:, None] - human.CAPSULE_RADII
-    pose, crowd = new_robot_pose(arm), new_people_geometry(people, 1, 0)
-    found = np.empty((len(RADII), crowd.columns.shape[1]))
+    pose, geometry = new_robot_pose(arm), new_people_geometry(people, 1, 0)
+    found = np.empty((len(RADII), geometry.columns.shape[1]))
     for k in range(CHUNK):
         place_robot(arm, q[k], pose)
-        place_workers(people, human_q[k : k + 1], crowd)
-        clearance = people_clearance(people, pose.columns, crowd)
+        place_workers(people, human_q[k : k + 1], geometry)
+        clearance = people_clearance(people, pose.columns, geometry)
         for i, row in enumerate(found):
-            distances(pose.columns, i, crowd.columns, row)
+            distances(pose.columns, i, geometry.columns, row)
         d = found[:, : len(human.CAPSULE_RADII)].copy()
         yield Case(robot_at[k], person_at[k], d, expected[k], clearance)
 

@@ -75,7 +75,7 @@ def ssm_constraint_of(
 
     Args:
         settings: Assumptions of the layer; None for no layer.
-        dt: Control cycle [s].
+        dt: Control period [s].
         age: Age of the observation of people beyond the tracker's delay [s].
     """
     if settings is None or not settings.use_measured_velocity:

@@ -95,10 +95,10 @@ class QueryState:
     @property
     def shapes(self) -> Shapes:
         """The people as shapes, bodies first."""
-        crowd = self._work.crowd
+        geometry = self._work.geometry
         return Shapes(
-            columns=crowd.columns.copy(),
-            cylinders=np.concatenate([crowd.cylinders, self._tops], axis=1),
+            columns=geometry.columns.copy(),
+            cylinders=np.concatenate([geometry.cylinders, self._tops], axis=1),
             going=np.where(
                 self._measured[:, None],
                 self.state.people.walkers.rows[0][:, [VX, VY, GROWTH]],

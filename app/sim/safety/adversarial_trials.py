@@ -139,11 +139,11 @@ def run_trial(
     cell = with_people(load_cell(settings.cell), settings.people)
     arm, people = arm_of(cell), people_of(cell, REACHING)
     state = new_people_state(cell, people, 1)
-    crowd = new_people_geometry(people, len(cell.workers), len(cell.cylinders))
+    geometry = new_people_geometry(people, len(cell.workers), len(cell.cylinders))
     n_late = ceil(settings.true_delay / arm.dt - 1e-9)
     shape = (people.columns.shape[1], len(cell.cylinders))
     spaces = (watch.new_ssm_workspace(arm, *shape), watch.new_ssm_workspace(arm, *shape))
-    work = new_trial_work(arm, people, state, crowd, spaces, n_late)
+    work = new_trial_work(arm, people, state, geometry, spaces, n_late)
     rows = np.zeros((n_episodes, N_RESULT))
     trial = Trial(
         human_speed=settings.human_speed,

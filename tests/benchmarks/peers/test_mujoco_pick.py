@@ -36,11 +36,11 @@ def by_kernels(q: np.ndarray, human_q: np.ndarray) -> Iterator[np.ndarray]:
     robot = new_robot_pose(arm)
     for robot_q, person_q in zip(q, human_q, strict=True):
         place_robot(arm, robot_q, robot)
-        crowd = people_geometry_of(people, person_q[None], np.zeros((0, 3)))
+        geometry = people_geometry_of(people, person_q[None], np.zeros((0, 3)))
         n = len(arm.link)
-        found = np.empty((n, crowd.columns.shape[1]))
+        found = np.empty((n, geometry.columns.shape[1]))
         for k in range(n):
-            distances(robot.columns, k, crowd.columns, found[k])
+            distances(robot.columns, k, geometry.columns, found[k])
         pair_distances(robot.columns, arm.first, arm.second, robot.pair)
         near = found[:, : len(human.CAPSULE_NAMES)].ravel()
         yield np.concatenate([near, robot.pair, [table_clearance(robot.columns)[0]]])

@@ -51,10 +51,10 @@ class PeriodMotion(NamedTuple):
 
 
 @kernel(inline="always")
-def clearances(arm: Arm, people: People, robot: RobotPose, crowd: PeopleGeometry) -> Clear:
+def clearances(arm: Arm, people: People, robot: RobotPose, geometry: PeopleGeometry) -> Clear:
     """Return the distances of a placed robot to people, cell and itself [m]."""
     return (
-        people_clearance(people, robot.columns, crowd),
+        people_clearance(people, robot.columns, geometry),
         cell_clearance(arm, robot.columns)[0],
         self_clearance(arm, robot)[0],
     )
@@ -78,42 +78,42 @@ def sweep(
     people: People,
     motion: PeriodMotion,
     robot0: Vec,
-    crowd0: Vec,
+    workers0: Vec,
     clear: Vec,
     robot: RobotPose,
-    crowd: PeopleGeometry,
+    geometry: PeopleGeometry,
 ) -> tuple[int, float]:
     """Check one period for contact, including between its ends.
 
     Args:
         motion: Motion of robot and people.
         robot0: The robot's capsules at the start, shape (9, n).
-        crowd0: The workers' capsules at the start, shape (9, m).
+        workers0: The workers' capsules at the start, shape (9, m).
         clear: Clearances at the start, from :func:`clearances` [m], shape (3,); afterwards
             those at the last pose tested.
         robot: Work space; holds the last pose tested, the end of the period if no contact.
-        crowd: Work space, likewise; ``q0``, ``cylinders0`` and ``pelvis_z[0]`` hold the people
+        geometry: Work space, likewise; ``q0``, ``cylinders0``, ``pelvis_z[0]`` hold the people
             at the start, ``size`` their sizes at the end.
 
     Returns:
         Kind of contact, and the time in the period at which it was found [s].
     """
     place_robot(arm, motion.q1, robot)
-    place_workers(people, motion.human_q1, crowd)
+    place_workers(people, motion.human_q1, geometry)
     for w in range(motion.human_q1.shape[0]):
-        crowd.pelvis_z[1, w] = crowd.size[w, PELVIS_Z]
-    copy_rows(motion.cylinders1, crowd.cylinders)
+        geometry.pelvis_z[1, w] = geometry.size[w, PELVIS_Z]
+    copy_rows(motion.cylinders1, geometry.cylinders)
     robot_speed = robot_speed_bound(arm, motion.path, robot0, robot.columns)
     approach = robot_speed + people_speed_bound(
-        crowd0, crowd.columns, crowd.cylinders0, motion.cylinders1, arm.dt
+        workers0, geometry.columns, geometry.cylinders0, motion.cylinders1, arm.dt
     )
     begin = (clear[0], clear[1], clear[2])
-    end = clearances(arm, people, robot, crowd)
+    end = clearances(arm, people, robot, geometry)
     kind, x, last = NO_CONTACT, arm.dt, end
     if _kind(begin, end, robot_speed, approach, arm.dt) != NO_CONTACT:
         speeds = (robot_speed, approach)
-        kind, x, last = _search(arm, people, motion, begin, end, speeds, robot, crowd)
-        _place_at(arm, people, motion, x, robot, crowd)
+        kind, x, last = _search(arm, people, motion, begin, end, speeds, robot, geometry)
+        _place_at(arm, people, motion, x, robot, geometry)
     clear[0], clear[1], clear[2] = last
     return kind, x
 
@@ -127,7 +127,7 @@ def _search(
     end: Clear,
     speeds: tuple[float, float],
     robot: RobotPose,
-    crowd: PeopleGeometry,
+    geometry: PeopleGeometry,
 ) -> tuple[int, float, Clear]:
     """Halve the period until every interval is free or too short to be halved.
 
@@ -137,13 +137,13 @@ def _search(
         end: Clearances at the end [m].
         speeds: Bounds on the robot's speed and on that of robot and people together [m/s].
         robot: Work space.
-        crowd: Work space.
+        geometry: Work space.
 
     Returns:
         Kind of contact, its time in the period [s], and the clearances there [m].
     """
     a, top, (robot_speed, approach) = 0.0, 0, speeds
-    right, ahead = crowd.stack_end, crowd.stack_clear
+    right, ahead = geometry.stack_end, geometry.stack_clear
     right[0] = arm.dt
     ahead[0, 0], ahead[0, 1], ahead[0, 2] = end
     while top >= 0:
@@ -159,8 +159,10 @@ def _search(
         else:
             top += 1
             right[top] = 0.5 * (a + b)
-            _place_at(arm, people, motion, right[top], robot, crowd)
-            ahead[top, 0], ahead[top, 1], ahead[top, 2] = clearances(arm, people, robot, crowd)
+            _place_at(arm, people, motion, right[top], robot, geometry)
+            ahead[top, 0], ahead[top, 1], ahead[top, 2] = clearances(
+                arm, people, robot, geometry
+            )
     return NO_CONTACT, arm.dt, end
 
 
@@ -171,10 +173,10 @@ def _place_at(
     motion: PeriodMotion,
     x: float,
     robot: RobotPose,
-    crowd: PeopleGeometry,
+    geometry: PeopleGeometry,
 ) -> None:
     """Place robot and people at time ``x`` of the period [s]."""
-    q, part = crowd.robot_q, x / arm.dt
+    q, part = geometry.robot_q, x / arm.dt
     q0, qd0, c, d = motion.path
     human_q1, cylinders1 = motion.human_q1, motion.cylinders1
     for j in range(6):
@@ -182,11 +184,11 @@ def _place_at(
     place_robot(arm, q, robot)
     for w in range(human_q1.shape[0]):
         for j in range(18):
-            crowd.q[w, j] = crowd.q0[w, j] + part * (human_q1[w, j] - crowd.q0[w, j])
-        rise = crowd.pelvis_z[1, w] - crowd.pelvis_z[0, w]
-        crowd.size[w, PELVIS_Z] = crowd.pelvis_z[0, w] + part * rise
-    place_workers(people, crowd.q, crowd)
+            geometry.q[w, j] = geometry.q0[w, j] + part * (human_q1[w, j] - geometry.q0[w, j])
+        rise = geometry.pelvis_z[1, w] - geometry.pelvis_z[0, w]
+        geometry.size[w, PELVIS_Z] = geometry.pelvis_z[0, w] + part * rise
+    place_workers(people, geometry.q, geometry)
     for k in range(cylinders1.shape[0]):
         for i in range(3):
-            start = crowd.cylinders0[k, i]
-            crowd.cylinders[k, i] = start + part * (cylinders1[k, i] - start)
+            start = geometry.cylinders0[k, i]
+            geometry.cylinders[k, i] = start + part * (cylinders1[k, i] - start)

@@ -137,16 +137,16 @@ def observe_rows(
         view: PLAIN (the state of (5.8), ``N_PLAIN`` numbers) or FEATURES.
         out: Filled, shape (k, F).
     """
-    crowd, people = work.crowd, world.people
+    geometry, people = work.geometry, world.people
     n_people = max(1, state.people.q.shape[1] + state.people.cylinders.shape[1])
     human_q, human_qd = observation.human_q[:n_people], observation.human_qd[:n_people]
     size, point = observation.human_size[:n_people], observation.point
     for k in range(envs.shape[0]):
         e, row = envs[k], out[k]
         place_robot(world.arm, state.q[e], work.robot)
-        place_people(people, state.people, e, crowd)
+        place_people(people, state.people, e, geometry)
         observe_people(
-            people, state.people, e, work.robot.columns, crowd, human_q, human_qd, size
+            people, state.people, e, work.robot.columns, geometry, human_q, human_qd, size
         )
         if view == PLAIN:
             for j in range(6):

@@ -51,7 +51,7 @@ class GraspRules(NamedTuple):
 
 
 class ToolState(NamedTuple):
-    """The tool at the end of a control cycle."""
+    """The tool at the end of a control period."""
 
     tcp: Vec
     """Tool centre point [m], shape (3,)."""
@@ -98,14 +98,14 @@ def distance_left(rules: GraspRules, phase: int, goal: Vec, tcp: Vec) -> float:
 def next_phase(
     rules: GraspRules, phase: int, closing: float, goal: Vec, tool: ToolState, dt: float
 ) -> tuple[int, float, bool]:
-    """Return the phase after a control cycle, the closing time [s] and whether it succeeded.
+    """Return the phase after a control period, the closing time [s] and whether it succeeded.
 
     Args:
         phase: Phase of the pick.
         closing: Time for which the tool has been held at the object [s].
         goal: Target over the object [m], shape (3,).
         tool: The tool at the end of the cycle.
-        dt: Control cycle [s].
+        dt: Control period [s].
     """
     tcp = tool.tcp
     offset = math.hypot(goal[0] - tcp[0], goal[1] - tcp[1])

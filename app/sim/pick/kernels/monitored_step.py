@@ -1,7 +1,7 @@
 """Steps of the pick scenario under speed and separation monitoring (compiled).
 
-A control cycle is that of ``pick/kernels/episode.py`` with the safety layer between command and
-robot (``scenario/kernels/monitored_motion.py``).
+A control period is that of ``pick/kernels/episode.py`` with the safety layer between command
+and robot (``scenario/kernels/monitored_motion.py``).
 
 Source: docs/method.md 2.7.
 """

@@ -23,7 +23,7 @@ class RewardWeights(NamedTuple):
     c_c: float
     """Cost of a collision."""
     c_step: float
-    """Cost of a control cycle."""
+    """Cost of a control period."""
     c_v: float
     """Cost of tcp speed near the target [s/m]."""
     d_v: float
@@ -51,7 +51,7 @@ def reward(
     succeeded: bool,
     weights: RewardWeights,
 ) -> float:
-    """Return the reward of one control cycle.
+    """Return the reward of one control period.
 
     Args:
         d_old: Distance to the target before [m].

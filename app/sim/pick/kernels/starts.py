@@ -247,7 +247,7 @@ def reset_env(
     for attempt in range(START_TRIES):
         _draw_start(world, rules, state, e, work)
         place_robot(arm, state.q[e], work.robot)
-        start_people(world.people, state.people, e, rng, work.crowd)
+        start_people(world.people, state.people, e, rng, work.geometry)
         measure(arm, world.people, state, e, work)
         state.n_redrawn[e] = attempt
         clear = state.clear[e]
@@ -265,7 +265,7 @@ def measure_starts(
     """Measure clearances, tilts and distances of all environments at their starts."""
     for e in range(state.q.shape[0]):
         place_robot(world.arm, state.q[e], work.robot)
-        place_people(world.people, state.people, e, work.crowd)
+        place_people(world.people, state.people, e, work.geometry)
         measure(world.arm, world.people, state, e, work)
         state.tilt[e] = robot_tilt(work.robot)
         begin(state, e, state.time_left[e], work)

@@ -120,9 +120,9 @@ def reset_env(
         state.q[e, j], state.qd[e, j], state.qdd[e, j] = arm.home[j], 0.0, 0.0
     place_robot(arm, state.q[e], work.robot)
     for attempt in range(START_TRIES):
-        start_people(world.people, state.people, e, rng, work.crowd)
+        start_people(world.people, state.people, e, rng, work.geometry)
         state.n_redrawn[e] = attempt
-        clear = people_clearance(world.people, work.robot.columns, work.crowd)
+        clear = people_clearance(world.people, work.robot.columns, work.geometry)
         if clear >= rules.start_clearance:
             break
     measure(arm, world.people, state, e, work)
@@ -133,7 +133,7 @@ def reset_env(
 def outcome_of(
     collided: bool, touched: bool, near: bool, unfeasible: bool, time_left: float, ends: bool
 ) -> int:
-    """Return the outcome of an episode after a control cycle.
+    """Return the outcome of an episode after a control period.
 
     Args:
         collided: Whether there was a collision in this cycle.

@@ -104,13 +104,15 @@ def enclosing_radius(columns: Vec, first: int, n: int, x: float, y: float) -> fl
 
 
 @kernel(inline="always")
-def write_person(state: PeopleState, e: int, p: int, crowd: PeopleGeometry, out: Vec) -> None:
+def write_person(
+    state: PeopleState, e: int, p: int, geometry: PeopleGeometry, out: Vec
+) -> None:
     """Write one person of environment ``e`` as a cylinder.
 
     Args:
         e: Environment.
         p: The person: workers first, then pedestrians; below 0 for NO_PERSON.
-        crowd: The people, placed as they are now.
+        geometry: The people, placed as they are now.
         out: Filled with x, y [m], vx, vy [m/s], r [m], growth [m/s], shape (N_PERSON,).
     """
     n_workers = state.q.shape[1]
@@ -121,7 +123,7 @@ def write_person(state: PeopleState, e: int, p: int, crowd: PeopleGeometry, out:
         out[0], out[1] = state.q[e, p, 0], state.q[e, p, 1]
         out[2], out[3] = state.qd[e, p, 0], state.qd[e, p, 1]
         n = body.N_CAPSULES
-        out[4] = enclosing_radius(crowd.columns, p * n, n, out[0], out[1])
+        out[4] = enclosing_radius(geometry.columns, p * n, n, out[0], out[1])
         out[5] = 0.0
     else:
         rows, k = state.walkers.rows, p - n_workers

@@ -47,7 +47,7 @@ class ReachObservationWorkspace(NamedTuple):
 
     robot: RobotPose
     """The robot at the observed configuration."""
-    crowd: PeopleGeometry
+    geometry: PeopleGeometry
     """The people, placed as they are now."""
     observed: Vec
     """The observed person, shape (N_PERSON,)."""
@@ -94,7 +94,7 @@ def new_observation_workspace(
     body = new_person_workspace()
     return ReachObservationWorkspace(
         robot=new_robot_pose(arm),
-        crowd=new_people_geometry(people, state.q.shape[1], state.cylinders.shape[1]),
+        geometry=new_people_geometry(people, state.q.shape[1], state.cylinders.shape[1]),
         observed=np.zeros(N_PERSON),
         clearances=np.zeros(3),
         body=body,

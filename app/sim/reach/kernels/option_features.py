@@ -88,7 +88,7 @@ def predict_motion(
             continue
         if p == observed:
             work.n[1] = work.n[0]
-        write_person(state, e, p, work.crowd, work.person)
+        write_person(state, e, p, work.geometry, work.person)
         copy_values(work.person, work.people[work.n[0]])
         _predict_person(state, e, p - n_workers, work)
         work.n[0] += 1

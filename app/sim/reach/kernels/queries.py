@@ -41,9 +41,9 @@ def place(
 ) -> None:
     """Place robot and people of environment ``e``, and fill the distances of workers."""
     place_robot(world.arm, state.q[e], work.robot)
-    place_people(world.people, state.people, e, work.crowd)
+    place_people(world.people, state.people, e, work.geometry)
     if state.people.q.shape[1] > 0:
-        capsule_clearances(work.robot.columns, work.crowd.columns, work.crowd.gap)
+        capsule_clearances(work.robot.columns, work.geometry.columns, work.geometry.gap)
 
 
 @kernel(inline="always")
@@ -57,13 +57,13 @@ def _observe_people(
 ) -> float:
     """Fill the people of environment ``e`` in ``work``; return their clearance [m]."""
     place(world, state, e, work)
-    robot, crowd = work.robot, work.crowd
+    robot, geometry = work.robot, work.geometry
     observed, clearance = which, state.clear[e, 0]
     if which == ALL_PEOPLE:
-        observed = nearest_person(world.people, robot.columns, crowd)
-    elif crowd.q.shape[0] + crowd.cylinders.shape[0] > 1:
-        clearance = person_clearance(world.people, robot.columns, crowd, which)
-    write_person(state.people, e, observed, crowd, work.observed)
+        observed = nearest_person(world.people, robot.columns, geometry)
+    elif geometry.q.shape[0] + geometry.cylinders.shape[0] > 1:
+        clearance = person_clearance(world.people, robot.columns, geometry, which)
+    write_person(state.people, e, observed, geometry, work.observed)
     if view != PLAIN:
         extrapolate_clearances(world.people, state.people, e, which, work)
     if view >= FORECAST:
@@ -118,7 +118,7 @@ def measure_rows(
     """Store the clearance of robot and people in some environments, shape (k,)."""
     for e in envs:
         place(world, state, e, work)
-        state.clear[e, 0] = people_clearance(world.people, work.robot.columns, work.crowd)
+        state.clear[e, 0] = people_clearance(world.people, work.robot.columns, work.geometry)
 
 
 @kernel(nogil=True)
@@ -138,4 +138,4 @@ def distances_of_rows(
     for k in range(envs.shape[0]):
         place(world, state, envs[k], work)
         for p in range(out.shape[1]):
-            out[k, p] = person_clearance(world.people, work.robot.columns, work.crowd, p)
+            out[k, p] = person_clearance(world.people, work.robot.columns, work.geometry, p)

@@ -23,7 +23,7 @@ def load_state(
             pedestrians, shape (n_people,).
     """
     place(world, state, 0, work)
-    clear = clearances(world.arm, world.people, work.robot, work.crowd)
+    clear = clearances(world.arm, world.people, work.robot, work.geometry)
     state.clear[0, 0], state.clear[0, 1], state.clear[0, 2] = clear
     for p in range(distances.shape[0]):
-        distances[p] = person_clearance(world.people, work.robot.columns, work.crowd, p)
+        distances[p] = person_clearance(world.people, work.robot.columns, work.geometry, p)

@@ -1,7 +1,7 @@
 """Reward of the reach scenario (docs/method.md 2.3, compiled).
 
 ``r = c_p (d_old - gamma d) - c_d d - c_a |c| - c_step - c_c [collision] + c_s [success]``, with
-``d`` the distance of tcp and goal and ``|c|`` the Euclidean norm of the control cycle's second
+``d`` the distance of tcp and goal and ``|c|`` the Euclidean norm of the control period's second
 coefficients; speed and separation monitoring subtracts ``c_o`` in each cycle that it stops.
 ``c_p = c_step = 0`` is the thesis' reward; ``c_d = c_a = 0`` rewards progress, which learned
 far better where a collision ends the episode: a cost of distance alone rewards an early end.
@@ -19,7 +19,7 @@ class ReachWeights(NamedTuple):
     """Coefficients of the reward terms; a preset sets them."""
 
     c_d: float
-    """Cost of the distance to the goal per control cycle [1/m]."""
+    """Cost of the distance to the goal per control period [1/m]."""
     c_p: float
     """Progress toward the goal [1/m]."""
     gamma: float
@@ -27,13 +27,13 @@ class ReachWeights(NamedTuple):
     c_a: float
     """Cost of the norm of the coefficients, half the acceleration [s^2/rad]."""
     c_step: float
-    """Cost of a control cycle."""
+    """Cost of a control period."""
     c_c: float
-    """Cost of a control cycle with a collision."""
+    """Cost of a control period with a collision."""
     c_s: float
     """Bonus for success."""
     c_o: float = 0.0
-    """Cost of a control cycle in which speed and separation monitoring stops the robot."""
+    """Cost of a control period in which speed and separation monitoring stops the robot."""
 
 
 @kernel(inline="always")
@@ -51,7 +51,7 @@ def action_cost(c: Vec, c_a: float) -> float:
 def reward(
     d_old: float, d: float, c: Vec, collided: bool, succeeded: bool, weights: ReachWeights
 ) -> float:
-    """Return the reward of one control cycle.
+    """Return the reward of one control period.
 
     Args:
         d_old: Distance to the goal before [m].

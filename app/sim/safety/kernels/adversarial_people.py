@@ -72,7 +72,7 @@ class TrialWorkspace(NamedTuple):
 
     state: PeopleState
     """Scripts and walks, one row."""
-    crowd: PeopleGeometry
+    geometry: PeopleGeometry
     """A pose of the people."""
     columns0: Vec
     """The people's capsules at the start of a period, shape (9, m)."""
@@ -173,10 +173,10 @@ def place_workers_at(people: People, work: TrialWorkspace, step: float) -> None:
     state, out = work.state, work.columns1
     for w in range(work.time.shape[0]):
         when = state.clock[0, w] + people.pace * (work.time[w] + step)
-        worker_at(people, state, 0, w, when, people.pace, work.crowd.away)
-    copy_rows(state.size[0], work.crowd.size)
-    place_workers(people, state.q[0], work.crowd)
-    copy_rows(work.crowd.columns, out)
+        worker_at(people, state, 0, w, when, people.pace, work.geometry.away)
+    copy_rows(state.size[0], work.geometry.size)
+    place_workers(people, state.q[0], work.geometry)
+    copy_rows(work.geometry.columns, out)
     for w in range(work.time.shape[0]):
         for k in range(w * body.N_CAPSULES, (w + 1) * body.N_CAPSULES):
             for i in range(3):
@@ -267,7 +267,7 @@ def new_trial_work(
     arm: Arm,
     people: People,
     state: PeopleState,
-    crowd: PeopleGeometry,
+    geometry: PeopleGeometry,
     spaces: tuple[SsmWorkspace, SsmWorkspace],
     n_late: int,
 ) -> TrialWorkspace:
@@ -276,7 +276,7 @@ def new_trial_work(
     columns, cylinders = people.columns, np.zeros((n_pedestrians, 4))
     return TrialWorkspace(
         state=state,
-        crowd=crowd,
+        geometry=geometry,
         columns0=columns.copy(),
         columns1=columns.copy(),
         cylinders0=cylinders.copy(),

@@ -173,7 +173,7 @@ def _draw_place(arm: Arm, people: People, work: TrialWorkspace) -> float:
         work.q[j] = arm.limits.q_min[j] + random.uniform(rng) * (
             arm.limits.q_max[j] - arm.limits.q_min[j]
         )
-    start_people(people, work.state, 0, rng, work.crowd)
+    start_people(people, work.state, 0, rng, work.geometry)
     for w in range(work.time.shape[0]):
         work.time[w] = 0.0
         work.offset[w, 0], work.offset[w, 1], work.offset[w, 2] = 0.0, 0.0, 0.0

@@ -82,7 +82,7 @@ class EpisodeState(NamedTuple):
     tilt: Vec
     """Pick: angle of the tool axis to the vertical [rad], shape (n_envs,)."""
     touched: Indices
-    """Reach: control cycles with a collision in the present episode, shape (n_envs,)."""
+    """Reach: control periods with a collision in the present episode, shape (n_envs,)."""
     episode: Indices
     """Number of the present episode, shape (n_envs,)."""
     outcome: Indices
@@ -132,18 +132,18 @@ class StepWorkspace(NamedTuple):
 
     robot: RobotPose
     """A pose of the robot."""
-    crowd: PeopleGeometry
+    geometry: PeopleGeometry
     """A pose of the people."""
     c: Vec
-    """Second coefficients of a control cycle [rad/s^2], shape (6,)."""
+    """Second coefficients of a control period [rad/s^2], shape (6,)."""
     d: Vec
-    """Third coefficients of a control cycle [rad/s^3], shape (6,)."""
+    """Third coefficients of a control period [rad/s^3], shape (6,)."""
     q: Vec
-    """Joint positions at the end of a control cycle [rad], shape (6,)."""
+    """Joint positions at the end of a control period [rad], shape (6,)."""
     qd: Vec
-    """Joint speeds at the end of a control cycle [rad/s], shape (6,)."""
+    """Joint speeds at the end of a control period [rad/s], shape (6,)."""
     qdd: Vec
-    """Joint accelerations at the end of a control cycle [rad/s^2], shape (6,)."""
+    """Joint accelerations at the end of a control period [rad/s^2], shape (6,)."""
     rng: random.State
     """Random stream of the episode that starts, shape (1,)."""
 
@@ -152,7 +152,7 @@ def new_step_workspace(arm: Arm, people: People, state: PeopleState) -> StepWork
     """Return work space for environments with the people of ``state``."""
     return StepWorkspace(
         robot=new_robot_pose(arm),
-        crowd=new_people_geometry(people, state.q.shape[1], state.cylinders.shape[1]),
+        geometry=new_people_geometry(people, state.q.shape[1], state.cylinders.shape[1]),
         c=np.zeros(6),
         d=np.zeros(6),
         q=np.zeros(6),
@@ -172,7 +172,7 @@ def move(
     act: NDArray[np.float32],
     work: StepWorkspace,
 ) -> tuple[bool, bool]:
-    """Move robot and people of environment ``e`` through one control cycle.
+    """Move robot and people of environment ``e`` through one control period.
 
     Args:
         action: Action type and bounds.
@@ -184,38 +184,38 @@ def move(
     Returns:
         Whether there was a contact, and whether a joint had no admissible coefficient.
     """
-    rows, crowd, robot = state.people, work.crowd, work.robot
-    copy_rows(rows.q[e], crowd.q0)
-    copy_rows(rows.cylinders[e], crowd.cylinders0)
+    rows, geometry, robot = state.people, work.geometry, work.robot
+    copy_rows(rows.q[e], geometry.q0)
+    copy_rows(rows.cylinders[e], geometry.cylinders0)
     for w in range(rows.q.shape[1]):
-        crowd.pelvis_z[0, w] = rows.size[e, w, PELVIS_Z]
+        geometry.pelvis_z[0, w] = rows.size[e, w, PELVIS_Z]
     start = JointState(state.q[e], state.qd[e], state.qdd[e])
     segment, end = Coefficients(work.c, work.d), JointState(work.q, work.qd, work.qdd)
     unfeasible = advance(action, arm.limits, arm.dt, start, act, segment, end)
     state.elapsed[e] += arm.dt
     state.time_left[e] -= arm.dt
-    advance_people(people, rows, e, state.robot[e], arm.dt, crowd.away)
-    copy_rows(rows.size[e], crowd.size)
+    advance_people(people, rows, e, state.robot[e], arm.dt, geometry.away)
+    copy_rows(rows.size[e], geometry.size)
     path = JointPath(state.q[e], state.qd[e], work.c, work.d)
     motion = PeriodMotion(path, work.q, rows.q[e], rows.cylinders[e])
     capsules0, clear = state.robot[e], state.clear[e]
-    kind, _ = sweep(arm, people, motion, capsules0, rows.columns[e], clear, robot, crowd)
+    kind, _ = sweep(arm, people, motion, capsules0, rows.columns[e], clear, robot, geometry)
     for j in range(6):
         state.q[e, j], state.qd[e, j], state.qdd[e, j] = work.q[j], work.qd[j], work.qdd[j]
     if kind != NO_CONTACT:
         place_robot(arm, work.q, robot)
-        place_people(people, rows, e, crowd)
+        place_people(people, rows, e, geometry)
     if people.yielding > 0.0:
-        store_clearances(rows, e, crowd)
+        store_clearances(rows, e, geometry)
     copy_capsules(robot.columns, state.robot[e])
-    copy_rows(crowd.columns, rows.columns[e])
+    copy_rows(geometry.columns, rows.columns[e])
     return kind != NO_CONTACT, unfeasible
 
 
 @kernel(inline="always")
 def measure(arm: Arm, people: People, state: EpisodeState, e: int, work: StepWorkspace) -> None:
     """Store the clearances of the placed robot and people in environment ``e``."""
-    clear = clearances(arm, people, work.robot, work.crowd)
+    clear = clearances(arm, people, work.robot, work.geometry)
     state.clear[e, 0], state.clear[e, 1], state.clear[e, 2] = clear
 
 
@@ -231,7 +231,7 @@ def begin(state: EpisodeState, e: int, time_limit: float, work: StepWorkspace) -
     """
     state.distance[e] = distance_to(state.goal[e], work.robot)
     copy_capsules(work.robot.columns, state.robot[e])
-    copy_rows(work.crowd.columns, state.people.columns[e])
+    copy_rows(work.geometry.columns, state.people.columns[e])
     state.time_left[e], state.elapsed[e] = time_limit, 0.0
     state.touched[e], state.outcome[e] = 0, RUNNING
 

@@ -1,11 +1,11 @@
-"""Motion of a control cycle under speed and separation monitoring (compiled).
+"""Motion of a control period under speed and separation monitoring (compiled).
 
 All scenarios share it. The commanded segment passes through ``ssm.decide``, and the admitted
 motion is executed. People move as without the layer, or along given tracks of cylinders.
-Contacts with people between the ends of a cycle are found by conservative advancement along the
-executed motion (``adversarial_trials.first_contact``), and the speed of the touching link tells
-whether the robot was moving. Contact of the robot with its cell or itself is checked at the
-ends of cycles.
+Contacts with people between the ends of a period are found by conservative advancement along
+the executed motion (``adversarial_trials.first_contact``), and the speed of the touching link
+tells whether the robot was moving. Contact of the robot with its cell or itself is checked at
+the ends of periods.
 
 Source: docs/method.md 2.7.
 """
@@ -112,14 +112,14 @@ def begin_rows(
         if monitor.tracks.shape[0] > 0:
             follow_track(state, e, monitor, arm.dt)
             place_robot(arm, state.q[e], work.robot)
-            place_people(people, state.people, e, work.crowd)
+            place_people(people, state.people, e, work.geometry)
             measure(arm, people, state, e, work)
         state.time_left[e] = min(monitor.horizon, state.time_left[e])
 
 
 @kernel(inline="always")
 def _people_before(people: People, state: EpisodeState, e: int, trial: TrialWorkspace) -> None:
-    """Store the people at the start of a control cycle."""
+    """Store the people at the start of a control period."""
     copy_rows(state.people.columns[e], trial.columns0)
     for k in range(trial.cylinders0.shape[0]):
         for i in range(3):
@@ -137,16 +137,16 @@ def _people_after(
     monitor: MonitoredState,
     work: StepWorkspace,
 ) -> None:
-    """Move the people through one control cycle and store them at its end."""
+    """Move the people through one control period and store them at its end."""
     trial = monitor.trial
     monitor.period[e] += 1
     if monitor.tracks.shape[0] > 0:
         follow_track(state, e, monitor, arm.dt)
     else:
-        advance_people(people, state.people, e, state.robot[e], arm.dt, work.crowd.away)
-    place_people(people, state.people, e, work.crowd)
-    copy_rows(work.crowd.columns, state.people.columns[e])
-    copy_rows(work.crowd.columns, trial.columns1)
+        advance_people(people, state.people, e, state.robot[e], arm.dt, work.geometry.away)
+    place_people(people, state.people, e, work.geometry)
+    copy_rows(work.geometry.columns, state.people.columns[e])
+    copy_rows(work.geometry.columns, trial.columns1)
     for k in range(trial.cylinders1.shape[0]):
         for i in range(3):
             trial.cylinders1[k, i] = state.people.cylinders[e, k, i]
@@ -240,7 +240,7 @@ def _arrive(
     copy_capsules(work.robot.columns, state.robot[e])
     measure(arm, people, state, e, work)
     if people.yielding > 0.0:
-        store_clearances(state.people, e, work.crowd)
+        store_clearances(state.people, e, work.geometry)
 
 
 @kernel(inline="always")
@@ -271,14 +271,14 @@ def move_monitored(
     monitor: MonitoredState,
     work: StepWorkspace,
 ) -> bool:
-    """Move robot and people of environment ``e`` through one control cycle.
+    """Move robot and people of environment ``e`` through one control period.
 
     Args:
         state: Environments; changed.
         e: Environment.
         monitor: Safety layer, tracks and accounts.
         work: ``c``, ``d`` are the command; ``q``, ``qd``, ``qdd`` its end. Afterwards ``robot``
-            and ``crowd`` are the poses at the end of the cycle.
+            and ``geometry`` are the poses at the end of the cycle.
 
     Returns:
         Whether there was a contact that ends the episode.

@@ -26,10 +26,10 @@ N_ACCOUNT = 14
     TOUCHED_AT_REST,
     ALLOWED,
 ) = range(N_ACCOUNT)
-"""Account of an episode: control cycles; cycles with override 0, below one half and below 1;
-cycles that end at standstill, and those of them with override 0; path length of the joints
+"""Account of an episode: control periods; periods with override 0, below one half and below 1;
+periods that end at standstill, and those of them with override 0; path length of the joints
 [rad] and of the tcp [m]; NO_TOUCH, PERSON or CELL; speed of the touching link [m/s]; greatest
-speed of any person [m/s]; sum of the overrides; cycles in which a person touches the robot at
+speed of any person [m/s]; sum of the overrides; periods in which a person touches the robot at
 standstill; speed at which the part touched by a moving link may be touched [m/s]."""
 NO_TOUCH, PERSON, CELL = range(3)
 """Contacts of an episode."""
@@ -49,14 +49,14 @@ class MonitoredState(NamedTuple):
     measured: bool
     """Whether the layer uses the measured velocity of pedestrians."""
     tracks: Vec
-    """Cylinder in place of each environment's first pedestrian at the ends of control cycles:
+    """Cylinder in place of each environment's first pedestrian at the ends of control periods:
     x, y, radius [m], shape (n_envs, n + 1, 3); no rows where people walk by themselves."""
     period: NDArray[np.int64]
-    """Control cycle of each track, shape (n_envs,)."""
+    """Control period of each track, shape (n_envs,)."""
     trial: TrialWorkspace
     """Work space of the contact search and the safety layer."""
     override: Vec
-    """Override of the last control cycle, shape (n_envs,)."""
+    """Override of the last control period, shape (n_envs,)."""
     account: Vec
     """Account of the present episode, shape (n_envs, N_ACCOUNT)."""
     closed: Vec

@@ -13,19 +13,19 @@ from app.sim.sorting.kernels.shortest_paths import Ints, lay_out
 @kernel()
 def _shift(source: int, target: int, objects: Objects) -> None:
     """Move the object at one position to another."""
-    n_cells = len(objects.clutter)
-    if source < n_cells:
+    n_slots = len(objects.clutter)
+    if source < n_slots:
         code = objects.clutter[source]
         objects.clutter[source] = 0
     else:
-        c = source - n_cells
+        c = source - n_slots
         objects.heights[c] -= 1
         code = objects.towers[c, objects.heights[c]]
         objects.towers[c, objects.heights[c]] = 0
-    if target < n_cells:
+    if target < n_slots:
         objects.clutter[target] = code
     else:
-        c = target - n_cells
+        c = target - n_slots
         objects.towers[c, objects.heights[c]] = code
         objects.heights[c] += 1
 

@@ -22,8 +22,8 @@ from app.sim.sorting.kernels.task import (
     SortingRows,
     SortingRules,
     is_solved,
-    n_cells,
-    nth_cell,
+    n_slots,
+    nth_slot,
     push,
 )
 
@@ -131,9 +131,9 @@ def _scatter(rows: SortingRows, e: int, rng: random.State, n_junk: int, rest: In
                 if i < n_junk:
                     push(rows, e, random.below(rng, rows.towers.shape[1]), code)
                 else:
-                    free = n_cells(rows, e, False)
-                    cell = nth_cell(rows, e, random.below(rng, free), False)
-                    rows.clutter[e, cell] = code
+                    free = n_slots(rows, e, False)
+                    slot = nth_slot(rows, e, random.below(rng, free), False)
+                    rows.clutter[e, slot] = code
                 break
             index -= rest[code]
 

@@ -1,7 +1,7 @@
 """Interference of people with a sorting task (docs/method.md 1.2, compiled).
 
 With equal probability, a person adds an object to the clutter, removes one that the goal does
-not need, moves one from a clutter cell or the top of a tower to a free cell, or changes the
+not need, moves one from a clutter slot or the top of a tower to a free slot, or changes the
 goal. Goals remain feasible.
 """
 
@@ -13,8 +13,8 @@ from app.sim.sorting.kernels.task import (
     SortingRows,
     SortingRules,
     is_solved,
-    n_cells,
-    nth_cell,
+    n_slots,
+    nth_slot,
     pop,
 )
 
@@ -40,42 +40,42 @@ def _count(rows: SortingRows, e: int, there: Ints) -> int:
 @kernel()
 def _add(rows: SortingRows, e: int, rng: random.State) -> None:
     there = rows.counts[e, 0]
-    free = n_cells(rows, e, False)
+    free = n_slots(rows, e, False)
     if _count(rows, e, there) < rows.clutter.shape[1] and free > 0:
-        cell = nth_cell(rows, e, random.below(rng, free), False)
-        rows.clutter[e, cell] = 1 + random.below(rng, there.shape[0] - 1)
+        slot = nth_slot(rows, e, random.below(rng, free), False)
+        rows.clutter[e, slot] = 1 + random.below(rng, there.shape[0] - 1)
 
 
 @kernel()
 def _remove(rows: SortingRows, e: int, rng: random.State) -> None:
-    occupied = n_cells(rows, e, True)
+    occupied = n_slots(rows, e, True)
     if occupied == 0:
         return
     there = rows.counts[e, 0]
     _count(rows, e, there)
-    cell = nth_cell(rows, e, random.below(rng, occupied), True)
-    code, wanted = int(rows.clutter[e, cell]), 0
+    slot = nth_slot(rows, e, random.below(rng, occupied), True)
+    code, wanted = int(rows.clutter[e, slot]), 0
     for c in range(rows.goal.shape[1]):
         for k in range(rows.goal_heights[e, c]):
             if rows.goal[e, c, k] == code:
                 wanted += 1
     if there[code] > wanted:
-        rows.clutter[e, cell] = 0
+        rows.clutter[e, slot] = 0
 
 
 @kernel()
 def _move(rows: SortingRows, e: int, rng: random.State) -> None:
-    free, occupied = n_cells(rows, e, False), n_cells(rows, e, True)
+    free, occupied = n_slots(rows, e, False), n_slots(rows, e, True)
     if free == 0:
         return
-    target = nth_cell(rows, e, random.below(rng, free), False)
+    target = nth_slot(rows, e, random.below(rng, free), False)
     c = random.below(rng, rows.towers.shape[1])
     if random.uniform(rng) < 0.5 and rows.heights[e, c] > 0:
         rows.clutter[e, target] = pop(rows, e, c)
     elif occupied > 0:
-        cell = nth_cell(rows, e, random.below(rng, occupied), True)
-        rows.clutter[e, target] = rows.clutter[e, cell]
-        rows.clutter[e, cell] = 0
+        slot = nth_slot(rows, e, random.below(rng, occupied), True)
+        rows.clutter[e, target] = rows.clutter[e, slot]
+        rows.clutter[e, slot] = 0
 
 
 @kernel()

@@ -1,6 +1,6 @@
 """Exact plans of the sorting task (compiled).
 
-A pick from cell ``k`` takes ``1 / (1 - fail[k])`` attempts on average; picks from towers do not
+A pick from slot ``k`` takes ``1 / (1 - fail[k])`` attempts on average; picks from towers do not
 fail. Among plans with the fewest moves, one with few expected attempts is found by rules
 (:mod:`app.sim.sorting.kernels.tie_breaking`) and one-step rollouts: where the rules put aside
 an object that is needed later, every alternative is simulated with the rules, and the best is
@@ -37,14 +37,14 @@ MAX_STATES = 20_000
 LESS = 1e-9
 """Least reduction of attempts by a preferred plan."""
 CELLS_TRIED = 3
-"""Number of best free cells tried for an object put aside, besides the worst one."""
+"""Number of best free slots tried for an object put aside, besides the worst one."""
 
 
 class Objects(NamedTuple):
     """Positions of the objects in a plan."""
 
     clutter: Bytes
-    """Objects in the cells, shape (K,)."""
+    """Objects in the slots, shape (K,)."""
     towers: Bytes
     """Objects on the towers, lowest first, shape (C, K)."""
     heights: Ints
@@ -59,7 +59,7 @@ class Task(NamedTuple):
     goal_heights: Ints
     """Objects per tower of the goal, shape (C,)."""
     fail: Vec
-    """Failure probabilities of the cells, shape (K,)."""
+    """Failure probabilities of the slots, shape (K,)."""
 
 
 class PlannerWork(NamedTuple):
@@ -79,24 +79,24 @@ class PlannerWork(NamedTuple):
     """The plan that was followed, then -1, shape (4 K + 1,)."""
 
 
-def _new_objects(n_cells: int, n_colours: int) -> Objects:
+def _new_objects(n_slots: int, n_colours: int) -> Objects:
     """Return work space for the objects of a task."""
     return Objects(
-        clutter=np.zeros(n_cells, dtype=np.int8),
-        towers=np.zeros((n_colours, n_cells), dtype=np.int8),
+        clutter=np.zeros(n_slots, dtype=np.int8),
+        towers=np.zeros((n_colours, n_slots), dtype=np.int8),
         heights=np.zeros(n_colours, dtype=np.int64),
     )
 
 
-def new_work(n_cells: int, n_colours: int, n_sizes: int) -> PlannerWork:
+def new_work(n_slots: int, n_colours: int, n_sizes: int) -> PlannerWork:
     """Return work space: 30 kB for K = 20, C = 3; 10 MB for K = 40, C = 5."""
     return PlannerWork(
-        paths=new_shortest_paths(n_cells, n_colours, n_sizes),
+        paths=new_shortest_paths(n_slots, n_colours, n_sizes),
         at=np.zeros(n_colours, dtype=np.int64),
-        now=_new_objects(n_cells, n_colours),
-        trial=_new_objects(n_cells, n_colours),
-        first=np.zeros(n_colours * (2 * n_cells + n_colours), dtype=np.bool_),
-        actions=np.zeros(4 * n_cells + 1, dtype=np.int64),
+        now=_new_objects(n_slots, n_colours),
+        trial=_new_objects(n_slots, n_colours),
+        first=np.zeros(n_colours * (2 * n_slots + n_colours), dtype=np.bool_),
+        actions=np.zeros(4 * n_slots + 1, dtype=np.int64),
     )
 
 
@@ -144,15 +144,15 @@ def _apply_action(action: int, objects: Objects, task: Task, work: PlannerWork) 
     Returns:
         Whether the states had to be written again: an object waits on a tower.
     """
-    p, n_cells, n_towers = work.paths, len(objects.clutter), len(objects.heights)
-    moves = n_cells * n_towers
+    p, n_slots, n_towers = work.paths, len(objects.clutter), len(objects.heights)
+    moves = n_slots * n_towers
     d = action % n_towers
     if action < moves:
         code = objects.clutter[action // n_towers]
         objects.clutter[action // n_towers] = 0
     else:
         c = (
-            (action - moves) // n_cells
+            (action - moves) // n_slots
             if action < 2 * moves
             else (action - 2 * moves) // n_towers
         )
@@ -161,7 +161,7 @@ def _apply_action(action: int, objects: Objects, task: Task, work: PlannerWork) 
         objects.towers[c, objects.heights[c]] = 0
         p.at[c] = p.below[c, p.at[c]]
         if action < 2 * moves:
-            objects.clutter[(action - moves) % n_cells] = code
+            objects.clutter[(action - moves) % n_slots] = code
             return False
         d = (action - 2 * moves) % n_towers
     objects.towers[d, objects.heights[d]] = code
@@ -212,7 +212,7 @@ def _try(action: int, best: float, task: Task, work: PlannerWork) -> float:
 
 @kernel()
 def _next_free(last: int, clutter: Bytes, fail: Vec) -> int:
-    """Return the next free cell by risk after ``last`` (-1: the best), -1 after the worst."""
+    """Return the next free slot by risk after ``last`` (-1: the best), -1 after the worst."""
     found = -1
     for k in range(len(clutter)):
         if clutter[k] != 0 or k == last:
@@ -225,7 +225,7 @@ def _next_free(last: int, clutter: Bytes, fail: Vec) -> int:
 
 @kernel()
 def _try_cells(c: int, best: float, task: Task, work: PlannerWork) -> tuple[int, float]:
-    """Evaluate the best free cells and the worst one for the top of a tower.
+    """Evaluate the best free slots and the worst one for the top of a tower.
 
     Args:
         c: The tower.
@@ -236,8 +236,8 @@ def _try_cells(c: int, best: float, task: Task, work: PlannerWork) -> tuple[int,
     Returns:
         The best such action, -1 where none is better, and the expected attempts then.
     """
-    now, n_cells = work.now, len(work.now.clutter)
-    base = n_cells * len(now.heights) + c * n_cells
+    now, n_slots = work.now, len(work.now.clutter)
+    base = n_slots * len(now.heights) + c * n_slots
     chosen, k = NONE, -1
     for n in range(CELLS_TRIED + 1):
         if n < CELLS_TRIED:
@@ -279,11 +279,11 @@ def _best_of_alternatives(task: Task, work: PlannerWork) -> int:
     """
     p, now = work.paths, work.now
     chosen = _choose(now, task, p)
-    n_cells, n_towers = len(now.clutter), len(now.heights)
-    moves = n_cells * n_towers
+    n_slots, n_towers = len(now.clutter), len(now.heights)
+    moves = n_slots * n_towers
     if not moves <= chosen < 2 * moves:
         return chosen
-    top = p.top[(chosen - moves) // n_cells, p.at[(chosen - moves) // n_cells]]
+    top = p.top[(chosen - moves) // n_slots, p.at[(chosen - moves) // n_slots]]
     if still_wanted(top, task.goal, task.goal_heights, p) == 0:
         return chosen
     best, index = np.inf, state_number(p)

@@ -23,7 +23,7 @@ class TaskBatch(NamedTuple):
     """States and goals of ``n`` tasks of one shape."""
 
     clutter: Bytes
-    """Objects in the cells, shape (n, K)."""
+    """Objects in the slots, shape (n, K)."""
     towers: Bytes
     """Objects on the towers, lowest first, shape (n, C, K)."""
     heights: Ints
@@ -33,7 +33,7 @@ class TaskBatch(NamedTuple):
     goal_heights: Ints
     """Objects per tower in the goal, shape (n, C)."""
     fail: Vec
-    """Failure probabilities of the cells, shape (n, K)."""
+    """Failure probabilities of the slots, shape (n, K)."""
 
 
 @kernel()

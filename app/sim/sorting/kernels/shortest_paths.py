@@ -6,7 +6,7 @@ goal is built, lowest level first. So a tower is described by one number, its *p
 Progress of all towers is a state: what lies in the clutter follows from it by counting. From a
 state lead
 
-- the removal of a tower's top to the clutter (there is always a free cell),
+- the removal of a tower's top to the clutter (there is always a free slot),
 - the placement of a tower's next object from the clutter, where there is one,
 - a tower's top straight onto a tower that wants it next: two moves' work in one,
 
@@ -71,16 +71,16 @@ class ShortestPaths(NamedTuple):
     """Work space of searches: states met; as ``table``."""
 
 
-def most_states(n_cells: int, n_colours: int) -> int:
+def most_states(n_slots: int, n_colours: int) -> int:
     """Return the largest number of states of a task, with K removals and K goals."""
-    each, more = divmod(2 * n_cells, n_colours)
+    each, more = divmod(2 * n_slots, n_colours)
     return int((each + 2) ** more * (each + 1) ** (n_colours - more))
 
 
-def new_shortest_paths(n_cells: int, n_colours: int, n_sizes: int) -> ShortestPaths:
+def new_shortest_paths(n_slots: int, n_colours: int, n_sizes: int) -> ShortestPaths:
     """Return work space for tasks of a shape: 7 bytes per state, 10 MB for K = 40, C = 5."""
-    c, length = n_colours, 2 * n_cells + 1
-    n_codes, size = 1 + n_colours * n_sizes, most_states(n_cells, n_colours)
+    c, length = n_colours, 2 * n_slots + 1
+    n_codes, size = 1 + n_colours * n_sizes, most_states(n_slots, n_colours)
     return ShortestPaths(
         n=np.zeros(c, dtype=np.int64),
         stride=np.zeros(c, dtype=np.int64),
@@ -220,7 +220,7 @@ def lay_out(
     """Write the states of a task.
 
     Args:
-        clutter: Objects in the cells, shape (K,).
+        clutter: Objects in the slots, shape (K,).
         towers: Objects on the towers, lowest first, shape (C, K).
         heights: Objects per tower, shape (C,).
         goal: Goal of the towers, shape (C, K).

@@ -3,7 +3,7 @@
 Codes, positions and the numbering of actions are those of ``state.py``; episodes are
 drawn by ``initial_states.py`` and the people's interference by ``interference.py``.
 
-Source: thesis eq. (3.13)-(3.19). Deviates: placing into an occupied clutter cell, not covered
+Source: thesis eq. (3.13)-(3.19). Deviates: placing into an occupied clutter slot, not covered
 by the thesis, returns the object.
 """
 
@@ -61,7 +61,7 @@ class SortingRules(NamedTuple):
 
 
 class SortingRows(NamedTuple):
-    """Rows of all tasks; ``n`` of them, ``K`` cells, ``C`` colours."""
+    """Rows of all tasks; ``n`` of them, ``K`` slots, ``C`` colours."""
 
     clutter: Codes
     """Objects in the clutter, shape (n, K)."""
@@ -74,7 +74,7 @@ class SortingRows(NamedTuple):
     goal_heights: Ints
     """Objects per tower of the goal, shape (n, C)."""
     fail: Floats
-    """Failure probabilities of the clutter cells, shape (n, K)."""
+    """Failure probabilities of the clutter slots, shape (n, K)."""
     own_fail: Floats
     """Those of the work cell, shape (n, K)."""
     fixed_objects: Ints
@@ -129,8 +129,8 @@ def pop(rows: SortingRows, e: int, c: int) -> int:
 
 
 @kernel()
-def nth_cell(rows: SortingRows, e: int, wanted: int, occupied: bool) -> int:
-    """Return the ``wanted``-th occupied or free clutter cell, from 0; -1 without one."""
+def nth_slot(rows: SortingRows, e: int, wanted: int, occupied: bool) -> int:
+    """Return the ``wanted``-th occupied or free clutter slot, from 0; -1 without one."""
     seen = 0
     for k in range(rows.clutter.shape[1]):
         if (rows.clutter[e, k] != 0) == occupied:
@@ -141,8 +141,8 @@ def nth_cell(rows: SortingRows, e: int, wanted: int, occupied: bool) -> int:
 
 
 @kernel()
-def n_cells(rows: SortingRows, e: int, occupied: bool) -> int:
-    """Return the number of occupied or free clutter cells."""
+def n_slots(rows: SortingRows, e: int, occupied: bool) -> int:
+    """Return the number of occupied or free clutter slots."""
     found = 0
     for k in range(rows.clutter.shape[1]):
         if (rows.clutter[e, k] != 0) == occupied:
@@ -159,28 +159,28 @@ def attempt(
     rng = rows.rng[e]
     empty = stuck = failed = back = False
     if action < n * n_towers:
-        cell, c = action // n_towers, action % n_towers
-        empty = rows.clutter[e, cell] == 0
+        slot, c = action // n_towers, action % n_towers
+        empty = rows.clutter[e, slot] == 0
         if not empty:
-            failed = random.uniform(rng) < rows.fail[e, cell]
+            failed = random.uniform(rng) < rows.fail[e, slot]
         if not empty and not failed:
             if rules.localisation_rate > 0.0:
-                others = n_cells(rows, e, True) - 1
+                others = n_slots(rows, e, True) - 1
                 if others > 0 and random.uniform(rng) < rules.localisation_rate:
-                    found = nth_cell(rows, e, random.below(rng, others), True)
+                    found = nth_slot(rows, e, random.below(rng, others), True)
                     # The last one stands in for the one that was meant.
-                    cell = nth_cell(rows, e, others, True) if found == cell else found
+                    slot = nth_slot(rows, e, others, True) if found == slot else found
                     failed = True
-            push(rows, e, c, int(rows.clutter[e, cell]))
-            rows.clutter[e, cell] = 0
+            push(rows, e, c, int(rows.clutter[e, slot]))
+            rows.clutter[e, slot] = 0
             rows.moves[e] += 1
     elif action < 2 * n * n_towers:
-        c, cell = (action - n * n_towers) // n, (action - n * n_towers) % n
+        c, slot = (action - n * n_towers) // n, (action - n * n_towers) % n
         empty = rows.heights[e, c] == 0
-        stuck = not empty and rows.clutter[e, cell] != 0
+        stuck = not empty and rows.clutter[e, slot] != 0
         if not empty and not stuck:
             back = True
-            rows.clutter[e, cell] = pop(rows, e, c)
+            rows.clutter[e, slot] = pop(rows, e, c)
             rows.moves[e] += 1
     else:
         c = (action - 2 * n * n_towers) // n_towers
@@ -218,7 +218,7 @@ def write_mask(rows: SortingRows, e: int, mask: NDArray[np.bool_]) -> None:
 
 @kernel()
 def write_obs(rows: SortingRows, e: int, out: NDArray[np.uint8]) -> None:
-    """Write cells, towers, goal and failure probabilities of row ``e`` as integers."""
+    """Write slots, towers, goal and failure probabilities of row ``e`` as integers."""
     n, n_towers = rows.clutter.shape[1], rows.towers.shape[1]
     for k in range(n):
         out[k] = rows.clutter[e, k]

@@ -4,9 +4,9 @@ Shortest plans come from :mod:`app.sim.sorting.kernels.shortest_paths`. The rule
 this order:
 
 1. tower to tower, without risk;
-2. clutter to tower, the least risky of all wanted objects, which frees a good cell;
-3. tower to clutter: the object with the least risk when picked again, into the best free cell;
-   an object that is not needed again into the worst free cell.
+2. clutter to tower, the least risky of all wanted objects, which frees a good slot;
+3. tower to clutter: the object with the least risk when picked again, into the best free slot;
+   an object that is not needed again into the worst free slot.
 """
 
 import numpy as np
@@ -28,7 +28,7 @@ NONE = -1
 
 @kernel()
 def safest_cell(code: int, clutter: Bytes, fail: Vec) -> int:
-    """Return the least risky cell that holds a code (0: a free one), -1 without one."""
+    """Return the least risky slot that holds a code (0: a free one), -1 without one."""
     best = -1
     for k in range(len(clutter)):
         if clutter[k] == code and (best < 0 or fail[k] < fail[best]):
@@ -38,7 +38,7 @@ def safest_cell(code: int, clutter: Bytes, fail: Vec) -> int:
 
 @kernel()
 def worst_free(clutter: Bytes, fail: Vec) -> int:
-    """Return the most risky free cell, -1 without one."""
+    """Return the most risky free slot, -1 without one."""
     worst = -1
     for k in range(len(clutter)):
         if clutter[k] == 0 and (worst < 0 or fail[k] > fail[worst]):
@@ -61,7 +61,7 @@ def still_wanted(code: int, goal: Bytes, goal_heights: Ints, p: ShortestPaths) -
 def _next_risk(code: int, wanted: int, clutter: Bytes, fail: Vec, free: int) -> float:
     """Return the additional risk of one more object in the clutter, -1 for none.
 
-    With ``wanted`` picks to come, the object in the cell ``free`` and its duplicates serve
+    With ``wanted`` picks to come, the object in the slot ``free`` and its duplicates serve
     them, the least risky first: what counts is the risk of the last one.
     """
     last = -1.0
@@ -79,7 +79,7 @@ def _next_risk(code: int, wanted: int, clutter: Bytes, fail: Vec, free: int) -> 
 
 @kernel()
 def _cell_for(code: int, wanted: int, clutter: Bytes, fail: Vec) -> int:
-    """Return the cell for a removed object: the best one if it is picked again."""
+    """Return the slot for a removed object: the best one if it is picked again."""
     free = safest_cell(0, clutter, fail)
     if free < 0:
         return -1
@@ -125,7 +125,7 @@ def _removal(
     index: int, clutter: Bytes, goal: Bytes, goal_heights: Ints, fail: Vec, p: ShortestPaths
 ) -> int:
     """Return the action of the least risky removal of a shortest plan, -1 without one."""
-    n_cells, n_towers = len(clutter), len(p.at)
+    n_slots, n_towers = len(clutter), len(p.at)
     best, least = NONE, 2.0
     free = safest_cell(0, clutter, fail)
     for c in range(n_towers):
@@ -135,12 +135,12 @@ def _removal(
             continue
         for d in range(n_towers):
             if d != c and p.want[d, p.at[d]] != top and ties_on_tower(removed, d, top, p):
-                return 2 * n_cells * n_towers + c * n_towers + d
+                return 2 * n_slots * n_towers + c * n_towers + d
         wanted = still_wanted(top, goal, goal_heights, p)
         risk = _next_risk(top, wanted, clutter, fail, free)
         if risk < least:
             k = _cell_for(top, wanted, clutter, fail)
-            best, least = n_cells * n_towers + c * n_cells + k, risk
+            best, least = n_slots * n_towers + c * n_slots + k, risk
     return best
 
 
@@ -149,19 +149,19 @@ def choose(clutter: Bytes, goal: Bytes, goal_heights: Ints, fail: Vec, p: Shorte
     """Return the next action of the plan, -1 at the goal.
 
     Args:
-        clutter: Objects in the cells, shape (K,).
+        clutter: Objects in the slots, shape (K,).
         goal: Goal of the towers, shape (C, K).
         goal_heights: Objects per tower there, shape (C,).
-        fail: Failure probabilities of the cells, shape (K,).
+        fail: Failure probabilities of the slots, shape (K,).
         p: The states, ``table`` filled, the towers at ``at``.
     """
     index = state_number(p)
     if p.table[index] == 0:
         return NONE
-    n_cells, n_towers = len(clutter), len(p.at)
+    n_slots, n_towers = len(clutter), len(p.at)
     action = _transfer(index, p)
     if action >= 0:
-        return 2 * n_cells * n_towers + action
+        return 2 * n_slots * n_towers + action
     action = _placement(index, clutter, fail, p)
     if action >= 0:
         return action
@@ -173,11 +173,11 @@ def mark_first(clutter: Bytes, p: ShortestPaths, first: NDArray[np.bool_]) -> No
     """Mark the first actions of shortest plans.
 
     Args:
-        clutter: Objects in the cells, shape (K,).
+        clutter: Objects in the slots, shape (K,).
         p: The states, ``table`` filled, the towers at ``at``.
         first: Marks, shape (n_actions,), written.
     """
-    n_cells, n_towers = len(clutter), len(p.at)
+    n_slots, n_towers = len(clutter), len(p.at)
     index = state_number(p)
     left = p.table[index] - 1
     for action in range(len(first)):
@@ -185,14 +185,14 @@ def mark_first(clutter: Bytes, p: ShortestPaths, first: NDArray[np.bool_]) -> No
     for c in range(n_towers):
         want, top = p.want[c, p.at[c]], p.top[c, p.at[c]]
         if want != 0 and p.table[index + p.stride[c]] == left:
-            for k in range(n_cells):
+            for k in range(n_slots):
                 first[k * n_towers + c] = clutter[k] == want
         if top == 0:
             continue
         removed = index + (p.below[c, p.at[c]] - p.at[c]) * p.stride[c]
-        for k in range(n_cells):
+        for k in range(n_slots):
             free = clutter[k] == 0 and p.table[removed] == left
-            first[n_cells * n_towers + c * n_cells + k] = free
+            first[n_slots * n_towers + c * n_slots + k] = free
         for d in range(n_towers):
             if d == c:
                 continue
@@ -200,4 +200,4 @@ def mark_first(clutter: Bytes, p: ShortestPaths, first: NDArray[np.bool_]) -> No
                 best = p.table[removed + p.stride[d]] == left
             else:
                 best = p.table[removed] == left and ties_on_tower(removed, d, top, p)
-            first[2 * n_cells * n_towers + c * n_towers + d] = best
+            first[2 * n_slots * n_towers + c * n_towers + d] = best

@@ -9,7 +9,7 @@ from app.sim.core.arrays import Vec
 
 
 class Commands(NamedTuple):
-    """Commands of one control cycle: actions, or segments."""
+    """Commands of one control period: actions, or segments."""
 
     act: NDArray[np.float32]
     """Actions of all environments, shape (n_envs, 6)."""
@@ -19,7 +19,7 @@ class Commands(NamedTuple):
 
 
 class StepResults(NamedTuple):
-    """Results of one control cycle; entries of other environments are left unchanged."""
+    """Results of one control period; entries of other environments are left unchanged."""
 
     rew: NDArray[np.float32]
     """Rewards, shape (n_envs,)."""

@@ -1,6 +1,6 @@
 """Steps of the reach scenario under speed and separation monitoring (compiled).
 
-A control cycle is that of ``reach/kernels/episode.py`` with the safety layer between command
+A control period is that of ``reach/kernels/episode.py`` with the safety layer between command
 and robot (``scenario/kernels/monitored_motion.py``).
 
 Source: docs/method.md 2.6 (last row) and 2.7.
@@ -39,7 +39,7 @@ def monitored_cycle(
     monitor: MonitoredState,
     work: StepWorkspace,
 ) -> float:
-    """Execute one control cycle of environment ``e``; return the reward.
+    """Execute one control period of environment ``e``; return the reward.
 
     Args:
         task: Time limit and reward coefficients.
@@ -89,7 +89,7 @@ def step_rows(
 ) -> None:
     """Step some environments under the safety layer.
 
-    One kernel for actions and segments, because two would compile the control cycle twice.
+    One kernel for actions and segments, because two would compile the control period twice.
 
     Args:
         task: Rules, action type and reward coefficients.

@@ -3,7 +3,7 @@
 At each decision the policy is simulated forward from the present state (``rollout.py``),
 beside people whose motion is predicted by ``prediction.py``. If that rollout collides, other
 action sequences (``candidates.py``) are simulated: fixed ones first, evasions and sampled
-waypoints only where all before collide. The best sequence is executed for one control cycle
+waypoints only where all before collide. The best sequence is executed for one control period
 (receding horizon); its remainder is a candidate of the next decision (warm start). An action is
 held for ``STEP_S``, as in the simulation, so that a remainder ends as it was simulated.
 

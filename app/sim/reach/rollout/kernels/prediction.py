@@ -62,7 +62,7 @@ def predict_people(
         moments: Number of moments: N_MOMENTS or N_LONG_MOMENTS.
         out: Filled.
     """
-    place_people(world.people, state.people, e, work.crowd)
+    place_people(world.people, state.people, e, work.geometry)
     predict_motion(state.people, e, ALL_PEOPLE, -1, work)
     places, n, n_workers = out.places, int(work.n[0]), state.people.q.shape[1]
     n_pedestrians = state.people.walkers.rows.shape[1]

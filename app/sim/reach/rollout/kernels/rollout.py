@@ -81,14 +81,14 @@ class Beginning(NamedTuple):
     """Start of a rollout: inside the first step, and how much of the margin applies."""
 
     elapsed: int
-    """Control cycles of the first step that have been executed with the last action."""
+    """Control periods of the first step that have been executed with the last action."""
     margin: float
     """Share of the prediction margin."""
 
 
 @kernel(inline="always")
 def periods_of(dt: float) -> int:
-    """Return the number of control cycles of ``dt`` [s] per step."""
+    """Return the number of control periods of ``dt`` [s] per step."""
     return max(1, int(STEP_S / dt + 0.5))
 
 

@@ -39,9 +39,9 @@ class RolloutWorkspace(NamedTuple):
     qdd: Vec
     """Joint accelerations [rad/s^2], shape (6,)."""
     c: Vec
-    """Second coefficients of a control cycle [rad/s^2], shape (6,)."""
+    """Second coefficients of a control period [rad/s^2], shape (6,)."""
     d: Vec
-    """Third coefficients of a control cycle [rad/s^3], shape (6,)."""
+    """Third coefficients of a control period [rad/s^3], shape (6,)."""
     obs: Obs
     """Observation of the policy, shape (n_obs,)."""
     act: Floats

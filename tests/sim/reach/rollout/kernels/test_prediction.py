@@ -52,7 +52,7 @@ def workspace(batch: ReachBatch) -> ReachObservationWorkspace:
 
 
 def watched(batch: ReachBatch, cycles: int) -> tuple[Vec, Vec]:
-    """Predict in every control cycle; return predictions and pedestrians.
+    """Predict in every control period; return predictions and pedestrians.
 
     Returns:
         Places, shape (cycles, n_envs, N_MOMENTS, 3), and rows, (cycles, n_envs, N_STATE).
