@@ -91,6 +91,11 @@ def _stop_ratio(snapshot: WorldSnapshot) -> float | None:
     return safety.stopped_s / safety.moving_s if safety.moving_s > 0.0 else None
 
 
+def _tick_ages(services: Services) -> Samples:
+    for world_id, world in services.worlds.copy().items():
+        yield (world_id,), world.handle.since_snapshot_s()
+
+
 def _tracker_ages(services: Services) -> Samples:
     for one in services.trackers.all():
         yield (one.id, one.cell), one.since_frame_s()
@@ -191,6 +196,12 @@ STATE_METRICS = (
         "Inputs of a live world outside the training range of its policy.",
         _WORLD,
         _of_worlds(lambda world: len(world.outside)),
+    ),
+    StateMetric(
+        "tandem_live_tick_age_seconds",
+        "Time since the last tick of a live world.",
+        ("world",),
+        _tick_ages,
     ),
     StateMetric(
         "tandem_tracker_age_seconds",

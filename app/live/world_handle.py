@@ -2,6 +2,7 @@
 
 import queue
 import threading
+import time
 
 from app.errors import Conflict
 from app.live.command_checks import Command, check, check_state, people_after
@@ -22,6 +23,7 @@ class WorldHandle:
 
     def __init__(self, id: str, cell: Cell, first: WorldSnapshot) -> None:
         self._id, self._cell, self._last = id, cell, first
+        self._published_at = time.monotonic()
         self._queue: queue.SimpleQueue[Command] = queue.SimpleQueue()
         self._lock = threading.Lock()
         self._is_open = True
@@ -108,7 +110,11 @@ class WorldHandle:
 
     def publish(self, snapshot: WorldSnapshot) -> None:
         """Replace the last snapshot; for the thread of the world only."""
-        self._last = snapshot
+        self._last, self._published_at = snapshot, time.monotonic()
+
+    def since_snapshot_s(self) -> float:
+        """Return the time since the last snapshot was published [s]."""
+        return time.monotonic() - self._published_at
 
     def drain(self) -> list[Command]:
         """Return and remove all queued commands; for the thread of the world only."""

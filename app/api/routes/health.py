@@ -3,6 +3,7 @@
 Both routes need no token; without it they answer the status only.
 """
 
+from datetime import UTC, datetime, timedelta
 from typing import Literal
 
 from fastapi import APIRouter, Request
@@ -15,6 +16,11 @@ from app.errors import NotReady
 router = APIRouter(tags=["health"])
 HEALTH, READY = PATHS = ("/healthz", "/readyz")
 """Paths answered without the token."""
+STALLED_S = 10.0
+"""Time without a tick after which a live world counts as stalled [s].
+
+Hundreds of its periods of 20 to 50 ms, which a busy machine does not delay it by.
+"""
 
 
 class HealthPublic(Answer):
@@ -36,6 +42,11 @@ class ReadinessPublic(Answer):
     queue: str | None = Field(
         default=None, description="why the queue of jobs waits, with the token"
     )
+    stalled: dict[str, datetime] | None = Field(
+        default=None,
+        description=f"live worlds without a tick for {STALLED_S:g} s, with the time of their "
+        "last one, with the token",
+    )
 
 
 @router.get(HEALTH, summary="200 when the service can decide", response_model_exclude_none=True)
@@ -56,16 +67,26 @@ async def ready(request: Request, services: ServicesDep) -> ReadinessPublic:
     """Answer 200 once the kernels are compiled, a 503 problem until then.
 
     With the token, the problem contains the present activity. ``degraded`` names damaged
-    checkpoints (all others can be used) and gives the reason if the queue of jobs waits.
+    checkpoints (all others can be used), gives the reason if the queue of jobs waits, and names
+    stalled live worlds. Decisions and jobs do not depend on these: the answer stays 200.
     """
     if not _is_trusted(request, services):
         return ReadinessPublic(status="ready")
     damaged, waiting = services.checkpoints.damaged, services.supervisor.waiting
+    stalled = _stalled(services)
     return ReadinessPublic(
-        status="degraded" if damaged or waiting else "ready",
+        status="degraded" if damaged or waiting or stalled else "ready",
         damaged=list(damaged) or None,
         queue=f"waiting: {waiting}" if waiting else None,
+        stalled=stalled or None,
     )
+
+
+def _stalled(services: Services) -> dict[str, datetime]:
+    """Return the live worlds that no longer tick, with the time of their last tick."""
+    now = datetime.now(UTC)
+    ages = {name: one.handle.since_snapshot_s() for name, one in services.worlds.items()}
+    return {name: now - timedelta(seconds=age) for name, age in ages.items() if age > STALLED_S}
 
 
 def _is_trusted(request: Request, services: Services) -> bool:

@@ -1,17 +1,25 @@
 import sqlite3
-from collections.abc import Callable
+import threading
+from collections.abc import Callable, Iterator
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
 
 import pytest
 from fastapi.testclient import TestClient
 
+from app.api.routes import health
 from app.errors import Conflict
+from app.live.commands import SetCandidates, SetPolicy
 from app.main import create_app
 from app.settings import Settings
-from tests.api.conftest import ADDRESS, wait_until_ready
+from app.sim.cells.cell import Cell, load_cell
+from app.sim.pick.task_policy import Decision
+from tests.api.conftest import ADDRESS, services_of, wait_until_ready
 from tests.api.live_server import WARM_UP_S
+from tests.support.straight_policy import StraightPolicy
 from tests.support.waiting import wait_until
+from web.viewer.loop import LiveCell
 
 SMALL = {"learning": {"n_envs": 8, "batch_size": 16}, "networks": {"width": 16}}
 """A training that begins and ends quickly; it is stopped long before its end."""
@@ -34,6 +42,58 @@ def test_service_says_that_it_warms_up_and_then_decides(cold_app_settings: Setti
         assert cold.get("/").status_code == 200
         wait_until_ready(cold)
         assert cold.get("/v1/worlds/main").status_code == 200
+
+
+class HangingPolicy(StraightPolicy):
+    """A policy whose decision does not end before it is released."""
+
+    def __init__(self, cell: Cell) -> None:
+        super().__init__(cell)
+        self.released = threading.Event()
+
+    def decide(self, *state: Any, **terms: Any) -> Decision:
+        self.released.wait()
+        return super().decide(*state, **terms)
+
+
+@pytest.fixture
+def other(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> Iterator[LiveCell]:
+    """A second live world, which counts as stalled soon."""
+    monkeypatch.setattr(health, "STALLED_S", 1.0)
+    live = LiveCell(load_cell("pick-and-place"), None, id="other")
+    live.start()
+    services_of(client).worlds["other"] = live
+    yield live
+    services_of(client).worlds.pop("other").stop()
+
+
+def test_readiness_names_a_live_world_whose_loop_hangs_until_it_is_replaced(
+    client: TestClient, other: LiveCell
+) -> None:
+    before = datetime.now(UTC) - timedelta(seconds=30)
+    hanging = HangingPolicy(other.cell)
+    other.handle.submit(SetCandidates(ids=("cube1",)))
+    other.handle.submit(SetPolicy(checkpoint="hanging").with_loaded(hanging))
+    found = wait_until(
+        lambda: client.get("/readyz").json(), lambda now: now["status"] == "degraded"
+    )
+    assert list(found["stalled"]) == ["other"]
+    last_tick = datetime.fromisoformat(found["stalled"]["other"])
+    assert before < last_tick < datetime.now(UTC) - timedelta(seconds=health.STALLED_S)
+    assert client.get("/readyz").status_code == 200
+    assert client.get("/healthz").status_code == 200
+    started = client.put("/v1/worlds/other/cell", json={"cell": other.cell.name})
+    assert started.status_code == 200
+    hanging.released.set()
+    wait_until(lambda: "stalled" not in client.get("/readyz").json())
+
+
+def test_readiness_names_a_live_world_whose_thread_has_ended(
+    client: TestClient, other: LiveCell
+) -> None:
+    assert "stalled" not in client.get("/readyz").json()
+    other.stop()
+    wait_until(lambda: list(client.get("/readyz").json().get("stalled", ())) == ["other"])
 
 
 def test_second_app_on_the_same_database_is_refused(cold_app_settings: Settings) -> None:
