@@ -5,7 +5,6 @@ Crashes of its worker count as failures of a job; deaths of the server do not.
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from datetime import UTC, datetime
 from typing import Any, Literal
 
 import sqlalchemy as sa
@@ -15,7 +14,7 @@ from app.store.database.reserve import write_with_reserve
 from app.store.database.tables import jobs, resume_states
 from app.store.engine import Store
 from app.store.fencing import change_state, fenced_update
-from app.store.jobs import read_job
+from app.store.jobs import ended_now, read_job
 from app.store.records import COMPOSITE_KINDS, Claim, EarlyEnd, JobRecord
 
 MAX_ERROR = 4000
@@ -174,13 +173,12 @@ def _end(
     connection: sa.Connection, claim: Claim, state: str, changes: Mapping[str, Any]
 ) -> None:
     fenced_update(connection, claim, {}, counts=False)
-    now = datetime.now(UTC)
     data: dict[str, Any] = {"attempt": claim.attempt}
     for name in ("error", "ended_by"):
         if changes.get(name):
             data[name] = changes[name]
-    values = {"error": None, **changes, "finished_at": now, "heartbeat_at": now}
-    values["waiting"] = None
+    values = {"error": None, **changes, **ended_now(), "waiting": None}
+    values["heartbeat_at"] = values["finished_at"]
     if state != "cancelled":  # its end came before the cancel of the pruner
         values.setdefault("ended_by", None)
     change_state(connection, claim.job_id, state, values, data)
@@ -206,7 +204,7 @@ def _requeue(connection: sa.Connection, job_id: str, changes: Mapping[str, Any])
     data: dict[str, Any] = {"attempt": job.attempt}
     changes = {**changes, "waiting": None}
     if job.cancel_requested:
-        values = {**changes, "error": None, "finished_at": datetime.now(UTC)}
+        values = {**changes, "error": None, **ended_now()}
         change_state(connection, job_id, "cancelled", values, data)
         return
     if changes.get("error"):

@@ -15,7 +15,7 @@ from app.store.database.tables import jobs, metrics
 from app.store.engine import Store
 from app.store.events import append_event
 from app.store.fencing import change_state
-from app.store.jobs import read_job, select_jobs
+from app.store.jobs import ended_now, read_job, select_jobs
 from app.store.jobs import request_cancel as cancel_job
 from app.store.records import JobRecord
 
@@ -71,7 +71,7 @@ def end(
     error: str | None = None,
 ) -> None:
     """End a job."""
-    changes = {"result": result, "error": error, "finished_at": datetime.now(UTC)}
+    changes = {"result": result, "error": error, **ended_now()}
     with store.writing() as connection:
         job = read_job(connection, job_id, for_update=True)
         if not job.is_final:

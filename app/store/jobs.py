@@ -218,6 +218,16 @@ def select_jobs(
     return [_record(row) for row in connection.execute(query).mappings()]
 
 
+def ended_now() -> dict[str, Any]:
+    """Return the columns of a job that ends: the time, and the next number of an end.
+
+    The clock may step back. PostgreSQL may give jobs that end at once the same number.
+    """
+    other = jobs.alias()
+    last = sa.select(sa.func.coalesce(sa.func.max(other.c.end_number), 0)).scalar_subquery()
+    return {"finished_at": datetime.now(UTC), "end_number": last + 1}
+
+
 def _record(row: Mapping[Any, Any]) -> JobRecord:
     fields = dict(row)
     if fields["state"] == "running" and fields["cancel_requested"]:
@@ -267,7 +277,7 @@ def _cancel(connection: sa.Connection, job: JobRecord) -> None:
     queued = job.state == "queued"
     changes: dict[str, Any] = {"cancel_requested": True, "last_event": job.last_event + 1}
     if queued:
-        changes |= {"state": "cancelled", "finished_at": datetime.now(UTC)}
+        changes |= {"state": "cancelled", **ended_now()}
     connection.execute(sa.update(jobs).where(jobs.c.id == job.id).values(changes))
     data = {"state": "cancelled" if queued else "cancelling", "attempt": job.attempt}
     append_event(connection, job.id, job.last_event + 1, "state", data=data)

@@ -103,6 +103,8 @@ class JobRecord(NewJob):
     """Time of the first claim."""
     finished_at: datetime | None
     """Time of the final state."""
+    end_number: int | None
+    """Running number, in the order of the last ends of jobs."""
     heartbeat_at: datetime | None
     """Last heartbeat of its worker."""
     error: str | None

@@ -104,7 +104,7 @@ def prune(
         StorageFull: No room is left.
     """
     newest = sa.select(jobs.c.id).where(_ENDED)
-    newest = newest.order_by(jobs.c.finished_at.desc(), jobs.c.number.desc())
+    newest = newest.order_by(jobs.c.end_number.desc(), jobs.c.number.desc())
     with_state = newest.where(jobs.c.id.in_(sa.select(resume_states.c.job_id)))
     with store.reading() as connection:
         old = connection.execute(newest.offset(keep_jobs)).scalars().all()

@@ -9,10 +9,12 @@ from alembic.script import ScriptDirectory
 
 from app.errors import Conflict
 from app.storage_errors import StorageDamaged
+from app.store import jobs
 from app.store.database.migrate import alembic_config, migrate
 from app.store.database.schema import REVISION, check_schema
 from app.store.database.tables import metadata
 from app.store.engine import Store
+from app.store.records import NewJob
 
 
 def test_migrations_build_exactly_the_tables(store: Store) -> None:
@@ -38,6 +40,22 @@ def test_migrations_can_be_taken_back(store: Store) -> None:
         command.downgrade(config, "base")
         names = sa.inspect(connection).get_table_names()
     assert set(names) <= {"alembic_version", "sqlite_sequence"}
+
+
+def test_jobs_that_ended_before_are_numbered_by_the_clock(store: Store) -> None:
+    for _ in range(3):
+        jobs.create_job(store, NewJob(kind="count", spec={}))
+    second, first, _ = jobs.list_jobs(store).items
+    for one in (first, second):
+        jobs.request_cancel(store, one.id)
+    config = alembic_config()
+    with store.writing() as connection:
+        config.attributes["connection"] = connection
+        command.downgrade(config, "0013")
+    migrate(store)
+    found = {one.id: one.end_number for one in jobs.list_jobs(store).items}
+    assert (found[first.id], found[second.id]) == (1, 2)
+    assert sorted(map(str, found.values())) == ["1", "2", "None"]
 
 
 def test_database_of_a_newer_version_is_refused(store: Store) -> None:

@@ -1,3 +1,4 @@
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import pytest
@@ -15,6 +16,7 @@ from app.store import (
     metrics,
     retention,
 )
+from app.store.database import tables
 from app.store.engine import Store
 from app.store.records import Claim, NewJob, ResumeState
 from jobs.retention import Retention
@@ -136,6 +138,20 @@ def test_newest_ended_jobs_and_states_are_kept(store: Store, claim: Claim) -> No
     assert attempts.load_resume(store, ended[3]) is None
     assert attempts.load_resume(store, active.job_id) is not None
     assert not list(retention.prune(store, keep_jobs=2, keep_states=1, acting={acts: "w"}))
+
+
+def test_job_that_ended_last_is_kept_though_the_clock_stepped_back(
+    store: Store, claim: Claim
+) -> None:
+    later = second_job(store)
+    completion.fail(store, later, "x")
+    ahead = datetime.now(UTC) + timedelta(hours=1)
+    with store.writing() as connection:
+        connection.execute(sa.update(tables.jobs).values(finished_at=ahead))
+    completion.fail(store, claim, "x")  # submitted first, ended last
+    assert list(dict(retention.prune(store, keep_jobs=1, keep_states=1, acting={}))) == [
+        later.job_id
+    ]
 
 
 def test_curve_of_a_deleted_job_is_not_found(store: Store, claim: Claim) -> None:

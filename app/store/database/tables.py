@@ -110,6 +110,7 @@ jobs = Table(
     Column("part_of", String(36)),  # no foreign key, as for the parent
     Column("trial", Integer),
     Column("checkpoint", String(64)),
+    Column("end_number", Integer),
     Index("ix_jobs_state_number", "state", "number"),  # pages of jobs in a state
     Index("ix_jobs_part_of_number", "part_of", "number"),  # pages without parts, or of them
     sqlite_autoincrement=True,
