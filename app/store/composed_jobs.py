@@ -15,7 +15,7 @@ from app.store.database.tables import jobs, metrics
 from app.store.engine import Store
 from app.store.events import append_event
 from app.store.fencing import change_state
-from app.store.jobs import ended_now, read_job, select_jobs
+from app.store.jobs import cancel_parts, ended_now, read_job, select_jobs
 from app.store.jobs import request_cancel as cancel_job
 from app.store.records import JobRecord
 
@@ -70,13 +70,15 @@ def end(
     result: Mapping[str, Any] | None = None,
     error: str | None = None,
 ) -> None:
-    """End a job."""
+    """End a job; the parts of one that fails are cancelled in the same transaction."""
     changes = {"result": result, "error": error, **ended_now()}
     with store.writing() as connection:
         job = read_job(connection, job_id, for_update=True)
         if not job.is_final:
             data = {"attempt": job.attempt} | ({"error": error} if error else {})
             change_state(connection, job_id, state, changes, data)
+            if state == "failed":
+                cancel_parts(connection, job_id)
 
 
 def cancel(store: Store, job: JobRecord, parts: Iterable[JobRecord]) -> None:

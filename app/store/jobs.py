@@ -218,6 +218,17 @@ def select_jobs(
     return [_record(row) for row in connection.execute(query).mappings()]
 
 
+def cancel_parts(connection: sa.Connection, job_id: str) -> None:
+    """Cancel the parts of a job that have not ended, in a transaction."""
+    parts = sa.select(jobs.c.id).where(
+        jobs.c.part_of == job_id, jobs.c.state.not_in(FINAL_STATES)
+    )
+    for part_id in connection.execute(parts.order_by(jobs.c.number)).scalars().all():
+        part = read_job(connection, part_id, for_update=True)
+        if part.state in ("queued", "running"):
+            _cancel(connection, part)
+
+
 def ended_now() -> dict[str, Any]:
     """Return the columns of a job that ends: the time, and the next number of an end.
 
@@ -278,6 +289,7 @@ def _cancel(connection: sa.Connection, job: JobRecord) -> None:
     changes: dict[str, Any] = {"cancel_requested": True, "last_event": job.last_event + 1}
     if queued:
         changes |= {"state": "cancelled", **ended_now()}
+        cancel_parts(connection, job.id)  # resumed parts of one that is resumed, too
     connection.execute(sa.update(jobs).where(jobs.c.id == job.id).values(changes))
     data = {"state": "cancelled" if queued else "cancelling", "attempt": job.attempt}
     append_event(connection, job.id, job.last_event + 1, "state", data=data)

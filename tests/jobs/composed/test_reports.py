@@ -3,10 +3,12 @@
 from typing import Any
 
 import pytest
+import sqlalchemy as sa
 
 from app.errors import InvalidInput
 from app.policies.report.page import RESULTS, evaluations, page
 from app.store import attempts, completion, job_actions, jobs
+from app.store.database import tables
 from app.store.engine import Store
 from app.store.records import JobRecord
 from jobs.composed.reports import Reports
@@ -95,6 +97,24 @@ def test_cancelled_report_continues_with_what_it_has_when_resumed(store: Store) 
     repeated = parts_of(store, report)
     assert [one.state for one in repeated] == ["succeeded", "cancelled", "queued"]
     assert repeated[2].spec == repeated[1].spec != kept.spec
+
+
+def test_failed_report_cancels_its_evaluations_and_repeats_them_when_resumed(
+    store: Store,
+) -> None:
+    report = look(store, post(store, measure=True))
+    running, _ = claimed(store)
+    with store.writing() as connection:
+        mine = tables.jobs.c.id == report.id
+        connection.execute(sa.update(tables.jobs).where(mine).values(spec={}))
+    assert look(store, report).state == "failed"
+    assert [one.state for one in parts_of(store, report)] == ["cancelling"]
+    completion.finish(store, running, state="cancelled")
+    with store.writing() as connection:
+        connection.execute(sa.update(tables.jobs).where(mine).values(spec=dict(report.spec)))
+    job_actions.resume_job(store, report.id)
+    look(store, report)
+    assert [one.state for one in parts_of(store, report)] == ["cancelled", "queued"]
 
 
 @pytest.mark.parametrize(

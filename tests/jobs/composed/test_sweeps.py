@@ -1,5 +1,6 @@
 """Sweeps, looked at by a new server each time; their trials are ended by the test."""
 
+from collections.abc import Mapping
 from typing import Any
 
 import pytest
@@ -215,13 +216,53 @@ def test_sweep_that_cannot_go_on_fails_alone(store: Store) -> None:
     damaged, taken, sound = (post(store) for _ in range(3))
     other = NewJob(kind="count", spec={"kind": "count"})
     jobs.create_job(store, other, idempotency_key=f"{taken.id}-1-train")
-    with store.writing() as connection:
-        mine = tables.jobs.c.id == damaged.id
-        connection.execute(sa.update(tables.jobs).where(mine).values(spec={}))
+    put_spec(store, damaged, {})
     assert look(store, sound)[0].state == "running"
     reasons = {one.id: jobs.get_job(store, one.id).error for one in (damaged, taken)}
     assert "cannot go on" in str(reasons[damaged.id])
     assert "was submitted with another body" in str(reasons[taken.id])
+
+
+def put_spec(store: Store, sweep: JobRecord, spec: Mapping[str, Any]) -> None:
+    """Change the stored spec of a sweep; an empty one is damaged."""
+    with store.writing() as connection:
+        mine = tables.jobs.c.id == sweep.id
+        connection.execute(sa.update(tables.jobs).where(mine).values(spec=dict(spec)))
+
+
+def test_failed_sweep_cancels_its_trials_and_replaces_them_when_resumed(store: Store) -> None:
+    sweep = post(store, trials=2, parallel=2)
+    for _ in range(2):
+        look(store, sweep)
+    running, _ = claimed(store)
+    put_spec(store, sweep, {})
+    Sweeps().advance(store)
+    first, second = composed_jobs.parts_of(store, sweep.id)
+    assert jobs.get_job(store, sweep.id).state == "failed"
+    assert (first.state, second.state) == ("cancelling", "cancelled")
+    put_spec(store, sweep, sweep.spec)
+    job_actions.resume_job(store, sweep.id)
+    for _ in range(2):
+        _, trials = look(store, sweep)
+    assert [one.state for one in trials] == ["running", "cancelled", "queued"]
+    completion.finish(store, running, state="cancelled")
+    _, trials = look(store, sweep)
+    assert [one.state for one in trials] == ["cancelled", "cancelled", "queued", "queued"]
+
+
+def test_cancel_of_a_sweep_that_waits_cancels_its_trials(store: Store) -> None:
+    sweep = post(store, trials=2)
+    look(store, sweep)
+    claim, _ = claimed(store)
+    attempts.record_checkpoint(store, claim, 5, policy(b"1"), resume(5))
+    completion.fail(store, claim, "no cell")
+    put_spec(store, sweep, {})
+    Sweeps().advance(store)
+    put_spec(store, sweep, sweep.spec)
+    job_actions.resume_job(store, claim.job_id)
+    job_actions.resume_job(store, sweep.id)
+    assert jobs.request_cancel(store, sweep.id).state == "cancelled"
+    assert jobs.get_job(store, claim.job_id).state == "cancelled"
 
 
 @SQLITE_ONLY
