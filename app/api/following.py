@@ -3,7 +3,6 @@
 import logging
 import threading
 from collections.abc import Sequence
-from typing import Any
 
 from app.api.schemas.worlds import FollowPublic
 from app.api.services import LiveWorld, Services
@@ -54,8 +53,8 @@ def start(world_id: str, job: JobRecord, services: Services) -> FollowPublic:
     )
     with follows.lock:
         choices = world.handle.choices
-        now = _updated(follow, world, choices, services)
-        follows.by_world[world_id] = now, world, choices + (now.checkpoint is not None)
+        now, choices = _updated(follow, world, choices, services)
+        follows.by_world[world_id] = now, world, choices
         if follows.thread is None or not follows.thread.is_alive():
             follows.thread = threading.Thread(
                 target=_run, args=(services,), name="following", daemon=True
@@ -79,8 +78,7 @@ def deploy_newest(services: Services) -> bool:
             elif world.handle.choices != choices:
                 now = _ended(follow, "another policy was chosen")
             else:
-                now = _refreshed(follow, world, choices, services)
-            choices += now.checkpoint != follow.checkpoint
+                now, choices = _refreshed(follow, world, choices, services)
             follows.by_world[world_id] = now, world, choices
         active = any(one[0].active for one in follows.by_world.values())
         follows.thread = follows.thread if active else None
@@ -98,58 +96,66 @@ def _run(services: Services) -> None:
 
 def _refreshed(
     follow: FollowPublic, world: LiveWorld, choices: int, services: Services
-) -> FollowPublic:
-    """Return a follow after a check; it has ended where its job has."""
+) -> tuple[FollowPublic, int]:
+    """Return a follow and its ``choices`` after a check; it has ended where its job has."""
     job = find_job(services.store, follow.job)
     if job is None:
-        return _ended(follow, f"job {follow.number} was deleted")
+        return _ended(follow, f"job {follow.number} was deleted"), choices
     try:
-        now = _updated(follow, world, choices, services)
+        now, choices = _updated(follow, world, choices, services)
     except ServiceError as error:
-        return _ended(follow, error.message)
-    if now.active and job.is_final:
+        return _ended(follow, error.message), choices
+    if job.is_final:
         acts = "its last checkpoint acts" if now.checkpoint else "it has no checkpoint"
-        return _ended(now, f"job {job.number} is {job.state}: {acts}")
-    return now
+        now = _ended(now, f"job {job.number} is {job.state}: {acts}")
+    return now, choices
 
 
 def _updated(
     follow: FollowPublic, world: LiveWorld, choices: int, services: Services
-) -> FollowPublic:
+) -> tuple[FollowPublic, int]:
     """Let the newest checkpoint of the job act, if it does not yet.
+
+    A job that is resumed without a state has dropped all: the policies of the cell act until
+    its next checkpoint.
+
+    Returns:
+        The follow, and the choices that the world has had afterwards.
 
     Raises:
         Conflict: The world has had other than so many ``choices``.
     """
     items = list_checkpoints(services.store, job_id=follow.job, limit=1).items
     if not items and follow.checkpoint is not None:
-        _fall_back(world, choices, services)
-        reason = f"the checkpoints of job {follow.number} were removed: the cell's policy acts"
-        return _ended(follow, reason, step=None, checkpoint=None)
+        n_commands = _fall_back(world, choices, services)
+        now = follow.model_copy(update={"step": None, "checkpoint": None})
+        return now, choices + n_commands
     if not items or items[0].sha256 == follow.checkpoint:
-        return follow
+        return follow, choices
     newest = items[0]
     sorts = purpose_of(newest.manifest) == SORTING
     command: PolicyCommand = SetPolicy(checkpoint=newest.sha256)
     if sorts:
         command = SetSortingPolicy(checkpoint=newest.sha256)
     submit_loaded(command, world, services, choices)
-    return follow.model_copy(update={"step": newest.step, "checkpoint": newest.sha256})
+    update = {"step": newest.step, "checkpoint": newest.sha256}
+    return follow.model_copy(update=update), choices + 1
 
 
-def _ended(follow: FollowPublic, reason: str, **changes: Any) -> FollowPublic:
+def _ended(follow: FollowPublic, reason: str) -> FollowPublic:
     logger.info("job %d is followed no longer: %s", follow.number, reason)
-    return follow.model_copy(update={"active": False, "reason": reason, **changes})
+    return follow.model_copy(update={"active": False, "reason": reason})
 
 
-def _fall_back(world: LiveWorld, choices: int, services: Services) -> None:
-    """Let the policies act that the cell starts with."""
+def _fall_back(world: LiveWorld, choices: int, services: Services) -> int:
+    """Let the policies act that the cell starts with; return the number of commands."""
 
-    def submit(commands: Sequence[PolicyCommand]) -> None:
+    def submit(commands: Sequence[PolicyCommand]) -> int:
         for place, command in enumerate(commands):
             world.handle.submit(command, choices + place)
+        return len(commands)
 
-    services.retention.deploy(lambda: _own_policies(world.cell, services), submit)
+    return services.retention.deploy(lambda: _own_policies(world.cell, services), submit)
 
 
 def _own_policies(cell: Cell, services: Services) -> tuple[PolicyCommand, ...]:

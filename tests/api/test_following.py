@@ -6,10 +6,11 @@ from app.api import following
 from app.api.services import Services
 from app.errors import Conflict
 from app.live.commands import SetPolicy
-from app.store import attempts, jobs
+from app.policies.checkpoints import pretrained
+from app.store import attempts, completion, jobs
 from app.store.checkpoints import drop_job_checkpoints
 from app.store.engine import Store
-from app.store.records import Claim, JobRecord, NewJob
+from app.store.records import Claim, JobRecord, NewJob, ResumeState
 from jobs.checkpoints import shipped
 from tests.support.databases import SQLITE_ONLY, claimed
 from tests.support.idle_service import add_world, idle_service, loading, own_policy
@@ -44,6 +45,50 @@ def queued(services: Services) -> list[str | None]:
     """Return the checkpoints of the queued commands."""
     commands = services.worlds["main"].handle.drain()
     return [one.checkpoint for one in commands if isinstance(one, SetPolicy)]
+
+
+def followed(services: Services) -> tuple[bool, int | None, str | None]:
+    """Look once; return whether the world follows, and the step and checkpoint that act."""
+    following.deploy_newest(services)
+    now = services.follows.of("main")
+    assert now is not None
+    return now.active, now.step, now.checkpoint
+
+
+def again(store: Store, claim: Claim) -> Claim:
+    """Let the attempt of a claim crash and the job be claimed again."""
+    completion.crash(store, claim, "killed", max_failures=3)
+    return claimed(store)[0]
+
+
+def test_world_goes_back_to_the_stored_checkpoint_of_a_resumed_training_and_takes_the_next(
+    services: Services, training: tuple[Claim, JobRecord]
+) -> None:
+    (claim, job), kept, dropped = training, own_policy(), own_policy()
+    state = ResumeState(step=5, manifest={}, tensors=b"state")
+    attempts.record_checkpoint(services.store, claim, 5, kept, state)
+    attempts.record_checkpoint(services.store, claim, 6, dropped)
+    assert following.start("main", job, services).step == 6
+    claim = again(services.store, claim)
+    assert followed(services) == (True, 5, kept.sha256)
+    attempts.record_checkpoint(services.store, claim, 6, dropped)
+    assert followed(services) == (True, 6, dropped.sha256)
+    assert queued(services) == [dropped.sha256, kept.sha256, dropped.sha256]
+
+
+def test_world_takes_the_next_checkpoint_of_a_training_that_starts_at_step_0_again(
+    services: Services, training: tuple[Claim, JobRecord]
+) -> None:
+    services.checkpoints.publish("pick", shipped("pick"))
+    (claim, job), new = training, own_policy()
+    attempts.record_checkpoint(services.store, claim, 5, new)  # without a state
+    following.start("main", job, services)
+    claim = again(services.store, claim)
+    assert followed(services) == (True, None, None)
+    assert followed(services) == (True, None, None)
+    attempts.record_checkpoint(services.store, claim, 5, new)
+    assert followed(services) == (True, 5, new.sha256)
+    assert queued(services) == [new.sha256, pretrained.SHA256["pick"], new.sha256]
 
 
 def test_policy_chosen_while_a_newer_checkpoint_is_loaded_is_kept(
