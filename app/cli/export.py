@@ -30,8 +30,10 @@ def export(
             raise
         remedy = "pip install 'tandem[onnx]'"
         raise MissingPackage("onnx", "the export", remedy) from None
-    content = onnx_export.export(find_checkpoint(checkpoint, settings))
-    path = output or Path(f"{Path(checkpoint).stem}.onnx")
+    file = Path(checkpoint)
+    name = file.stem if file.suffix == ".safetensors" else checkpoint
+    content = onnx_export.export(find_checkpoint(checkpoint, settings), name)
+    path = output or Path(f"{name}.onnx")
     write_output(path, content)
     text = f"wrote {path}\n{onnx_export.LIMITS}"
     data = {"file": str(path), "bytes": len(content), "limits": onnx_export.LIMITS}

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from onnx import TensorProto, helper, numpy_helper
 
 from app.errors import InvalidInput
-from app.policies.checkpoints.checkpoint import CHOOSING, REACHING, Checkpoint, purpose_of
+from app.policies.checkpoints.checkpoint import CHOOSING, SORTING, Checkpoint, purpose_of
 from app.policies.inference.reach_policy import PEOPLE_SET, ReachPolicy
 from app.policies.inference.value_networks import ValueNetworks, pick_preset_of
 from app.policies.networks.actor_critic import BASE_WEIGHT, ResidualActor
@@ -107,20 +107,27 @@ class Graph:
         return self.add("Tanh", self.add("Add", net, self.add("Atanh", share)))
 
 
-def export(checkpoint: Checkpoint) -> bytes:
+def export(checkpoint: Checkpoint, name: str) -> bytes:
     """Return the ONNX model of a checkpoint.
+
+    Args:
+        checkpoint: The policy.
+        name: Its name, for the metadata.
 
     Raises:
         InvalidInput: It is a sorting policy.
         CheckpointMismatch: Its tensors do not fit its manifest.
     """
     purpose = purpose_of(checkpoint.manifest)
-    if purpose not in (CHOOSING, REACHING):
-        rule = "is not exported: its moves need the rules of the task; POST /v1/sorting decides"
-        raise InvalidInput("checkpoint", purpose, rule, (CHOOSING, REACHING))
+    if purpose == SORTING:
+        rule = (
+            "is a sorting policy, which is not exported: its moves need the rules of the task; "
+            "POST /v1/sorting decides"
+        )
+        raise InvalidInput("checkpoint", name, rule)
     graph = Graph(checkpoint.arrays())
-    groups: list[tuple[str, int]] = [(name, n) for name, n in checkpoint.manifest["layout"]]
-    obs = graph.add("Concat", *(name for name, _ in groups), axis=1)
+    groups: list[tuple[str, int]] = [(group, n) for group, n in checkpoint.manifest["layout"]]
+    obs = graph.add("Concat", *(group for group, _ in groups), axis=1)
     if purpose == CHOOSING:
         raw = pick_preset_of(checkpoint).episode.observation == "state"
         sheet = RAW_STATE if raw else PickEnv.__doc__ or ""
@@ -128,8 +135,8 @@ def export(checkpoint: Checkpoint) -> bytes:
     else:
         outputs, sheet = _reach(graph, checkpoint, obs), ReachEnv.__doc__ or ""
     inputs = [
-        _tensor(name, size, text)
-        for (name, size), text in zip(groups, contents(groups, sheet), strict=True)
+        _tensor(group, size, text)
+        for (group, size), text in zip(groups, contents(groups, sheet), strict=True)
     ]
     made = helper.make_graph(
         graph.nodes, "policy", inputs, outputs, graph.constants, doc_string=LIMITS
@@ -138,7 +145,7 @@ def export(checkpoint: Checkpoint) -> bytes:
         made, opset_imports=[helper.make_opsetid("", OPSET)], producer_name="tandem"
     )
     model.ir_version = 8  # that of the operators' version
-    helper.set_model_props(model, _metadata(checkpoint, purpose))
+    helper.set_model_props(model, {"name": name, **_metadata(checkpoint, purpose)})
     onnx.checker.check_model(model)
     content: bytes = model.SerializeToString()
     return content

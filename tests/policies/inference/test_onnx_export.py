@@ -29,7 +29,7 @@ TOLERANCE = 1e-5
 
 def played(checkpoint: Checkpoint, obs: Vec) -> list[Vec]:
     """Return the outputs of the exported model."""
-    session = onnxruntime.InferenceSession(export(checkpoint))
+    session = onnxruntime.InferenceSession(export(checkpoint, "policy"))
     feeds, first = {}, 0
     for name, size in checkpoint.manifest["layout"]:
         feeds[name] = obs[:, first : first + size]
@@ -92,7 +92,7 @@ def test_exported_pick_policy_acts_and_values_as_the_training(preset: PickPreset
     act, value = played(checkpoint, obs)
     np.testing.assert_allclose(act, expected.numpy(), atol=TOLERANCE)
     np.testing.assert_allclose(value[:, 0], least.numpy(), atol=TOLERANCE)
-    model = onnx.load_from_string(export(checkpoint))
+    model = onnx.load_from_string(export(checkpoint, "policy"))
     assert all(one.doc_string for one in model.graph.input)
 
 
@@ -125,7 +125,7 @@ def test_exported_reach_policy_whose_manifest_leaves_out_defaults_acts_as_the_ch
 @pytest.mark.parametrize("alias", ["pick", "reach"])
 def test_exported_model_describes_its_inputs_and_limits(alias: str) -> None:
     checkpoint = pretrained.load(alias)
-    model = onnx.load_from_string(export(checkpoint))
+    model = onnx.load_from_string(export(checkpoint, "policy"))
     inputs = [
         (one.name, one.type.tensor_type.shape.dim[1].dim_value) for one in model.graph.input
     ]
@@ -139,4 +139,4 @@ def test_exported_model_describes_its_inputs_and_limits(alias: str) -> None:
 
 def test_sorting_policy_is_not_exported() -> None:
     with pytest.raises(InvalidInput, match="/v1/sorting"):
-        export(pretrained.load("sorting-e0"))
+        export(pretrained.load("sorting-e0"), "sorting-e0")
