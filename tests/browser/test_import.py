@@ -64,6 +64,25 @@ def test_no_other_file_is_chosen_while_one_is_read(
 
 
 @pytest.mark.usefixtures("emptied")
+def test_file_is_sent_once_however_often_import_is_clicked(
+    open_page: Callable[..., Page], tmp_path: Path
+) -> None:
+    clip = tmp_path / "angles.csv"
+    clip.write_text(csv_text(working()), encoding="utf-8")
+    page = open_page(scene=False)
+    held: list[Route] = []
+    page.route("**/v1/recordings?*", lambda route: held.append(route))
+    page.click('[data-mode="recorded"]')
+    page.set_input_files('[data-role="import-file"]', clip)
+    page.eval_on_selector("form.import", "(one) => [1, 2].map(() => one.requestSubmit())")
+    expect(page.locator('[data-action="import"]')).to_be_disabled()
+    page.dblclick('[data-action="import"]', force=True)
+    held[0].continue_()
+    expect(page.locator('[data-role="import-result"]')).to_contain_text("angles read as: m")
+    assert len(held) == 1
+
+
+@pytest.mark.usefixtures("emptied")
 def test_file_of_angles_has_no_unit_to_state(
     open_page: Callable[..., Page], tmp_path: Path
 ) -> None:

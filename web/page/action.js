@@ -1,8 +1,8 @@
 // Requests that a click starts: one at a time, with a question before those that remove something.
 import { sentence } from "./format.js";
-import { html, useEffect, useRef, useState } from "./vendor/htm-preact-standalone.module.js";
+import { html, useLayoutEffect, useRef, useState } from "./vendor/htm-preact-standalone.module.js";
 
-/** One request at a time, however often its button is clicked; its error stays until the next. */
+/** One request at a time, however often its button is clicked; its error stays until the next, or `forget`. */
 export function useAction(onDone) {
   const [state, setState] = useState({ busy: false, error: null });
   const running = useRef(false);
@@ -19,7 +19,8 @@ export function useAction(onDone) {
     running.current = false;
     setState({ busy: false, error });
   };
-  return { ...state, run };
+  const forget = () => setState({ busy: false, error: null });
+  return { ...state, run, forget };
 }
 
 export function Fault({ error }) {
@@ -36,7 +37,7 @@ export function Ask({ name, label, question, yes, no, action, onYes }) {
     setAsking(to);
   };
   // The button that had the focus is gone: it goes to the one that changes nothing.
-  useEffect(() => {
+  useLayoutEffect(() => {
     if (turned.current) box.current.querySelector("button:last-of-type").focus();
   }, [asking]);
   return html`<div class="confirm" ref=${box}

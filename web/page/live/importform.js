@@ -1,5 +1,6 @@
 // Importing a recording: a file, what is stated about it, and how it was read.
 import { html, useState } from "../vendor/htm-preact-standalone.module.js";
+import { useAction } from "../action.js";
 import { postFile } from "../api.js";
 import * as format from "../format.js";
 import { Icon } from "../icons.js";
@@ -16,37 +17,36 @@ const NUMBER_TITLE = "A unit, or metres per unit as a number; found from the fil
 export function ImportForm({ onDone }) {
   const [file, setFile] = useState(null);
   const [stated, setStated] = useState({});
-  const [answer, setAnswer] = useState({});
+  const [motion, setMotion] = useState(null);
+  const { busy, error, run, forget } = useAction((made) => {
+    setMotion(made);
+    setFile(null);
+    onDone(made);
+  });
   const state = (name) => (e) => setStated((now) => ({ ...now, [name]: e.target.value.trim() }));
   const choose = (e) => {
     setFile(e.target.files[0] ?? null);
     setStated({});
-    setAnswer({});
+    setMotion(null);
+    forget();
     e.target.value = ""; // so that the same file can be chosen again
   };
-  const send = async (e) => {
+  const send = (e) => {
     e.preventDefault();
     const { names = "", ...others } = stated;
     const asked = [
       ...Object.entries({ file_name: file.name, ...others }).filter(([, value]) => value),
       ...names.split(";").filter((pair) => pair.trim()).map((pair) => ["map", pair]),
     ];
-    setAnswer({ busy: true });
-    try {
-      const motion = await postFile(`v1/recordings?${new URLSearchParams(asked)}`, file);
-      setAnswer({ motion });
-      setFile(null);
-      onDone(motion);
-    } catch (problem) {
-      setAnswer({ problem });
-    }
+    setMotion(null);
+    run(() => postFile(`v1/recordings?${new URLSearchParams(asked)}`, file));
   };
   const skeleton = file?.name.toLowerCase().endsWith(".bvh");
   return html`<form class="dock-row import" onSubmit=${send} aria-label="Import a recording">
     <span class="dock-label">Import</span><div>
     <label class="tool" title="BVH, OpenSim or CSV, at most 32 MiB">
       <input class="sr" type="file" accept=${FORMATS} data-role="import-file"
-        disabled=${Boolean(answer.busy)} onChange=${choose} />
+        disabled=${busy} onChange=${choose} />
       <${Icon} name="plus" /><span>${file ? file.name : "Choose a file"}</span></label>
     ${skeleton && html`
       <datalist id="import-units">${UNITS.map((one) => html`<option key=${one} value=${one} />`)}
@@ -66,11 +66,11 @@ export function ImportForm({ onDone }) {
       <input class="names" data-role="import-names" placeholder="theirs=ours; …" spellcheck="false"
         onInput=${state("names")} /></label>
     <button type="submit" class="tool" data-action="import"
-      disabled=${Boolean(answer.busy)}>${answer.busy ? "Reading …" : "Import"}</button>`}
-    ${answer.problem && html`<p class="field-error" role="alert" data-role="import-error">
-      ${format.sentence(answer.problem.message)}</p>`}
-    ${answer.motion && html`<p class="result" role="status" data-role="import-result">
-      ${summary(answer.motion)}</p>`}
+      disabled=${busy}>${busy ? "Reading …" : "Import"}</button>`}
+    ${error && html`<p class="field-error" role="alert" data-role="import-error">
+      ${format.sentence(error.message)}</p>`}
+    ${motion && html`<p class="result" role="status" data-role="import-result">
+      ${summary(motion)}</p>`}
   </div></form>`;
 }
 
