@@ -56,7 +56,7 @@ def test_alias_is_added_and_removed(open_page: Callable[..., Page], server: str)
 def test_shipped_checkpoint_says_so_and_keeps_its_alias(open_page: Callable[..., Page]) -> None:
     page = opened(open_page, "reach")
     expect(page.locator(f"{card('reach')} .job-sub")).to_have_text(
-        "reach-td3 · 40.96 M steps · shipped"
+        "Reach (TD3) · 40.96 M steps · shipped"
     )
     expect(page.locator(f"{card('reach')} .uses")).to_have_text("Shipped")
     expect(page.get_by_title("Alias of a shipped checkpoint")).to_have_text("reach")
@@ -72,7 +72,9 @@ def test_shipped_checkpoints_are_choices_behind_a_page_of_newer_ones(
     with page.expect_response("**/v1/checkpoints/pick"):
         page.locator("[data-role=acting]").focus()
     options = page.locator("[data-role=acting] optgroup[label=Shipped] option")
-    expect(options).to_contain_text(["pick · pick-td3", "pick-monitored"])
+    expect(options).to_contain_text(
+        ["pick · Pick and place (TD3)", "pick-monitored · Pick and place under SSM (TD3)"]
+    )
 
 
 def test_active_policy_that_is_no_longer_stored_says_so(open_page: Callable[..., Page]) -> None:

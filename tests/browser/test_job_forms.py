@@ -1,10 +1,11 @@
 """A visitor starts jobs by their forms, limits them and goes on."""
 
+import re
 from collections.abc import Callable
 from typing import Any
 
 import pytest
-from playwright.sync_api import Page, expect
+from playwright.sync_api import Page, Route, expect
 
 from tests.browser.test_drag import tell
 from tests.browser.test_training import GROWTH_MS, open_form
@@ -105,6 +106,46 @@ def test_kind_of_job_obeys_the_arrow_keys(open_page: Callable[..., Page]) -> Non
     expect(page.locator('[data-action="new-job"]')).to_be_focused()
 
 
+def delete(page: Page, job_id: str) -> None:
+    """Delete a job of the list by the keyboard."""
+    row = page.locator(f'[data-job="{job_id}"]')
+    if row.locator(".job-head").get_attribute("aria-expanded") == "false":
+        row.locator(".job-head").press("Enter")
+    row.locator('[data-action="delete"]').press("Enter")
+    row.locator('[data-action="delete-yes"]').press("Enter")
+    expect(row).to_have_count(0)
+
+
+def test_focus_goes_to_the_next_job_when_one_is_deleted_and_then_to_the_heading(
+    open_page: Callable[..., Page], server: str
+) -> None:
+    body = {"kind": "evaluate", "protocol": "pick-single", "priority": -100}
+    made = [patient_http.post(f"{server}/v1/jobs", json=body).json()["id"] for _ in range(3)]
+    oldest, old, newest = made
+    page = open_page(scene=False)
+
+    def only_made(route: Route) -> None:
+        answer = route.fetch()
+        items = [one for one in answer.json()["items"] if one["id"] in made]
+        route.fulfill(response=answer, json={**answer.json(), "items": items})
+
+    page.route(re.compile(r"/v1/jobs(\?.*)?$"), only_made)
+    page.click("#tab-training")
+    for one in made:
+        row = page.locator(f'[data-job="{one}"]')
+        if row.locator(".job-head").get_attribute("aria-expanded") == "false":
+            row.locator(".job-head").press("Enter")
+        row.locator('[data-action="cancel"]').press("Enter")
+        row.locator('[data-action="cancel-yes"]').press("Enter")
+        expect(row).to_have_attribute("data-state", "cancelled")
+        expect(row.locator(".job-head")).to_be_focused()
+    for gone, focused in ((old, oldest), (oldest, newest)):
+        delete(page, gone)
+        expect(page.locator(f'[data-job="{focused}"] .job-head')).to_be_focused()
+    delete(page, newest)
+    expect(page.locator("#jobs-title")).to_be_focused()
+
+
 def test_evaluation_is_started_with_choices_of_the_server(
     open_page: Callable[..., Page], server: str
 ) -> None:
@@ -135,9 +176,7 @@ def test_evaluation_is_started_with_choices_of_the_server(
         11,
     )
     expect(page.locator('.is-open [data-role="rows"]')).to_contain_text("success")
-    expect(page.locator(".is-open .job-detail")).to_contain_text(
-        "One random target per episode"
-    )
+    expect(page.locator(".is-open .job-sub")).to_contain_text("One random target per episode")
     assert len(page.problems) == 2  # type: ignore[attr-defined]  # two refusals
 
 

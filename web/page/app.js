@@ -44,8 +44,9 @@ function App() {
     const act = ({ purpose, sha256 }) =>
       cell.send({ tag: purpose === "sorting" ? "set-sorting-policy" : "set-policy", checkpoint: sha256 });
     return html`<${Training} link=${link} jobs=${jobs} error=${error} waiting=${waiting} refresh=${refresh}
-      cell=${cell.cell?.name} acting=${[acting, sortingPolicy]} onAct=${act} />`;
-  }, [link, jobs, error, waiting, acting, sortingPolicy, cell.cell?.name]);
+      cell=${cell.cell?.name} presets=${checkpoints.presets} acting=${[acting, sortingPolicy]}
+      onAct=${act} />`;
+  }, [link, jobs, error, waiting, acting, sortingPolicy, cell.cell?.name, checkpoints.presets]);
   if (link === "signin") return html`<${SignIn} />`;
   return html`<div class="frame" data-link=${link}>
     <header class="topbar">

@@ -2,6 +2,7 @@
 
 from app.policies.checkpoints.checkpoint import Checkpoint
 from app.policies.checkpoints.trained_cell import cell_of
+from app.policies.configs.presets import TITLES
 
 
 class TrainedPolicy:
@@ -14,11 +15,12 @@ class TrainedPolicy:
     def __init__(self, checkpoint: Checkpoint) -> None:
         manifest = checkpoint.manifest
         name = manifest["preset"].get("name", "policy")
+        title = TITLES.get(name, name)
         self._cell = cell_of(manifest)
         self.checkpoint: str = checkpoint.sha256
         """SHA-256 of the checkpoint."""
-        self.title = f"{name}, {manifest['step'] / 1e6:.2f} M steps"
-        """Name of the preset and number of training steps."""
+        self.title = f"{title}, {manifest['step'] / 1e6:.2f} M steps"
+        """Title of the preset and number of training steps."""
         self.cell = self._cell.name
         """Name of the work cell of the training."""
         self.cell_sha256 = self._cell.sha256

@@ -82,7 +82,7 @@ def test_it_says_what_it_is(checkpoint):
     cell = load_cell("shared-workspace")
     assert (policy.checkpoint, policy.view) == (checkpoint.sha256, "forecast")
     assert (policy.cell, policy.cell_sha256) == (cell.name, cell.sha256)
-    assert policy.title == "reach-td3, 0.00 M steps"
+    assert policy.title == "Reach (TD3), 0.00 M steps"
     assert policy.action == ActionSettings()
     np.testing.assert_array_equal(policy.targets, goal_region_of(cell).targets())
     assert ReachPolicy(untrained_reach(width=16, goals="box")).targets is None

@@ -53,7 +53,10 @@ def test_a_policy_gives_the_values_of_the_trained_network(small_run):
     obs = batch_in(load_cell("sorting-e0"), 20, 7).reset()
     assert np.array_equal(policy.values(obs), again.values(obs))
     assert (policy.cell, policy.shape.n_actions) == ("sorting-e0", 44)
-    assert len(policy.checkpoint) == 64 and policy.title == "sorting-e0-dqn, 0.01 M steps"
+    assert (
+        len(policy.checkpoint) == 64
+        and policy.title == "Sorting e0 with expert labels (DQN), 0.01 M steps"
+    )
     with pytest.raises(InvalidInput, match="shape"):
         policy.values(obs[:, :-1])
 

@@ -4,12 +4,14 @@ import { Ask, Fault, useAction } from "../action.js";
 import { postFile, put, remove } from "../api.js";
 import * as format from "../format.js";
 import { Alert, Icon } from "../icons.js";
-import { Facts, FieldName, fieldValue } from "./fieldnames.js";
-import { PURPOSES } from "./formfields.js";
+import { Facts, FieldName, fieldValue, presetTitle } from "./fieldnames.js";
+import { PURPOSES, protocolTitle } from "./formfields.js";
+import { useListFocus } from "./listfocus.js";
 import { PAGE, storedCheckpoints } from "./checkpoints.js";
 
 /** The section of the checkpoints; `acting` are the SHA-256 of those of the live cell. */
-export function CheckpointCards({ link, jobs, acting, presets }) {
+export function CheckpointCards({ link, jobs, acting, presets, protocols }) {
+  const section = useListFocus();
   const [list, setList] = useState(null);
   const [error, setError] = useState(null);
   const [open, setOpen] = useState(null);
@@ -21,8 +23,9 @@ export function CheckpointCards({ link, jobs, acting, presets }) {
   const choose = (sha256) => setPair((now) =>
     (now.includes(sha256) ? now.filter((one) => one !== sha256) : [...now, sha256].slice(-2)));
   const compared = pair.map((sha256) => list?.find((c) => c.sha256 === sha256)).filter(Boolean);
-  return html`<section class="card" aria-labelledby="checkpoints-title" data-role="checkpoints">
-    <header class="card-head"><h2 id="checkpoints-title">Checkpoints</h2></header>
+  return html`<section class="card" aria-labelledby="checkpoints-title" data-role="checkpoints"
+    ref=${section}>
+    <header class="card-head"><h2 id="checkpoints-title" tabindex="-1">Checkpoints</h2></header>
     <${Upload} onDone=${(one) => { refresh(); setOpen(one.sha256); }} />
     ${error && html`<${Alert}>${format.sentence(`The checkpoints could not be loaded: ${error.message}`)}
       ${" "}<button type="button" class="text-button" onClick=${refresh}>Try again</button></${Alert}>`}
@@ -33,27 +36,27 @@ export function CheckpointCards({ link, jobs, acting, presets }) {
       onClose=${() => setPair([])} />`}
     ${compared.length === 1 && html`<p class="faint" role="status">Open a second checkpoint and tick Compare in it, too.</p>`}
     <ul class="jobs">${(list ?? []).map((one) => html`<${Card} key=${one.sha256} one=${one}
-      open=${open === one.sha256} chosen=${pair.includes(one.sha256)} acting=${acting} jobs=${jobs}
+      open=${open === one.sha256} chosen=${pair.includes(one.sha256)} ...${{ acting, jobs, presets, protocols }}
       onOpen=${setOpen} onChoose=${choose} onChanged=${refresh} />`)}</ul>
     ${list?.length >= PAGE && html`<p class="faint">The newest ${PAGE} and the shipped ones are
       shown.</p>`}
   </section>`;
 }
 
-function Card({ one, open, chosen, acting, jobs, onOpen, onChoose, onChanged }) {
+function Card({ one, open, chosen, acting, jobs, presets, protocols, onOpen, onChoose, onChanged }) {
   const acts = acting.includes(one.sha256);
   return html`<li class=${`stored ${open ? "is-open" : ""}`} data-checkpoint=${one.sha256}>
     <button type="button" class="job-head" aria-expanded=${String(open)}
       onClick=${() => onOpen(open ? null : one.sha256)}>
       <${Icon} name="chevron" />
-      <span class="job-name" title=${nameOf(one)}>${nameOf(one)}</span>
+      <span class="job-name" title=${nameOf(one)}>${nameOf(one, presets)}</span>
       ${acts ? html`<span class="chip chip-good">deployed</span>`
         : html`<span class="chip">${PURPOSES[one.purpose] ?? one.purpose}</span>`}
-      <span class="job-sub">${subtitle(one)}</span>
+      <span class="job-sub">${subtitle(one, presets)}</span>
     </button>
     ${open && html`<div class="job-detail">
       <${Facts} entries=${Object.entries(facts(one))} />
-      <${Uses} one=${one} acts=${acts} jobs=${jobs} />
+      <${Uses} ...${{ one, acts, jobs, protocols }} />
       <${Aliases} one=${one} onChanged=${onChanged} />
       <div class="job-actions">
         <label class="tool"><input type="checkbox" data-action="compare-checkpoint" checked=${chosen}
@@ -66,13 +69,15 @@ function Card({ one, open, chosen, acting, jobs, onOpen, onChoose, onChanged }) 
   </li>`;
 }
 
-function nameOf(one) {
-  return one.aliases.join(", ") || `${one.preset ?? "checkpoint"} ${format.short(one.sha256)}`;
+/** Aliases, or the preset and the id; the preset by its name where its title is not asked for. */
+function nameOf(one, presets = null) {
+  return one.aliases.join(", ")
+    || `${presetTitle(presets, one.preset) ?? "checkpoint"} ${format.short(one.sha256)}`;
 }
 
-function subtitle(one) {
+function subtitle(one, presets) {
   const steps = one.step ?? one.manifest.step;
-  return [one.aliases.length > 0 && one.preset, Number.isFinite(steps) && format.count(steps, "step"),
+  return [one.aliases.length > 0 && presetTitle(presets, one.preset), Number.isFinite(steps) && format.count(steps, "step"),
     one.shipped.length ? "shipped" : format.ago(one.created_at)].filter(Boolean).join(" · ");
 }
 
@@ -104,7 +109,7 @@ function evaluations(one, jobs) {
   return (jobs ?? []).filter((job) => job.kind === "evaluate" && names.includes(job.checkpoint ?? job.spec?.checkpoint));
 }
 
-function Uses({ one, acts, jobs }) {
+function Uses({ one, acts, jobs, protocols }) {
   const tested = evaluations(one, jobs);
   const maker = jobs?.find((job) => job.id === one.job_id);
   const uses = [
@@ -112,7 +117,7 @@ function Uses({ one, acts, jobs }) {
     one.job_id ? `Made by job ${maker?.number ?? format.short(one.job_id)}`
       : one.shipped.length ? "Shipped"
         : one.manifest.recalibration ? "Recalibrated or uploaded" : "Uploaded",
-    ...tested.map((job) => `Job ${job.number} · ${job.spec.protocol}: ${job.state}`),
+    ...tested.map((job) => `Job ${job.number} · ${protocolTitle(protocols.items, job.spec.protocol)}: ${job.state}`),
   ].filter(Boolean);
   return html`<ul class="uses" aria-label="Use">${uses.map((text) => html`<li key=${text}>${text}</li>`)}
     </ul>${tested.filter((job) => job.result).map((job) => html`<dl class="rows" key=${job.id}>
@@ -199,7 +204,7 @@ function Comparison({ pair, jobs, presets, onClose }) {
     .filter((name) => columns[0][name] !== columns[1][name]);
   return html`<div class="differences" data-role="checkpoint-differences">
     <table><thead><tr><th scope="col">Field</th>
-      ${pair.map((one) => html`<th scope="col" key=${one.sha256}>${nameOf(one)}</th>`)}</tr></thead>
+      ${pair.map((one) => html`<th scope="col" key=${one.sha256}>${nameOf(one, presets)}</th>`)}</tr></thead>
     <tbody>${names.map((name) => html`<tr key=${name}><th scope="row"><${FieldName}
       presets=${presets} path=${name} preset=${pair[0].manifest.preset?.name} named /></th>
       ${columns.map((column, k) => html`<td key=${k}>${column[name] ?? "–"}</td>`)}</tr>`)}</tbody></table>

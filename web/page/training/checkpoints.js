@@ -2,6 +2,8 @@
 import { html, useCallback, useEffect, useState } from "../vendor/htm-preact-standalone.module.js";
 import { get } from "../api.js";
 import * as format from "../format.js";
+import { presetTitle } from "./fieldnames.js";
+import { useItems } from "./formfields.js";
 
 export const PAGE = 100;
 const PER_JOB = 5;
@@ -22,9 +24,10 @@ export async function storedCheckpoints() {
 
 /**
  * Known checkpoints, and the ids of policies that act and are no longer stored; asked for again when `stamp`
- * changes and by `refresh`.
+ * changes and by `refresh`. Presets, whose titles name them.
  */
 export function useCheckpoints(link, stamp) {
+  const presets = useItems(link, "v1/presets");
   const [list, setList] = useState([]);
   const [unstored, setUnstored] = useState([]);
   const refresh = useCallback(() => {
@@ -33,7 +36,7 @@ export function useCheckpoints(link, stamp) {
     get("v1/worlds").then(({ items }) => setUnstored(items.flatMap((one) => one.unstored)), () => {});
   }, [link]);
   useEffect(refresh, [refresh, stamp]);
-  return { list, unstored, refresh };
+  return { list, unstored, presets, refresh };
 }
 
 export function Acting({ world, checkpoints, jobs, send }) {
@@ -47,7 +50,7 @@ export function Acting({ world, checkpoints, jobs, send }) {
       onChange=${(e) => send({ tag: "set-policy", checkpoint: e.target.value || null })}>
       ${world.reach && html`<option value="">none: straight to the goal</option>`}
       ${!now && !world.reach && html`<option value="" disabled>none: choose one</option>`}
-      ${options(groups, now, world.policy_title, checkpoints.unstored)}
+      ${options(groups, now, world.policy_title, checkpoints)}
     </select>
   </label>`;
 }
@@ -61,19 +64,19 @@ export function TaskPlanner({ sorting, cell, checkpoints, jobs, send }) {
     <select value=${now ?? ""} data-role="sorting-policy" onFocus=${checkpoints.refresh}
       onChange=${(e) => send({ tag: "set-sorting-policy", checkpoint: e.target.value || null })}>
       <option value="">the exact planner</option>
-      ${options(groups, now, sorting.sorting_policy_title, checkpoints.unstored)}
+      ${options(groups, now, sorting.sorting_policy_title, checkpoints)}
     </select></label>`;
 }
 
 /** The checkpoints of groups, after the one that acts now if it is in none of them. */
-function options(groups, now, title, unstored) {
+function options(groups, now, title, { unstored, presets }) {
   const known = groups.some((g) => g.items.some((c) => c.sha256 === now));
   const state = unstored.includes(now) ? " · no longer stored" : "";
   return html`
     ${now && !known && html`<option value=${now}>${title ?? format.short(now)}${state}</option>`}
     ${groups.map((group) => html`<optgroup key=${group.label} label=${group.label}>
       ${group.items.map((c) => html`<option key=${c.sha256} value=${c.sha256}>
-        ${name(c, group.job)}</option>`)}</optgroup>`)}`;
+        ${name(c, group.job, presets)}</option>`)}</optgroup>`)}`;
 }
 
 /** Shipped checkpoints first, then uploaded ones, each job's newest few, and the active one. */
@@ -94,9 +97,9 @@ function grouped(list, jobs, now) {
   return groups;
 }
 
-function name(checkpoint, job) {
+function name(checkpoint, job, presets) {
   const { manifest = {} } = checkpoint;
-  const preset = checkpoint.preset ?? manifest.preset?.name;
+  const preset = presetTitle(presets, checkpoint.preset ?? manifest.preset?.name);
   const step = checkpoint.step ?? manifest.step;
   const parts = [checkpoint.aliases[0] ?? job ?? preset ?? format.short(checkpoint.sha256)];
   if (!job && preset && preset !== parts[0]) parts.push(preset);

@@ -4,7 +4,7 @@ import * as format from "../format.js";
 import { Alert, Close } from "../icons.js";
 import { GOALS } from "../palette.js";
 import { axis, Plot, useTheme } from "../plots.js";
-import { FieldName, fieldOf, fieldValue } from "./fieldnames.js";
+import { FieldName, fieldOf, fieldValue, presetTitle } from "./fieldnames.js";
 import { useAnswer } from "./formfields.js";
 
 export const MAX_JOBS = 20;
@@ -148,7 +148,8 @@ function Differences({ found, presets }) {
       <tbody>${differences.map(({ field, values }) => html`<tr key=${field}>
         <th scope="row"><${FieldName} presets=${presets} path=${field}
           preset=${jobs.find((job) => job.preset)?.preset} named /></th>
-        ${values.map((v, i) => html`<td key=${jobs[i].id}>${fieldValue(v)}</td>`)}</tr>`)}</tbody>
+        ${values.map((v, i) => html`<td key=${jobs[i].id}>${
+          field === "preset" ? presetTitle(presets, v) : fieldValue(v)}</td>`)}</tr>`)}</tbody>
     </table></div>`;
 }
 
@@ -159,7 +160,9 @@ function labelOf(group, { jobs, groups, differences }, presets) {
   const differ = differences.filter(({ field, values }) => field !== "seed"
     && trained.some((i) => JSON.stringify(values[i]) !== JSON.stringify(values[place])));
   const { preset } = jobs[place];
-  if (differ.length === 0 || differ.some(({ field }) => field === "preset")) return preset;
+  if (differ.length === 0 || differ.some(({ field }) => field === "preset")) {
+    return presetTitle(presets, preset);
+  }
   const parts = differ.slice(0, NAMED).map(({ field, values }) =>
     `${fieldOf(presets, field, preset).title} = ${fieldValue(values[place])}`);
   const more = differ.length > NAMED ? `, ${differ.length - NAMED} more` : "";

@@ -2,11 +2,12 @@
 import { html } from "../vendor/htm-preact-standalone.module.js";
 import { post } from "../api.js";
 import * as format from "../format.js";
+import { presetTitle } from "./fieldnames.js";
 import { Loading, OWN, parsed, protocolField, StartForm, useForm, useItems } from "./formfields.js";
 
 const SEED = { ...OWN[0], default: 11 };
 
-export function EvaluateForm({ link, protocols, onStarted, onClose }) {
+export function EvaluateForm({ link, presets, protocols, onStarted, onClose }) {
   const checkpoints = useItems(link, "v1/checkpoints?limit=200");
   const recordings = useItems(link, "v1/recordings");
   const form = useForm({
@@ -20,7 +21,7 @@ export function EvaluateForm({ link, protocols, onStarted, onClose }) {
   const { typed } = form;
   const protocol = protocols.items.find(({ name }) => name === typed.protocol) ?? protocols.items[0];
   const chosen = typed.recordings ?? [];
-  const field = protocol.purpose && checkpointField(protocol, checkpoints.items);
+  const field = protocol.purpose && checkpointField(protocol, checkpoints.items, presets);
   const checkpoint = field && field.choices.includes(typed.checkpoint) ? typed.checkpoint : "";
   const send = (key) => post("v1/jobs", {
     kind: "evaluate",
@@ -46,10 +47,11 @@ export function EvaluateForm({ link, protocols, onStarted, onClose }) {
 }
 
 /** Stored checkpoints of the purpose of a protocol; empty is the protocol's own. */
-export function checkpointField(protocol, checkpoints) {
+export function checkpointField(protocol, checkpoints, presets) {
   const fitting = checkpoints.filter(({ purpose }) => purpose === protocol.purpose);
   const labels = Object.fromEntries(fitting.map((one) => [one.sha256,
-    [one.aliases[0] ?? format.short(one.sha256), one.preset ?? one.manifest.preset?.name,
+    [one.aliases[0] ?? format.short(one.sha256),
+      presetTitle(presets, one.preset ?? one.manifest.preset?.name),
       format.count(one.step ?? one.manifest.step, "step")].filter(Boolean).join(" · ")]));
   return {
     name: "checkpoint", wide: true, choices: ["", ...fitting.map(({ sha256 }) => sha256)], default: "",

@@ -2,6 +2,11 @@
 import { html } from "../vendor/htm-preact-standalone.module.js";
 import * as format from "../format.js";
 
+/** A preset's title; its name where no title is known. */
+export function presetTitle(presets, name) {
+  return presets?.items?.find((one) => one.name === name)?.title ?? name;
+}
+
 const OTHERS = { cell: "Work cell", kind: "Kind of job", purpose: "Purpose" };
 
 /** Title and unit of a field by its dotted name; `preset` is where it is looked for first. */

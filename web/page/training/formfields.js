@@ -118,16 +118,17 @@ export function presetField(presets, preset, disabled = false) {
     labels: Object.fromEntries(presets.map(({ name, title }) => [name, title])), wide: true, named: true, disabled };
 }
 
-/** What a protocol evaluates, without the verb. */
-export function protocolTitle({ title }) {
-  return capital(title.replace(/^Evaluate /, "").replace(/\.$/, ""));
+/** What a protocol evaluates, without the verb; its name where that is not known. */
+export function protocolTitle(protocols, name) {
+  const title = protocols?.find((one) => one.name === name)?.title;
+  return title ? capital(title.replace(/^Evaluate /, "").replace(/\.$/, "")) : name;
 }
 
 /** The choice of a protocol by what it evaluates; `names` are the choices. */
 export function protocolField(protocols, names, chosen) {
   const known = (protocols ?? []).filter(({ name }) => names.includes(name));
   return { default: chosen, choices: names, wide: true, named: true,
-    labels: Object.fromEntries(known.map((one) => [one.name, protocolTitle(one)])),
+    labels: Object.fromEntries(known.map(({ name }) => [name, protocolTitle(known, name)])),
     groups: Object.fromEntries(known.map(({ name, purpose }) => [name, capital(PURPOSES[purpose] ?? "safety layer")])) };
 }
 

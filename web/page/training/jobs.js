@@ -5,7 +5,7 @@ import * as format from "../format.js";
 import { Alert, Icon } from "../icons.js";
 import { CurvePlot } from "../plots.js";
 import { EndedByBudget } from "./budgets.js";
-import { Facts, fieldOf, fieldValue } from "./fieldnames.js";
+import { Facts, fieldOf, fieldValue, presetTitle } from "./fieldnames.js";
 import { MAX_JOBS } from "./compare.js";
 import { protocolTitle } from "./formfields.js";
 import { isActive } from "./jobactions.js";
@@ -122,22 +122,24 @@ export function JobList({ jobs, error, onNew, ...rest }) {
 
 function Job({ job, jobs, open, chosen, onChoose, ...rest }) {
   const share = job.progress ?? 0;
+  const [kind, raw] = [kindOf(job, rest), job.preset ?? job.spec?.protocol];
+  const title = titleOf(job, kind);
   return html`<li class=${`job ${open ? "is-open" : ""} ${chosen ? "has-choice" : ""}`} data-job=${job.id}
     data-state=${job.state}>
     ${chosen && html`<label class="job-choice"><input type="checkbox" checked=${chosen.includes(job.id)}
-      data-role="compare" aria-label=${`Compare ${title(job)}`}
+      data-role="compare" aria-label=${`Compare ${title}`}
       disabled=${chosen.length >= MAX_JOBS && !chosen.includes(job.id)}
       onChange=${() => onChoose(job.id)} /></label>`}
     <button type="button" class="job-head" aria-expanded=${String(open)}
       onClick=${() => rest.onOpen(open ? null : job.id)}>
       <${Icon} name="chevron" />
-      <span class="job-name" title=${title(job)}>${title(job)}</span>
+      <span class="job-name" title=${raw ? `${title} (${raw})` : title}>${title}</span>
       <span class=${`chip chip-${job.waiting ? "warn" : TONES[job.state] ?? "quiet"}`}>${
         job.waiting ? `waiting: ${job.waiting}` : stateOf(job)}</span>
-      <span class="job-sub">${subtitle(job, jobs)}</span>
+      <span class="job-sub">${subtitle(job, jobs, kind)}</span>
     </button>
     ${isActive(job) &&
-    html`<div class="progress" role="progressbar" aria-label=${`Progress of ${title(job)}`}
+    html`<div class="progress" role="progressbar" aria-label=${`Progress of ${title}`}
       aria-valuemin="0" aria-valuemax="100" aria-valuenow=${Math.round(share * 100)}>
       <i style=${{ transform: `scaleX(${share})` }}></i></div>`}
     ${open && html`<${DETAILS[job.kind] ?? JobDetail} job=${job} ...${rest} />`}
@@ -150,14 +152,18 @@ function stateOf(job) {
   return job.ended_by ? `${job.state}: ${job.ended_by}` : job.state;
 }
 
-function title(job) {
-  const name = job.name ?? job.preset ?? job.spec?.protocol ?? job.kind;
-  return `${job.number === undefined ? format.short(job.id) : `Job ${job.number}`} · ${name}`;
+/** What a job trains or evaluates. */
+function kindOf({ preset, spec, kind }, { presets, protocols }) {
+  return preset ? presetTitle(presets, preset) : protocolTitle(protocols.items, spec?.protocol) ?? kind;
 }
 
-function subtitle(job, jobs) {
+function titleOf(job, kind) {
+  return `${job.number === undefined ? format.short(job.id) : `Job ${job.number}`} · ${job.name ?? kind}`;
+}
+
+function subtitle(job, jobs, kind) {
   const parts = [`seed ${job.seed}`];
-  if (job.name) parts.unshift(job.preset ?? job.spec?.protocol ?? job.kind);
+  if (job.name) parts.unshift(kind);
   if (job.kind in KINDS) parts.unshift(KINDS[job.kind]);
   const parent = job.parent && jobs.find(({ id }) => id === job.parent);
   if (parent) parts.push(`from job ${parent.number}`);
@@ -250,13 +256,11 @@ function rate(v, n) {
 }
 
 /** An evaluation has no curve: its rows, once all are known. */
-function Evaluation({ job, protocols, ...rest }) {
-  const { protocol, checkpoint, episodes } = job.spec;
-  const known = protocols.items?.find(({ name }) => name === protocol);
+function Evaluation({ job, ...rest }) {
+  const { checkpoint, episodes } = job.spec;
   const rows = job.result?.results ?? [];
   const rates = (row) => OUTCOMES.filter(({ key }) => row[key]);
   return html`<${JobFrame} job=${job} ...${rest}>
-    <p class="uses" title=${protocol}>${known ? protocolTitle(known) : protocol}</p>
     <${Facts} entries=${[["Checkpoint", checkpoint?.length === SHA_256 ? format.short(checkpoint) : checkpoint ?? "–"],
       ["Episodes", format.number(episodes)]]} />
     ${rows.length === 0 && !job.error && html`<p class="empty">${job.state === "queued"

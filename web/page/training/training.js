@@ -8,6 +8,7 @@ import { isActive } from "./jobactions.js";
 import { JobList, QueueWaits, useOpened } from "./jobs.js";
 import { EvaluateForm } from "./evaluateform.js";
 import { useItems } from "./formfields.js";
+import { useListFocus } from "./listfocus.js";
 import { ReportForm } from "./reportform.js";
 import { SweepForm } from "./sweepform.js";
 import { TrainForm } from "./trainform.js";
@@ -15,9 +16,9 @@ import { TrainForm } from "./trainform.js";
 const KINDS = { train: ["Training", TrainForm], evaluate: ["Evaluation", EvaluateForm],
   sweep: ["Sweep", SweepForm], report: ["Report", ReportForm] };
 
-export function Training({ link, cell, jobs: newest, error, waiting, refresh, acting, onAct }) {
-  const presets = useItems(link, "v1/presets");
+export function Training({ link, cell, presets, jobs: newest, error, waiting, refresh, acting, onAct }) {
   const protocols = useItems(link, "v1/protocols");
+  const section = useListFocus();
   const [form, setForm] = useState(null);
   const had = useRef(null);
   useEffect(() => { // a form that was closed had the focus
@@ -43,8 +44,8 @@ export function Training({ link, cell, jobs: newest, error, waiting, refresh, ac
   return html`<div class="training">
     ${form && html`<${NewJob} key=${form.from?.id} ...${{ link, presets, protocols, cell }} from=${form.from}
       onStarted=${started} onClose=${() => setForm(null)} />`}
-    <section class="card" aria-labelledby="jobs-title">
-      <header class="card-head"><h2 id="jobs-title">Jobs</h2>
+    <section class="card" aria-labelledby="jobs-title" ref=${section}>
+      <header class="card-head"><h2 id="jobs-title" tabindex="-1">Jobs</h2>
         <span class="spacer"></span>
         ${chosen && html`<button type="button" class="primary" data-action="show-comparison"
             disabled=${listed.length === 0} onClick=${() => setCompared(listed)}>
@@ -66,7 +67,7 @@ export function Training({ link, cell, jobs: newest, error, waiting, refresh, ac
         onClone=${(job) => setForm({ from: job })}
         onNew=${form ? null : () => setForm({})} />
     </section>
-    <${CheckpointCards} link=${link} jobs=${jobs} acting=${acting} presets=${presets} />
+    <${CheckpointCards} link=${link} jobs=${jobs} ...${{ acting, presets, protocols }} />
   </div>`;
 }
 
