@@ -113,6 +113,7 @@ jobs = Table(
     Column("end_number", Integer),
     Index("ix_jobs_state_number", "state", "number"),  # pages of jobs in a state
     Index("ix_jobs_part_of_number", "part_of", "number"),  # pages without parts, or of them
+    Index("ix_jobs_end_number", "end_number"),  # the last one, and the ended jobs in order
     sqlite_autoincrement=True,
 )
 

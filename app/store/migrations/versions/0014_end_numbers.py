@@ -11,13 +11,14 @@ def upgrade() -> None:
     """Apply the change."""
     op.add_column("jobs", sa.Column("end_number", sa.Integer(), nullable=True))
     op.execute(
-        "UPDATE jobs SET end_number = (SELECT count(*) FROM jobs AS other "
-        "WHERE other.finished_at < jobs.finished_at "
-        "OR other.finished_at = jobs.finished_at AND other.number <= jobs.number) "
-        "WHERE finished_at IS NOT NULL"
+        "UPDATE jobs SET end_number = ended.place FROM (SELECT id, row_number() OVER "
+        "(ORDER BY finished_at, number) AS place FROM jobs WHERE finished_at IS NOT NULL) "
+        "AS ended WHERE ended.id = jobs.id"
     )
+    op.create_index("ix_jobs_end_number", "jobs", ["end_number"])
 
 
 def downgrade() -> None:
     """Revert the change."""
+    op.drop_index("ix_jobs_end_number", "jobs")
     op.drop_column("jobs", "end_number")
