@@ -13,6 +13,8 @@ from app.api.problems import Problem
 
 TIMEOUT_S = 30.0
 """Default time limit of an answer [s]."""
+SILENCE_S = 60.0
+"""Least silence after which a stream fails [s]; the server sends a byte at least every 15 s."""
 M = TypeVar("M", bound=BaseModel)
 Json = Mapping[str, Any]
 
@@ -99,14 +101,18 @@ class Transport:
         Raises:
             Refused: The server answered a problem.
         """
+        headers, content = _texts(parts.get("headers")), parts.get("content")
         body = parts.get("body")
+        if body is not None:
+            given = _json_of(body) if isinstance(body, BaseModel) else body
+            content = json.dumps(given).encode()  # NaN too: a missing key-point
+            headers["Content-Type"] = "application/json"
         answer = self._http.request(
             method,
             _filled(path, names),
             params=_given(parts.get("query")),
-            headers=_texts(parts.get("headers")),
-            json=_json_of(body) if isinstance(body, BaseModel) else body,
-            content=parts.get("content"),
+            headers=headers,
+            content=content,
         )
         _raise_problem(answer)
         return answer
@@ -130,11 +136,11 @@ class Transport:
         Raises:
             Refused: The server answered a problem.
         """
-        pauses = httpx.Timeout(self._timeout_s, read=None)  # between events
+        pauses = httpx.Timeout(self._timeout_s, read=max(self._timeout_s, SILENCE_S))
         with self._http.stream(
             "GET", _filled(path, names), headers=_texts(headers), timeout=pauses
         ) as answer:
-            if answer.is_error:
+            if not answer.is_success:
                 answer.read()
                 _raise_problem(answer)
             fields: dict[str, str] = {}
@@ -153,15 +159,16 @@ class Transport:
 
 
 def _filled(path: str, names: Sequence[str]) -> str:
-    return path.format(*(quote(name, safe="") for name in names))
+    """Return a path with names; an encoded dot is part of a name, ``..`` another path."""
+    return path.format(*(quote(name, safe="").replace(".", "%2E") for name in names))
 
 
 def _raise_problem(answer: httpx.Response) -> None:
-    if not answer.is_error:
+    if answer.is_success:
         return
     try:
         problem = Problem.model_validate_json(answer.content)
-    except ValueError:  # of a proxy in between
+    except ValueError:  # a redirection, or of a proxy in between
         answer.raise_for_status()
         raise
     after = answer.headers.get("retry-after")

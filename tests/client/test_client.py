@@ -1,11 +1,15 @@
 """The generated client against a real server."""
 
+import math
+import socket
 from collections.abc import Iterator
 
+import httpx
 import pytest
 
+from app.api.schemas.task_selection import TaskSelectionRequest
 from app.api.schemas.trackers import TrackerCreate
-from app.client import Client, Refused
+from app.client import Client, Refused, transport
 from app.live.commands import PauseClock, ResumeClock
 from jobs.spec import EvaluateSpec
 from tests.api.live_server import served
@@ -85,3 +89,37 @@ def test_refused_value_has_its_rule(client: Client) -> None:
 def test_token_is_sent(address: str) -> None:
     with Client(address) as stranger, pytest.raises(Refused, match="401"):
         stranger.list_worlds()
+
+
+def test_missing_key_points_are_sent_as_nan(client: Client) -> None:
+    points = {"neck": [0.0, 1.45, 0.64], "mid_hip": [0.0, 1.45, 0.2], "wrist_r": [math.nan] * 3}
+    body = {
+        "cell": "pick-and-place",
+        "robot": {"q": [0.99, -2.33, 2.08, -1.32, -1.57, 0.0], "qd": [0.0] * 6},
+        "people": [{"keypoints": points}],
+        "candidates": [{"id": "left", "position": [-0.5, 0.7, 0.12]}],
+    }
+    for request in (body, TaskSelectionRequest.model_validate(body)):
+        (person,) = client.select_task(request).people
+        assert "wrist_r" in person.missing
+        assert person.unusable == []
+
+
+@pytest.mark.parametrize("name", [".", "..", "../worlds"])
+def test_dots_of_a_name_lead_to_no_other_route(client: Client, name: str) -> None:
+    with pytest.raises(Refused) as refused:
+        client.get_job(name)
+    assert refused.value.problem.status == 404
+
+
+def test_redirection_is_no_success(client: Client) -> None:
+    with pytest.raises(httpx.HTTPStatusError, match="307"):
+        client.delete_cell("")  # redirected to the list
+
+
+def test_stream_without_a_byte_fails(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(transport, "SILENCE_S", 0.2)
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        address = f"http://127.0.0.1:{listener.getsockname()[1]}"
+        with Client(address, timeout_s=0.2) as one, pytest.raises(httpx.ReadTimeout):
+            next(one.stream_world("main"))  # the connection is taken, never answered
