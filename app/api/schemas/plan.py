@@ -187,7 +187,8 @@ class PlanAnswer(Answer):
     )
     fewest_moves: int = Field(description="fewest moves to the goal without failed picks")
     expected_attempts: float = Field(
-        description="the exact planner's expected attempts to the goal, with failed picks"
+        description="the exact planner's expected attempts to the goal, with failed picks; the "
+        "pick of an object that is held and can be placed has not failed"
     )
     people: list[PersonUse] = Field(description="use of each person")
     state_outside: list[OutOfRangeInput] = Field(

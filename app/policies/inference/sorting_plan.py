@@ -147,7 +147,7 @@ class SortingPlanner:
                 query is invalid.
         """
         started, held = time.perf_counter(), query.held
-        near = near_optimal_moves(query.state, self._names.shape, query.margin)
+        near = self._near(query)
 
         def planned(**motion: Any) -> SortingPlan:
             return SortingPlan(
@@ -191,6 +191,17 @@ class SortingPlanner:
                 self._policy.action,
             ),
         )
+
+    def _near(self, query: PlanQuery) -> NearOptimalMoves:
+        """Return the near-optimal moves; the pick of a held object has succeeded already."""
+        shape, held, state = self._names.shape, query.held, query.state
+        if held is not None and held < shape.n_cells:
+            fail = state.fail.copy()
+            fail[held] = 0.0
+            near = near_optimal_moves(replace(state, fail=fail), shape, query.margin)
+            if near.of(held).moves:
+                return near
+        return near_optimal_moves(state, shape, query.margin)
 
     def _choose(self, query: PlanQuery, options: tuple[PlanOption, ...]) -> int:
         """Return the index of the move of the greatest score, with hysteresis for values."""
@@ -301,7 +312,9 @@ def reason(plan: SortingPlan, objective: Objective) -> str:
     if plan.symbol is None:
         return "Every tower matches the goal."
     if plan.symbol == "return":
-        return "The plan needs another move before the held object is placed."
+        if not plan.near.moves:
+            return "Every tower matches the goal without the held object."
+        return "No move of about as few attempts places the held object now."
     scores = [score_of(one, objective) for one in plan.options]
     own = scores.pop(plan.index)
     if not scores:

@@ -112,7 +112,32 @@ def test_held_object_that_must_wait_returns_to_where_it_was_picked() -> None:
     assert found.chosen.move == Move(7, 7)
     back = np.array(CELL.stations_of("clutter")[7].position)
     assert found.chosen.place.position[:2] == pytest.approx(back[:2])
-    assert "another move" in reason(found, "value")
+    assert "places the held object" in reason(found, "value")
+
+
+def test_held_object_is_placed_although_it_was_the_riskier_one_to_pick() -> None:
+    state = task(5, 9)
+    state.fail[9] = 0.9
+    found = planner().plan(query(state, held=9))
+    assert found.symbol == "place" and found.chosen is not None
+    assert (found.chosen.move, found.chosen.attempts) == (Move(9, RED), 1.0)
+    assert state.fail[9] == 0.9
+
+
+def test_object_that_returns_will_be_picked_at_its_own_risk() -> None:
+    small = SHAPE.code(0, 0)
+    state = task(5)
+    state.clutter[7], state.fail[7], state.goal[0, 1] = small, 0.5, small
+    found = planner().plan(query(state, held=7))
+    assert found.symbol == "return" and found.near.plan.attempts == pytest.approx(3.0)
+
+
+def test_held_object_of_a_solved_task_returns() -> None:
+    state = empty_state(SHAPE)
+    state.clutter[7] = BLUE_SMALL
+    found = planner().plan(query(state, held=7))
+    assert found.symbol == "return"
+    assert reason(found, "value") == "Every tower matches the goal without the held object."
 
 
 @pytest.mark.parametrize(("lead", "stays"), [(0.4, True), (0.6, False)])
