@@ -189,7 +189,7 @@ def read_rows(lines: Sequence[tuple[int, str]], n_columns: int, n_rows: int) -> 
             faults.append(Fault(place=place, value=f"<{len(words)}>", rule=rule, hint=hint))
         else:
             try:
-                values[k] = list(map(float, words))
+                values[k] = np.nan if "_" in line else list(map(float, words))
             except ValueError:
                 values[k] = np.nan
         if not (np.abs(values[k]) <= MAX_NUMBER).all():
@@ -219,7 +219,7 @@ def _bad_words(words: Sequence[str], line: int) -> Iterator[Fault]:
 def _number_rule(word: str) -> str:
     """Return the rule that a word violates; empty for a valid number."""
     try:
-        value = float(word)
+        value = float("" if "_" in word else word)
     except ValueError:
         return "must be a number"
     if abs(value) <= MAX_NUMBER:

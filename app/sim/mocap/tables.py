@@ -41,7 +41,7 @@ MISSING = frozenset(
 )
 """Markers of missing values, in lower case."""
 
-_THOUSANDS = re.compile(r"[+-]?\d{1,3}([.,'’\s]\d{3})+([.,]\d+)?|[+-]?\d+[.,]\d+[.,]\d+")
+_THOUSANDS = re.compile(r"[+-]?\d{1,3}([.,'’_\s]\d{3})+([.,]\d+)?|[+-]?\d+[.,]\d+[.,]\d+")
 _UNIT = re.compile(r"\s*[(\[{][^)\]}]*[)\]}]\s*$")
 
 
@@ -159,7 +159,7 @@ class TextTable:
 
     def _numbers(self, cells: Sequence[str], text: str) -> list[float]:
         """Return numbers; NaN for missing values, infinity for text."""
-        if self.decimal == "." or "." not in text:
+        if (self.decimal == "." or "." not in text) and "_" not in text:
             try:
                 return [float(one) for one in self._pointed(cells)]
             except ValueError:
@@ -320,8 +320,9 @@ def _likeness(one: str, other: str) -> float:
 
 
 def _number(word: str) -> float | None:
+    """Return a number, None for text; unlike Python's, ``1_000`` is none."""
     try:
-        return float(word)
+        return None if "_" in word else float(word)
     except ValueError:
         return None
 

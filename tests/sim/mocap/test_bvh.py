@@ -101,6 +101,8 @@ def test_keywords_may_have_any_case_and_joints_their_names(write: Callable[[str]
         ("Frame Time: 0.01\n", "", "line 18", 'must be "Frame Time:" with a number'),
         ("90 0 0 0 0 90", "90 0 0 0 0", "line 20", "must hold 9 numbers"),
         ("90 0 0 0 0 90", "90 0 0 x 0 90", "line 20, number 7", "must be a number"),
+        ("90 0 0 0 0 90", "90 0 0 1_0 0 90", "line 20, number 7", "must be a number"),
+        ("OFFSET 1 0 0", "OFFSET 1 0 0_0", "line 8", "must be a number"),
         ("90 0 0 0 0 90", "90 0 0 inf 0 90", "line 20, number 7", "must be a finite number"),
         ("90 0 0 0 0 90", "90 0 0 1e300 0 90", "line 20, number 7", "at most 1000000000"),
         ("0 0 0 0 0 0 0 0 0\n1 2 3 90 0 0 0 0 90\n", "", "frames", "the file is cut off"),
