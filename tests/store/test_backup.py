@@ -1,12 +1,17 @@
 """A backup restores exactly what was there; a damaged one changes nothing."""
 
 import errno
+import hashlib
+import io
 import json
 import os
 import random
 import sqlite3
+import tarfile
 import threading
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -159,6 +164,38 @@ def test_damaged_backup_is_named_and_changes_nothing(
         restore_backup(store, data, file)
     assert dump(path_of(store)) == before
     assert not list(data.glob("*.kept")) and not list(data.glob("*.db.part"))
+
+
+@pytest.mark.parametrize(
+    "edit",
+    [
+        lambda head: head.pop("revision"),
+        lambda head: head.update(rows=[]),
+        lambda head: head.update(files=["tandem.db"]),
+        lambda head: head["files"].update({"kept.txt": head["files"]["tandem.db"]}),
+        lambda head: head["files"].pop("tandem.db"),
+    ],
+)
+def test_head_of_another_form_is_refused(
+    store: Store, data: Path, tmp_path: Path, edit: Callable[[dict[str, Any]], object]
+) -> None:
+    whole, file = tmp_path / "whole.tar", tmp_path / "b.tar"
+    write_backup(store, data, whole)
+    with tarfile.open(whole) as archive:
+        members = {one.name: archive.extractfile(one).read() for one in archive}
+    head = json.loads(members["backup.json"])
+    edit(head)
+    members["backup.json"] = json.dumps(head).encode()
+    members["backup.json.sha256"] = hashlib.sha256(members["backup.json"]).hexdigest().encode()
+    members["kept.txt"] = members["tandem.db"]
+    with tarfile.open(file, "w") as archive:
+        for name, content in members.items():
+            member = tarfile.TarInfo(name)
+            member.size = len(content)
+            archive.addfile(member, io.BytesIO(content))
+    with pytest.raises(InvalidInput, match=r"b\.tar"):
+        restore_backup(store, data, file)
+    assert not list(data.glob("*.kept")) and not (data / "kept.txt").exists()
 
 
 def test_backup_of_a_newer_version_is_refused(

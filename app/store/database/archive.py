@@ -8,7 +8,9 @@ import tarfile
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path, PurePosixPath
-from typing import IO, Any
+from typing import IO, Annotated, Any, Literal
+
+from pydantic import BaseModel, Field
 
 from app.errors import InvalidInput
 
@@ -16,6 +18,23 @@ HEAD, HEAD_DIGEST = "backup.json", "backup.json.sha256"
 DATABASE = "tandem.db"
 FORMAT = 1
 CHUNK = 1 << 20
+
+
+class _Member(BaseModel):
+    """A member as the head states it."""
+
+    size: int
+    sha256: str
+
+
+class _Head(BaseModel):
+    """First member of an archive."""
+
+    format: Literal[1]
+    created_at: str
+    revision: str
+    rows: dict[str, int]
+    files: dict[Annotated[str, Field(pattern=rf"^({DATABASE}|files/.+)$")], _Member]
 
 
 def is_backup(file: Path) -> bool:
@@ -75,8 +94,8 @@ def opened(path: Path) -> Iterator[tuple[tarfile.TarFile, dict[str, Any]]]:
             text = _member(archive, HEAD, path).read()
             if _member(archive, HEAD_DIGEST, path).read() != _sha256(text):
                 raise ValueError(f"{HEAD} does not have its checksum")
-            head = json.loads(text)
-            if head["format"] != FORMAT or DATABASE not in head["files"]:
+            head = _Head.model_validate_json(text).model_dump()
+            if DATABASE not in head["files"]:
                 raise KeyError(DATABASE)
             for name, expected in head["files"].items():
                 with _member(archive, name, path) as content:
