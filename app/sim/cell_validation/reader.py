@@ -8,6 +8,7 @@ prevent the checks of the rest.
 import copy
 import difflib
 import json
+import re
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
@@ -27,6 +28,8 @@ from app.sim.cells.parts import (
 )
 from app.sim.cells.people import ConstantWalker, FixedSpeedWalker, Walker, Worker
 
+_CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f]")
+_TEXT_RULE = "must be text without control characters"
 MAX_BYTES = 256 * 1024
 """Largest file that is read [bytes]."""
 MAX_DEPTH = 16
@@ -148,7 +151,7 @@ def _pairs(pairs: list[tuple[str, Any]]) -> _Object:
 def _tree_faults(node: object, place: str) -> Iterator[Fault]:
     """Return the faults of repeated keys and of invalid text."""
     if isinstance(node, str) and not _is_text(node):
-        yield Fault(place=place, value=ascii(node)[:MAX_SHOWN], rule="must be text")
+        yield Fault(place=place, value=ascii(node)[:MAX_SHOWN], rule=_TEXT_RULE)
     if isinstance(node, _Object):
         for name in node.repeated_keys:
             path = f"{place}.{name}".lstrip(".")
@@ -162,6 +165,8 @@ def _tree_faults(node: object, place: str) -> Iterator[Fault]:
 
 
 def _is_text(text: str) -> bool:
+    if _CONTROL.search(text):
+        return False
     try:
         text.encode("utf-8")
     except UnicodeEncodeError:
