@@ -19,8 +19,8 @@ Rows = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 Infos = dict[str, NDArray[Any]]
 
-MAX_NUMBER = int(np.iinfo(np.int64).max)
-"""Greatest seed and number of an episode."""
+MAX_SEED, MAX_EPISODE = 2**63 - 1, 2**62 - 1
+"""Greatest seed; greatest number of a stated episode, to which later ones are added."""
 OBS_BOUND = 100.0
 """Bound of the observation spaces; nothing observed comes near it."""
 NAMES = np.array(OUTCOMES, dtype=object)
@@ -121,7 +121,8 @@ class ArmTask:
         Raises:
             InvalidInput: They are no real numbers.
         """
-        act = action_array(given).astype(np.float32, copy=False)
+        with np.errstate(over="ignore"):  # infinite then, which the batch refuses
+            act = action_array(given).astype(np.float32, copy=False)
         return act[None] if act.ndim == 1 and self.batch.n_envs == 1 else act
 
     def truncates(self, ended: Rows) -> Mask:
@@ -176,7 +177,7 @@ def next_episode(batch: Batch, rows: Rows, seed: int | None, episode: object = N
     Raises:
         InvalidInput: The seed or a number of an episode is out of range; nothing is changed.
     """
-    if seed is not None and not 0 <= seed <= MAX_NUMBER:
+    if seed is not None and not 0 <= seed <= MAX_SEED:
         raise InvalidInput("seed", seed, "must lie in [0, 2^63)")
     if episode is None:
         after = batch.episode[rows] + 1 if seed is None else np.zeros_like(rows)
@@ -191,7 +192,7 @@ def _episodes(given: object, n_rows: int) -> Rows:
     """Return stated numbers of episodes, shape (n_rows,)."""
     found = np.asarray(given)
     is_whole = found.dtype.kind in "iu" and found.shape in ((), (n_rows,))
-    if not is_whole or not ((found >= 0) & (found <= MAX_NUMBER)).all():
-        rule = f"must be a whole number in [0, 2^63), or a list of {n_rows} of them"
+    if not is_whole or not ((found >= 0) & (found <= MAX_EPISODE)).all():
+        rule = f"must be a whole number in [0, 2^62), or a list of {n_rows} of them"
         raise InvalidInput("options.episode", given, rule)
     return np.full(n_rows, found, dtype=np.int64)

@@ -7,10 +7,10 @@ import numpy as np
 from gymnasium.error import ResetNeeded
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from app.errors import InvalidInput
-from app.sim.envs.arguments import check_render_mode, options_of
+from app.sim.envs.arguments import action_array, check_render_mode, options_of
 from app.sim.envs.raycast import Image
 from app.sim.envs.tasks import BatchTask, Mask, next_episode
 
@@ -133,7 +133,8 @@ class BatchVectorEnv(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
         waiting = self._over.copy()
         self._require_running(waiting)
         task = self._task
-        result = task.batch.step(task.actions(actions), auto_reset=False)
+        given = _without(actions, waiting) if waiting.any() else actions
+        result = task.batch.step(task.actions(given), auto_reset=False)
         rew = np.where(waiting, 0.0, result.rew.astype(np.float64))
         ended = np.where(waiting, 0, result.ended)
         late = task.truncates(ended)
@@ -184,6 +185,16 @@ class BatchVectorEnv(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
         if not self._seeded:
             raise ResetNeeded("call reset() before the first render()")
         return tuple(self._task.picture(row) for row in range(self.num_envs))
+
+
+def _without(actions: ArrayLike, ignored: Mask) -> NDArray[Any]:
+    """Return actions with zeros for some environments, whatever is given for these."""
+    act = np.array(action_array(actions))
+    if ignored.all():
+        act[...] = 0
+    elif act.ndim and len(act) == len(ignored):  # another shape is refused later
+        act[ignored] = 0
+    return act
 
 
 def _marked(infos: dict[str, NDArray[Any]], rows: Mask) -> dict[str, Any]:

@@ -93,16 +93,27 @@ def batch(**keywords: Any) -> VectorEnv[Any, Any, Any]:
     return gymnasium.make_vec("tandem/Reach-v0", N, **SHORT["tandem/Reach-v0"], **keywords)
 
 
-def test_next_step_ignores_the_action_where_an_episode_starts() -> None:
+@pytest.mark.parametrize("value", [1.0, np.nan])
+def test_next_step_ignores_the_action_where_an_episode_starts(value: float) -> None:
     env = batch(max_episode_steps=1)
     env.reset(seed=2)
-    zeros, ones = np.zeros((N, 6), np.float32), np.ones((N, 6), np.float32)
-    assert env.step(zeros)[3].all()
-    first, rew, over, late, infos = env.step(ones)
+    assert env.step(np.zeros((N, 6), np.float32))[3].all()
+    first, rew, over, late, infos = env.step(np.full((N, 6), value, np.float32))
     again, _ = batch().reset(seed=2, options={"episode": 1})
     np.testing.assert_array_equal(first, again)
     assert not rew.any() and not over.any() and not late.any()
     assert list(infos["episode_number"]) == [1] * N
+
+
+def test_next_step_ignores_the_action_of_some_environments_only() -> None:
+    env = gymnasium.make_vec("tandem/SortingE0-v0", 2, max_episode_steps=2)
+    env.reset(seed=1)
+    env.step(np.array([0, 0]))
+    env.reset(options={"reset_mask": np.array([False, True])})
+    assert list(env.step(np.array([0, 0]))[3]) == [True, False]
+    with pytest.raises(InvalidInput, match="act = .* must lie"):
+        env.step(np.array([0, -1]))
+    assert list(env.step(np.array([-1, 0]))[4]["episode_number"]) == [1, 1]
 
 
 def test_disabled_asks_for_a_reset_of_the_environments_that_ended() -> None:

@@ -116,6 +116,7 @@ def test_action_that_is_no_move_is_refused_and_changes_nothing(act: object) -> N
         ({"options": {"episode": 1.5}}, "options.episode = 1.5 must"),
         ({"options": {"episode": 2**70}}, "options.episode = .* must"),
         ({"options": {"episode": np.uint64(2**63)}}, "options.episode = .* must"),
+        ({"options": {"episode": 2**62}}, r"options.episode = .* must .* \[0, 2\^62\)"),
         ({"options": {"episode": "2"}}, "options.episode = '2' must"),
         ({"options": {"episode": [1, 2, 3, 4]}}, "options.episode = .* a list of . of them"),
     ],
