@@ -3,6 +3,8 @@
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from datetime import UTC, datetime
+from email.utils import parsedate_to_datetime
 from typing import Any, Literal, Self, TypedDict, TypeVar, Unpack, get_args, get_origin
 from urllib.parse import quote
 
@@ -171,8 +173,20 @@ def _raise_problem(answer: httpx.Response) -> None:
     except ValueError:  # a redirection, or of a proxy in between
         answer.raise_for_status()
         raise
-    after = answer.headers.get("retry-after")
-    raise Refused(problem, None if after is None else float(after))
+    raise Refused(problem, retry_after_s(answer.headers.get("retry-after")))
+
+
+def retry_after_s(header: str | None) -> float | None:
+    """Return the time that ``Retry-After`` states as seconds or as a date [s]."""
+    if header is None:
+        return None
+    if header.strip().isdecimal():
+        return float(header)
+    try:
+        wait = parsedate_to_datetime(header) - datetime.now(UTC)
+    except (TypeError, ValueError):  # neither, or a date without a zone
+        return None
+    return max(0.0, wait.total_seconds())
 
 
 def _given(values: Json | None) -> dict[str, Any]:

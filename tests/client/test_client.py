@@ -3,6 +3,8 @@
 import math
 import socket
 from collections.abc import Iterator
+from datetime import UTC, datetime, timedelta
+from email.utils import format_datetime
 
 import httpx
 import pytest
@@ -115,6 +117,16 @@ def test_dots_of_a_name_lead_to_no_other_route(client: Client, name: str) -> Non
 def test_redirection_is_no_success(client: Client) -> None:
     with pytest.raises(httpx.HTTPStatusError, match="307"):
         client.delete_cell("")  # redirected to the list
+
+
+def test_time_to_ask_again_is_given_in_seconds_or_as_a_date() -> None:
+    later = format_datetime(datetime.now(UTC) + timedelta(seconds=90), usegmt=True)
+    found = transport.retry_after_s(later)
+    assert found is not None and 80.0 < found <= 90.0
+    assert transport.retry_after_s("Fri, 27 Nov 1998 12:00:00 GMT") == 0.0
+    assert transport.retry_after_s(" 7 ") == 7.0
+    for header in (None, "", "soon", "-1", "Fri, 27 Nov"):
+        assert transport.retry_after_s(header) is None
 
 
 def test_stream_without_a_byte_fails(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -166,6 +166,44 @@ def test_damaged_backup_is_named_and_changes_nothing(
     assert not list(data.glob("*.kept")) and not list(data.glob("*.db.part"))
 
 
+def write_edited(
+    whole: Path, file: Path, edit: Callable[[dict[str, Any]], object], more: list[str]
+) -> None:
+    """Write a copy of a backup with another head and more copies of the database."""
+    with tarfile.open(whole) as archive:
+        members = {one.name: archive.extractfile(one).read() for one in archive}
+    head = json.loads(members["backup.json"])
+    edit(head)
+    members["backup.json"] = json.dumps(head).encode()
+    members["backup.json.sha256"] = hashlib.sha256(members["backup.json"]).hexdigest().encode()
+    members |= dict.fromkeys(more, members["tandem.db"])
+    with tarfile.open(file, "w") as archive:
+        for name, content in members.items():
+            member = tarfile.TarInfo(name)
+            member.size = len(content)
+            archive.addfile(member, io.BytesIO(content))
+
+
+@pytest.mark.parametrize("name", ["kernels/ab/k.nbi", "memory/.hidden", "other.lock"])
+def test_a_crafted_backup_restores_no_files_that_backups_do_not_contain(
+    store: Store, data: Path, tmp_path: Path, name: str
+) -> None:
+    whole, file = tmp_path / "whole.tar", tmp_path / "b.tar"
+    write_backup(store, data, whole)
+    added = {f"files/{name}", "files/memory/added.bin"}
+
+    def edit(head: dict[str, Any]) -> None:
+        head["files"] |= dict.fromkeys(added, head["files"]["tandem.db"])
+
+    write_edited(whole, file, edit, sorted(added))
+    (tmp_path / "other").mkdir()
+    other = Store(f"sqlite:///{tmp_path}/other/tandem.db")
+    restore_backup(other, tmp_path / "other", file)
+    assert (tmp_path / "other/memory/added.bin").exists()
+    assert not (tmp_path / "other" / name).exists()
+    other.close()
+
+
 @pytest.mark.parametrize(
     "edit",
     [
@@ -181,18 +219,7 @@ def test_head_of_another_form_is_refused(
 ) -> None:
     whole, file = tmp_path / "whole.tar", tmp_path / "b.tar"
     write_backup(store, data, whole)
-    with tarfile.open(whole) as archive:
-        members = {one.name: archive.extractfile(one).read() for one in archive}
-    head = json.loads(members["backup.json"])
-    edit(head)
-    members["backup.json"] = json.dumps(head).encode()
-    members["backup.json.sha256"] = hashlib.sha256(members["backup.json"]).hexdigest().encode()
-    members["kept.txt"] = members["tandem.db"]
-    with tarfile.open(file, "w") as archive:
-        for name, content in members.items():
-            member = tarfile.TarInfo(name)
-            member.size = len(content)
-            archive.addfile(member, io.BytesIO(content))
+    write_edited(whole, file, edit, ["kept.txt"])
     with pytest.raises(InvalidInput, match=r"b\.tar"):
         restore_backup(store, data, file)
     assert not list(data.glob("*.kept")) and not (data / "kept.txt").exists()

@@ -15,7 +15,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from pathlib import Path, PurePosixPath
+from pathlib import Path, PurePath, PurePosixPath
 from typing import Any
 
 from app.durable_files import sync_folder
@@ -48,7 +48,8 @@ NOT_KEPT = (
     "*.part",
     "*.unfinished",
 )
-"""Names in the data folder that no backup contains, as patterns."""
+"""Names in the data folder that no backup contains and none restores, as patterns; compiled
+kernels are code."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -152,7 +153,7 @@ def restore_backup(
             unpack(archive, head, DATABASE, part)
             _check_database(part, str(path))
             for name in head["files"]:
-                if name != DATABASE:
+                if name != DATABASE and _is_kept(PurePosixPath(name)):
                     _restore_file(archive, head, name, data_dir, target)
             kept = _keep(target)
             part.replace(target)
@@ -226,12 +227,14 @@ def _files(folder: Path, database: Path) -> Iterator[tuple[str, Path]]:
     """Yield the files of a folder that a backup contains, each with its relative name."""
     for file in sorted(folder.rglob("*")):
         name = file.relative_to(folder)
-        kept = not any(
-            PurePosixPath(part).match(one) for part in name.parts for one in NOT_KEPT
-        )
-        kept = kept and file.is_file() and not file.is_symlink()
+        kept = _is_kept(name) and file.is_file() and not file.is_symlink()
         if kept and not _is_of_database(file, database) and not is_backup(file):
             yield name.as_posix(), file
+
+
+def _is_kept(name: PurePath) -> bool:
+    """Return whether backups contain a file of this relative name."""
+    return not any(PurePosixPath(part).match(one) for part in name.parts for one in NOT_KEPT)
 
 
 def _is_of_database(file: Path, database: Path) -> bool:
