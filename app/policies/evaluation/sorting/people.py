@@ -7,16 +7,18 @@ docks. Blocks are no obstacles, as in the live cell. All tasks run side by side 
 the person works on and does not avoid the robot.
 
 The safety layer lies between policy and robot, with the assumptions ``AMONG_HANDS``; the rows
-``...-no-ssm`` are the same tasks without it. A person may touch the robot at standstill. After
-a contact of the moving robot it stops, waits until the person is away and begins its motion
-again. A motion that reaches the time limit begins again, too, with the choice of the order
-rule. A task that is not finished within ``LIMIT_S`` has failed.
+``...-no-ssm`` are the same tasks without it. This person's hands are sometimes faster than it
+assumes; the layer of the row ``critic-fast-hands`` has ``FAST_HANDS``. A person may touch the
+robot at standstill. After a contact of the moving robot it stops, waits until the person is
+away and begins its motion again. A motion that reaches the time limit begins again, too, with
+the choice of the order rule. A task that is not finished within ``LIMIT_S`` has failed.
 
 Each order rule (``order_rules.py``) runs the same tasks, with the same people and grasps.
 
 Source: docs/method.md 3.1, 3.6 and 4 (the critic's values for the symbolic choice). Ours.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -26,6 +28,7 @@ from numpy.typing import NDArray
 from app.policies.checkpoints.checkpoint import Checkpoint
 from app.policies.checkpoints.trained_cell import cell_of
 from app.policies.evaluation.pick.episodes import ObservedPeople, observe_exactly, settings_for
+from app.policies.evaluation.pick.ssm import FAST_HANDS
 from app.policies.evaluation.rows import EvaluationRequest, Json
 from app.policies.evaluation.sorting.full_tasks import FullTasks
 from app.policies.evaluation.sorting.order_rules import (
@@ -75,8 +78,8 @@ LIMIT_S = 600.0
 """Time after which a task has failed [s]."""
 MOTION_LIMIT_S = 20.0
 """Time limit of one motion [s]."""
-NO_SSM = "-no-ssm"
-"""Suffix of the rows without the safety layer."""
+NO_SSM, WITH_FAST_HANDS = "-no-ssm", "-fast-hands"
+"""Suffixes of rows: without the safety layer, and with one that assumes faster hands."""
 PLACE_TIME_S = 10.0
 """Time left of a motion that is valued before its object is picked [s]."""
 PAUSE_S = 1.0
@@ -331,19 +334,27 @@ def run_sorting_people(checkpoint: Checkpoint, request: EvaluationRequest) -> Js
     networks, cell, settings = parts_of(checkpoint)
     n = request.episodes or DEFAULT_TASKS
     runs: dict[str, FullTasks] = {}
-    rows = request.rows(2 * len(ORDER_RULES))
-    for suffix in ("", NO_SSM):
-        condition = CellCondition(active=not suffix)
+    rows = request.rows(2 * len(ORDER_RULES) + 1)
+    conditions: dict[str, tuple[CellCondition, Mapping[str, OrderRule]]] = {
+        "": (USUAL, ORDER_RULES),
+        NO_SSM: (CellCondition(active=False), ORDER_RULES),
+        WITH_FAST_HANDS: (CellCondition(safety=FAST_HANDS), {"critic": critic}),
+    }
+    for suffix, (condition, rules) in conditions.items():
         bench = SortingBesidePeople(networks, cell, settings, n, request.seed, condition)
-        for rule, choose in ORDER_RULES.items():
+        for rule, choose in rules.items():
             name = rule + suffix
             runs[name] = bench.run(choose)
             rows.append(runs[name].row(name))
+    others = "planner", "nearest", "critic" + NO_SSM, "critic" + WITH_FAST_HANDS
     return {
-        "settings": {**stated(bench.batch), "safety": AMONG_HANDS.describe()},
+        "settings": {
+            **stated(bench.batch),
+            "safety": AMONG_HANDS.describe(),
+            "critic" + WITH_FAST_HANDS: FAST_HANDS.describe(),
+        },
         "results": rows,
-        "paired": [_paired(runs["critic"], runs[name], name) for name in ("planner", "nearest")]
-        + [_paired(runs["critic"], runs["critic" + NO_SSM], "critic" + NO_SSM)],
+        "paired": [_paired(runs["critic"], runs[name], name) for name in others],
     }
 
 

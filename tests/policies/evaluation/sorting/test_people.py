@@ -139,8 +139,8 @@ def test_result_compares_the_rules_on_the_same_tasks() -> None:
     result = run_sorting_people(pretrained.load("pick"), request)
     names = [row["name"] for row in result["results"]]
     rules = ["critic", "planner", "nearest"]
-    assert names == rules + [f"{rule}-no-ssm" for rule in rules]
-    assert [done for done, _, _ in reported] == [1, 2, 3, 4, 5, 6]
+    assert names == [*rules, *(f"{rule}-no-ssm" for rule in rules), "critic-fast-hands"]
+    assert [done for done, _, _ in reported] == [1, 2, 3, 4, 5, 6, 7]
     critic, planner = result["results"][:2]
     difference = critic["cycle_time_s"]["mean"] - planner["cycle_time_s"]["mean"]
     assert result["paired"][0]["cycle_time_s"]["mean"] == pytest.approx(difference)
