@@ -10,15 +10,10 @@ from app.sim.cell_validation.checks import check_cell
 from app.sim.cells.cell import Cell, load_cell
 from app.sim.collision.contact import clearance
 from app.sim.pick.batch import OUTCOMES
-from app.sim.reach.batch import (
-    PROGRESS_WEIGHTS,
-    ReachBatch,
-    ReachSettings,
-    stated_rules,
-    with_workplace,
-)
+from app.sim.reach.batch import ReachBatch, ReachSettings, stated_rules, with_workplace
 from app.sim.robot.actions import ActionSettings
 from tests.sim.driven_batches import check_limits, check_rows, random_actions, straight
+from tests.sim.reach.kernels.test_reward import PROGRESS
 
 SUCCESS, COLLISION, TIMEOUT, UNFEASIBLE = range(1, 5)
 CROWD = ("worker", "walker", "constant", "fixed-speed")
@@ -137,7 +132,7 @@ def test_collision_ends_the_episode_unless_it_shall_go_on(cell: Cell) -> None:
 
 
 def test_goal_reached_after_a_collision_is_no_success(cell: Cell) -> None:
-    settings = ReachSettings(start="uniform", collision_ends=False, weights=PROGRESS_WEIGHTS)
+    settings = ReachSettings(start="uniform", collision_ends=False, weights=PROGRESS)
     batch = ReachBatch(cell, 400, 7, settings)
     batch.reset()
     late = np.zeros(400, dtype=bool)
