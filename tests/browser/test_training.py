@@ -302,6 +302,23 @@ def test_evaluation_is_shown_with_its_intervals(
     expect(rows).to_contain_text(f"{100 * success['mean']:.1f} % ({low} to {high})")
 
 
+def test_evaluation_of_another_protocol_shows_its_own_measures(
+    open_page: Callable[..., Page], server: str
+) -> None:
+    body = {"kind": "evaluate", "protocol": "risk-calibration", "episodes": 4, "seed": 3}
+    posted = patient_http.post(f"{server}/v1/jobs", json=body)
+    assert posted.status_code == 202, posted.text
+    page = open_page(scene=False)
+    page.click("#tab-training")
+    rows = page.locator(f'[data-job="{posted.json()["id"]}"] [data-role="rows"]')
+    expect(rows).to_contain_text("n = 4", timeout=GROWTH_MS)
+    result = patient_http.get(f"{server}/v1/jobs/{posted.json()['id']}").json()["result"]
+    contact = result["results"][0]["contact"]
+    for label, value in (("observed", contact["rate"]), ("predicted", contact["mean"])):
+        expect(rows).to_contain_text(f"contact, {label}{100 * value:.1f}\N{NO-BREAK SPACE}%")
+    expect(rows).not_to_contain_text("NaN")
+
+
 def test_override_out_of_range_is_explained_at_its_field(
     open_page: Callable[..., Page], server: str
 ) -> None:

@@ -7,6 +7,7 @@ import { Alert, Icon } from "../icons.js";
 import { Facts, FieldName, fieldValue, presetTitle } from "./fieldnames.js";
 import { PURPOSES, protocolTitle } from "./formfields.js";
 import { useListFocus } from "./listfocus.js";
+import { measuresOf } from "./measures.js";
 import { PAGE, storedCheckpoints } from "./checkpoints.js";
 
 /** The section of the checkpoints; `acting` are the SHA-256 of those of the live cell. */
@@ -121,13 +122,9 @@ function Uses({ one, acts, jobs, protocols }) {
   ].filter(Boolean);
   return html`<ul class="uses" aria-label="Use">${uses.map((text) => html`<li key=${text}>${text}</li>`)}
     </ul>${tested.filter((job) => job.result).map((job) => html`<dl class="rows" key=${job.id}>
-      ${rates(job).map(([name, text]) => html`<div key=${name}><dt>${name}</dt>
-        <dd><span>success</span><b>${text}</b></dd></div>`)}</dl>`)}`;
-}
-
-function rates(job) {
-  return (job.result?.results ?? []).filter((row) => row.success)
-    .map((row) => [row.name, format.interval(row.success)]);
+      ${job.result.results.map((row) => html`<div key=${row.name}><dt>${row.name}</dt>
+        ${measuresOf(row).slice(0, 1).map(([label, text]) => html`<dd key=${label}>
+          <span>${label}</span><b>${text}</b></dd>`)}</div>`)}</dl>`)}`;
 }
 
 function Aliases({ one, onChanged }) {

@@ -10,6 +10,7 @@ import { MAX_JOBS } from "./compare.js";
 import { protocolTitle } from "./formfields.js";
 import { isActive } from "./jobactions.js";
 import { JobFrame } from "./jobframe.js";
+import { measuresOf } from "./measures.js";
 import { Follow } from "./follow.js";
 import { ReportDetail } from "./report.js";
 import { SweepDetail } from "./sweep.js";
@@ -259,7 +260,6 @@ function rate(v, n) {
 function Evaluation({ job, ...rest }) {
   const { checkpoint, episodes } = job.spec;
   const rows = job.result?.results ?? [];
-  const rates = (row) => OUTCOMES.filter(({ key }) => row[key]);
   return html`<${JobFrame} job=${job} ...${rest}>
     <${Facts} entries=${[["Checkpoint", checkpoint?.length === SHA_256 ? format.short(checkpoint) : checkpoint ?? "–"],
       ["Episodes", format.number(episodes)]]} />
@@ -269,12 +269,10 @@ function Evaluation({ job, ...rest }) {
         : "It ended without a result: retry it."}</p>`}
     ${rows.length > 0 && html`<dl class="rows" data-role="rows">${rows.map((row) => html`
       <div key=${row.name}><dt>${row.name} <small>n = ${row.n}</small></dt>
-        ${rates(row).map(({ key, label }) => html`<dd key=${key}><span>${label}</span>
-          <b>${format.interval(row[key])}</b></dd>`)}
-        ${rates(row).length === 0 && html`<dd><span>contacts</span>
-          <b>${format.steps(row.contacts)}</b></dd>`}
+        ${measuresOf(row).map(([label, text]) => html`<dd key=${label}><span>${label}</span>
+          <b>${text}</b></dd>`)}
       </div>`)}</dl>
-      <p class="plot-foot"><span>Rates with their 95 % intervals</span></p>`}
+      <p class="plot-foot"><span>In brackets: 95 % intervals</span></p>`}
   </${JobFrame}>`;
 }
 
