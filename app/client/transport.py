@@ -15,6 +15,8 @@ from app.api.problems import Problem
 
 TIMEOUT_S = 30.0
 """Default time limit of an answer [s]."""
+FILE_S = 240.0
+"""Least time limit of an answer to a file, which the server imports or checks first [s]."""
 SILENCE_S = 60.0
 """Least silence after which a stream fails [s]; the server sends a byte at least every 15 s."""
 M = TypeVar("M", bound=BaseModel)
@@ -65,7 +67,7 @@ class Transport:
     Args:
         address: Address of the server, with the path of a reverse proxy.
         token: The server's token; None on loopback.
-        timeout_s: Time limit of an answer [s].
+        timeout_s: Time limit of an answer [s]; at least ``FILE_S`` where a file is sent.
     """
 
     def __init__(
@@ -109,12 +111,14 @@ class Transport:
             given = _json_of(body) if isinstance(body, BaseModel) else body
             content = json.dumps(given).encode()  # NaN too: a missing key-point
             headers["Content-Type"] = "application/json"
+        is_file = parts.get("content") is not None
         answer = self._http.request(
             method,
             _filled(path, names),
             params=_given(parts.get("query")),
             headers=headers,
             content=content,
+            timeout=max(self._timeout_s, FILE_S) if is_file else self._timeout_s,
         )
         _raise_problem(answer)
         return answer

@@ -15,6 +15,7 @@ from app.client import Client, Refused, transport
 from app.live.commands import PauseClock, ResumeClock
 from jobs.spec import EvaluateSpec
 from tests.api.live_server import served
+from tests.sim.recorded_person import csv_text, working
 from tests.support.workshop import definition
 from tools.generate_client import TARGET, render
 
@@ -117,6 +118,16 @@ def test_dots_of_a_name_lead_to_no_other_route(client: Client, name: str) -> Non
 def test_redirection_is_no_success(client: Client) -> None:
     with pytest.raises(httpx.HTTPStatusError, match="307"):
         client.delete_cell("")  # redirected to the list
+
+
+def test_a_file_has_more_time_than_other_requests(address: str) -> None:
+    content = csv_text(working(60)).encode()
+    with Client(address, token=TOKEN, timeout_s=1e-3) as hasty:
+        with pytest.raises(httpx.TimeoutException):
+            hasty.list_recordings()
+        assert hasty.create_recording(content, file_name="clip.csv", name="nods").name == "nods"
+    with Client(address, token=TOKEN) as client:
+        client.delete_recording("nods")
 
 
 def test_time_to_ask_again_is_given_in_seconds_or_as_a_date() -> None:
