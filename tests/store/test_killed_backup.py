@@ -70,7 +70,10 @@ def stopped_writer(store: Store, data: Path, folder: Path) -> Iterator[subproces
 def stopped(
     program: str, store: Store, data: Path, place: Path
 ) -> Iterator[subprocess.Popen[bytes]]:
-    """Yield a process that is stopped while its temporary files exist."""
+    """Yield a process that is stopped while its temporary folders have content.
+
+    Without content it may be stopped before it holds the lock of its folder.
+    """
     command = [sys.executable, "-c", program, store.url, str(data), str(place)]
     folders = [one for one in (data, place) if not one.suffix]
     with subprocess.Popen(command, stderr=subprocess.PIPE) as process:
@@ -78,7 +81,7 @@ def stopped(
         def stop_within() -> bool:
             assert process.poll() is None
             process.send_signal(signal.SIGSTOP)
-            if all(hidden(one) for one in folders):
+            if all(any(holds(one) for one in hidden(folder)) for folder in folders):
                 return True
             process.send_signal(signal.SIGCONT)
             return False
@@ -88,6 +91,14 @@ def stopped(
             yield process
         finally:
             process.kill()
+
+
+def holds(one: Path) -> bool:
+    """Return whether a temporary file or folder has content."""
+    try:
+        return one.is_file() or any(one.iterdir())
+    except FileNotFoundError:
+        return False  # removed since
 
 
 def hidden(folder: Path) -> list[Path]:
