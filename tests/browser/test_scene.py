@@ -58,7 +58,7 @@ def test_scene_goes_on_in_two_windows_while_people_come_and_go(
     until(shown, lambda now: len(now["people"]) == 2, LIMIT_S)
     for page in pages:
         expect_drawing(page)
-        assert page.locator('[data-role="scene-note"]').count() == 0
+        assert page.locator('[data-role="scene-note"]').all_inner_texts() == []
         assert page.problems == []  # type: ignore[attr-defined]
 
 
@@ -75,28 +75,50 @@ def test_scene_follows_into_other_cells_and_back_in_every_window(
         for page in pages:
             expect(page.locator('[data-role="cell"]')).to_have_value(cell)
             expect_drawing(page)
-            assert page.locator('[data-role="scene-note"]').count() == 0
+            assert page.locator('[data-role="scene-note"]').all_inner_texts() == []
+
+
+@WINDOWS
+@pytest.mark.usefixtures("shown")
+def test_scene_scrolled_out_of_view_is_not_taken_for_a_stopped_one(
+    open_page: Callable[..., Page],
+) -> None:
+    page = open_page((500, 600))
+    expect_drawing(page)
+    scene_of(page).evaluate("() => { window.first = true; }")
+    page.evaluate("() => scrollTo(0, document.documentElement.scrollHeight)")
+    page.wait_for_timeout(15_000)
+    page.evaluate("() => scrollTo(0, 0)")
+    expect_drawing(page)
+    assert scene_of(page).evaluate("() => window.first === true")
+    assert page.locator('[data-role="scene-note"]').all_inner_texts() == []
 
 
 @WINDOWS
 @pytest.mark.parametrize(
-    "harm",
+    ("harm", "reason"),
     [
-        "document.querySelectorAll('canvas').forEach((one) => one.remove())",
-        """[...document.querySelectorAll('canvas')].map((one) => one.getContext('webgl2'))
+        (
+            "document.querySelectorAll('canvas').forEach((one) => one.remove())",
+            "its canvas was removed",
+        ),
+        (
+            """[...document.querySelectorAll('canvas')].map((one) => one.getContext('webgl2'))
         .forEach((gl) => gl?.getExtension('WEBGL_lose_context').loseContext())""",
-        "WebGL2RenderingContext.prototype.clear = () => {}",
+            "its graphics context was lost",
+        ),
+        ("WebGL2RenderingContext.prototype.clear = () => {}", "it drew nothing for 5 s"),
     ],
     ids=["its canvas is gone", "its graphics context is lost", "it draws no more"],
 )
 @pytest.mark.usefixtures("shown")
 def test_failed_scene_is_reloaded_with_a_message(
-    open_page: Callable[..., Page], harm: str
+    open_page: Callable[..., Page], harm: str, reason: str
 ) -> None:
     page = open_page((500, 600))
     expect_drawing(page)
     scene_of(page).evaluate(f"() => {{ {harm} }}")
-    page.wait_for_selector('[data-role="scene-note"]')
+    expect(page.locator('[data-role="scene-note"]')).to_contain_text(f"stopped ({reason})")
     expect_drawing(page)
     expect(page.locator('[data-link="live"]')).to_be_visible()
 

@@ -16,8 +16,8 @@ const NOTE_MS = 20000;
 export function Viewer({ src, epoch, link, frame }) {
   const [round, setRound] = useState(0);
   const [report, setReport] = useState({ state: "", reason: "" });
-  const [note, setNote] = useState(false);
-  const died = useRef(false);
+  const [note, setNote] = useState("");
+  const died = useRef(""); // why the frame stopped, until it draws again
   const again = () => {
     setReport({ state: "", reason: "" });
     setRound((n) => n + 1);
@@ -28,10 +28,10 @@ export function Viewer({ src, epoch, link, frame }) {
       const ours = origin === location.origin && source === frame.current?.contentWindow;
       if (!ours || data?.from !== "tandem-scene") return;
       setReport(data);
-      died.current ||= data.state === "dead";
+      if (data.state === "dead") died.current ||= data.reason;
       if (data.state !== "up" || !died.current) return;
-      died.current = false;
-      setNote(true);
+      setNote(died.current);
+      died.current = "";
     };
     addEventListener("message", hear);
     return () => removeEventListener("message", hear);
@@ -52,7 +52,7 @@ export function Viewer({ src, epoch, link, frame }) {
 
   useEffect(() => {
     if (!note) return undefined;
-    const timer = setTimeout(() => setNote(false), NOTE_MS);
+    const timer = setTimeout(() => setNote(""), NOTE_MS);
     return () => clearTimeout(timer);
   }, [note]);
 
@@ -62,8 +62,8 @@ export function Viewer({ src, epoch, link, frame }) {
     ${text && html`<div class="veil" role="status" data-role="scene-trouble">
       <i class="spinner"></i><p><b>${text[0]}</b></p><p class="faint">${text[1]}</p></div>`}
     ${note && html`<p class="scene-note" role="status" data-role="scene-note">
-      <span>The 3D scene had stopped and was loaded again.</span>
-      <${Close} label="Dismiss" onClick=${() => setNote(false)} /></p>`}`;
+      <span>The 3D scene had stopped (${note}) and was loaded again.</span>
+      <${Close} label="Dismiss" onClick=${() => setNote("")} /></p>`}`;
 }
 
 /** What to say over the scene: a title and a sentence, or null while it is well. */
