@@ -11,7 +11,7 @@ from typing import Any, Literal, Protocol
 from app.store import attempts, completion, fencing
 from app.store.database.schema import check_schema
 from app.store.engine import Store
-from app.store.records import Claim, EarlyEnd, JobRecord, NewCheckpoint, ResumeState
+from app.store.records import Claim, JobRecord, NewCheckpoint, ResumeState, SpentBudget
 from jobs import resume_files
 
 
@@ -25,7 +25,7 @@ class EndOfAttempt:
     """Result of the job."""
     error: str | None = None
     """Cause of a failure."""
-    ended_by: EarlyEnd | None = None
+    ended_by: SpentBudget | None = None
     """The budget that ended it."""
     run_s: float | None = None
     """Run time of all attempts; None leaves it [s]."""

@@ -16,7 +16,7 @@ from typing import Any
 
 from app.errors import ServiceError
 from app.storage_errors import StaleAttempt, StorageDamaged, StorageFull, StorageUnavailable
-from app.store.records import EarlyEnd, JobRecord, NewCheckpoint, ResumeState
+from app.store.records import JobRecord, NewCheckpoint, ResumeState, SpentBudget
 from jobs.access import EndOfAttempt, JobAccess
 
 logger = logging.getLogger(__name__)
@@ -52,7 +52,7 @@ class JobWorker:
         self._lost = threading.Event()
         self._stop_seen = False
         self._waiting: str | None = None
-        self._early_end: EarlyEnd | None = None
+        self._early_end: SpentBudget | None = None
         self._budgeted = self.job
         self._run_before, self._started = self.job.run_s, time.monotonic()
 

@@ -15,7 +15,7 @@ from app.store.database.tables import jobs, resume_states
 from app.store.engine import Store
 from app.store.fencing import change_state, fenced_update
 from app.store.jobs import ended_now, read_job
-from app.store.records import COMPOSITE_KINDS, Claim, EarlyEnd, JobRecord
+from app.store.records import COMPOSITE_KINDS, Claim, JobRecord, SpentBudget
 
 MAX_ERROR = 4000
 """Longest error text of a job [characters]."""
@@ -29,7 +29,7 @@ def finish(
     *,
     state: Literal["succeeded", "cancelled"] = "succeeded",
     result: Mapping[str, Any] | None = None,
-    ended_by: EarlyEnd | None = None,
+    ended_by: SpentBudget | None = None,
     run_s: float | None = None,
 ) -> None:
     """End a job as succeeded or cancelled.

@@ -17,7 +17,7 @@ from app.store.events import append_event
 from app.store.fencing import change_state
 from app.store.jobs import cancel_parts, ended_now, read_job, select_jobs
 from app.store.jobs import request_cancel as cancel_job
-from app.store.records import JobRecord
+from app.store.records import EarlyEnd, JobRecord
 
 
 def open_jobs(store: Store, kind: str) -> tuple[JobRecord, ...]:
@@ -69,9 +69,10 @@ def end(
     *,
     result: Mapping[str, Any] | None = None,
     error: str | None = None,
+    ended_by: EarlyEnd | None = None,
 ) -> None:
     """End a job; the parts of one that fails are cancelled in the same transaction."""
-    changes = {"result": result, "error": error, **ended_now()}
+    changes = {"result": result, "error": error, "ended_by": ended_by, **ended_now()}
     with store.writing() as connection:
         job = read_job(connection, job_id, for_update=True)
         if not job.is_final:

@@ -39,7 +39,7 @@ def resume_job(
     Crashes and kills before count no longer.
 
     Args:
-        job_id: A job that is cancelled, has failed, or was ended by a budget.
+        job_id: A job that is cancelled, has failed, or was ended by a budget or failed parts.
         budget: Changed budgets by name; None removes one.
         references: What must be stored.
 
@@ -102,7 +102,10 @@ def require_repeatable(job: JobRecord, action: str) -> None:
         return
     remedy = "cancel it first"
     if job.state == "succeeded":
-        remedy = "resume it with a larger budget" if job.ended_by else "clone it with changes"
+        remedy = "clone it with changes"
+        if job.ended_by:
+            composed = job.kind in COMPOSITE_KINDS
+            remedy = "resume it" if composed else "resume it with a larger budget"
     rule = f"must be {' or '.join(REPEATABLE)} to {action} job {job.number}: {remedy}"
     raise WrongState("state", job.state, rule, REPEATABLE)
 

@@ -16,8 +16,11 @@ JobState = Literal["queued", "running", "cancelling", "succeeded", "failed", "ca
 FINAL_STATES: tuple[JobState, ...] = ("succeeded", "failed", "cancelled")
 """Final states."""
 
-EarlyEnd = Literal["step budget", "time budget", "pruned"]
-"""What ended a job before its last step: a budget, or the pruner of its sweep."""
+SpentBudget = Literal["step budget", "time budget"]
+"""A budget that ended a training before its last step."""
+
+EarlyEnd = SpentBudget | Literal["pruned", "failed parts"]
+"""Why a job ended incomplete: a budget, the pruner of its sweep, or evaluations of a report."""
 
 COMPOSITE_KINDS = ("sweep", "report")
 """Kinds of jobs that have no worker: the supervisor starts their parts, jobs likewise."""

@@ -13,7 +13,7 @@ from app.policies.report.page import RESULTS, evaluations, page
 from app.provenance import describe
 from app.store import composed_jobs, jobs
 from app.store.engine import Store
-from app.store.records import JobRecord
+from app.store.records import EarlyEnd, JobRecord
 from jobs.composed.composer import Composer
 from jobs.spec import AnySpec, ReportSpec, parse_spec
 
@@ -57,7 +57,8 @@ class Reports(Composer):
             except (OSError, ValueError, KeyError) as error:
                 self._fail(store, job, f"the page could not be written: {error!r}")
             else:
-                composed_jobs.end(store, job.id, "succeeded", result=result)
+                lacking: EarlyEnd | None = "failed parts" if result["failed"] else None
+                composed_jobs.end(store, job.id, "succeeded", result=result, ended_by=lacking)
 
 
 def _evaluation(spec: ReportSpec, protocol: str, checkpoint: str) -> AnySpec:

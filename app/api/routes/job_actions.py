@@ -70,7 +70,8 @@ def resume_job(
 ) -> JobPublic:
     """Queue the same job again; it continues from its newest state, at ``resume_step``.
 
-    Cancelled and failed jobs can be resumed, and those that a budget ended, with a larger one.
+    Cancelled and failed jobs can be resumed, those that a budget ended, with a larger one, and
+    reports without the results of some evaluations, which are run again.
     """
     changes = {} if body is None else body.model_dump(exclude_unset=True)
     require_budgeted(job, changes)

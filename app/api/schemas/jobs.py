@@ -7,7 +7,7 @@ from pydantic import Field
 
 from app.api.schemas.numbers import Answer, Body, Finite
 from app.store.cursors import MAX_INTEGER
-from app.store.records import EarlyEnd, JobRecord, MetricRow
+from app.store.records import JobRecord, MetricRow, SpentBudget
 
 
 class JobPublic(Answer):
@@ -47,7 +47,8 @@ class JobPublic(Answer):
     )
     run_s: float = Field(description="run time of all its attempts [s]")
     ended_by: str | None = Field(
-        description="what ended it early: `step budget`, `time budget` or `pruned`; else null"
+        description="why it is not complete: `step budget`, `time budget`, `pruned` or "
+        "`failed parts`; else null"
     )
     part_of: str | None = Field(description="id of the sweep or report that it is part of")
     trial: int | None = Field(
@@ -177,5 +178,5 @@ class AttemptEnd(Body):
     )
     result: dict[str, Any] | None = Field(None, description="result of the job")
     error: str | None = Field(None, description="cause of a failure", max_length=100_000)
-    ended_by: EarlyEnd | None = Field(None, description="the budget that ended it")
+    ended_by: SpentBudget | None = Field(None, description="the budget that ended it")
     run_s: RunTime | None = None

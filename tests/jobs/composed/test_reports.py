@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 import sqlalchemy as sa
 
-from app.errors import InvalidInput
+from app.errors import InvalidInput, WrongState
 from app.policies.report.page import RESULTS, evaluations, page
 from app.store import attempts, completion, job_actions, jobs
 from app.store.database import tables
@@ -81,6 +81,29 @@ def test_evaluation_without_a_result_is_named_and_not_replaced_by_a_stored_one(
     assert report.result["failed"] == list(evaluations())
     assert "success" in report.result["markdown"]
     assert "`docs/results/reach-random.json`" not in report.result["markdown"]
+
+
+def test_report_with_failed_evaluations_repeats_these_when_resumed(store: Store) -> None:
+    report = look(store, post(store, measure=True))
+    claim, failed = claimed(store)
+    completion.fail(store, claim, "no luck")
+    while look(store, report).state == "running":
+        run_one(store)
+    report = jobs.get_job(store, report.id)
+    assert (report.state, report.ended_by) == ("succeeded", "failed parts")
+    with pytest.raises(WrongState, match="retry job 1: resume it"):
+        job_actions.require_repeatable(report, "retry")
+    job_actions.resume_job(store, report.id)
+    assert look(store, report).state == "running"
+    again = parts_of(store, report)[-1]
+    assert (again.state, again.spec) == ("queued", failed.spec)
+    run_one(store)
+    report = look(store, report)
+    assert (report.state, report.ended_by) == ("succeeded", None)
+    assert report.result is not None
+    assert (report.result["failed"], report.result["measured"]) == ([], len(evaluations()))
+    with pytest.raises(WrongState, match="resume job 1: clone it"):
+        job_actions.resume_job(store, report.id)
 
 
 def test_cancelled_report_continues_with_what_it_has_when_resumed(store: Store) -> None:

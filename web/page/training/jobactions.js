@@ -27,9 +27,11 @@ export function JobActions({ job, onChanged, onOpen, onClone }) {
     onOpen(made.id);
   });
   const repeatable = REPEATABLE.has(job.state);
+  const resumable = repeatable ? job.resume_step !== null || COMPOSITE_KINDS.has(job.kind)
+    : job.ended_by === "failed parts";
   const act = (name) => again.run(() => post(`v1/jobs/${job.id}/${name}`));
   return html`
-    ${repeatable && (job.resume_step !== null || COMPOSITE_KINDS.has(job.kind)) && html`<button type="button" class="tool"
+    ${resumable && html`<button type="button" class="tool"
       data-action="resume" disabled=${again.busy} onClick=${() => act("resume")}
       title="Continue this job from its last state">
       ${COMPOSITE_KINDS.has(job.kind) ? "Resume" : `Resume at ${format.count(job.resume_step, "step")}`}</button>`}

@@ -220,7 +220,7 @@ function JobDetail({ job, presets, onChanged, onOpen, onClone, onAct, acting }) 
         ${` ${format.count(rows.length, "point")}`}</span>
         <span data-role="point">${row && `${readout ? "" : "last: "}${format.count(row.step, "step")},
           ${format.count(row.episodes ?? 0, "episode")}`}</span></p>`}
-    ${job.ended_by && job.ended_by !== "pruned" && html`<${EndedByBudget} key=${job.attempt} job=${job} onChanged=${onChanged} />`}
+    ${job.ended_by?.endsWith("budget") && html`<${EndedByBudget} key=${job.attempt} job=${job} onChanged=${onChanged} />`}
     ${lost && html`<p class="notice warn" role="status"><${Icon} name="alert" />
       The connection to this job was lost; trying again.</p>`}
     <${Speed} job=${job} row=${rows?.at(-1)} presets=${presets} />
