@@ -71,16 +71,23 @@ def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
 
 
 @contextmanager
-def serving(data: Path, port: int) -> Iterator[tuple[str, subprocess.Popen[bytes]]]:
+def serving(
+    data: Path, port: int, module: str = "app"
+) -> Iterator[tuple[str, subprocess.Popen[bytes]]]:
     """Start a server process, wait until it is ready, and stop it in the end.
 
     Yields its address and the process, which may have been killed by then.
+
+    Args:
+        data: Its data folder.
+        port: The port it listens on.
+        module: The module whose command ``serve`` it runs.
     """
     env = os.environ | {"TANDEM_DATA": str(data), "TANDEM_PORT": str(port)}
     log = data / "server.log"
     with log.open("wb") as sink:
         process = subprocess.Popen(
-            [sys.executable, "-m", "app", "serve"],
+            [sys.executable, "-m", module, "serve"],
             cwd=ROOT,
             env=env,
             stdout=sink,

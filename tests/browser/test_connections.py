@@ -1,10 +1,12 @@
 """Pages of one browser share six connections to a server: none is kept that nobody needs."""
 
 from collections.abc import Callable
+from pathlib import Path
 
 import pytest
 from playwright.sync_api import Browser, Page, Route, expect
 
+from tests.browser.conftest import free_port, serving
 from tests.browser.test_drag import tell
 
 pytestmark = pytest.mark.browser
@@ -16,6 +18,13 @@ SEE = """hidden => {
   document.dispatchEvent(new Event("visibilitychange"));
 }"""
 """Headless Chromium hides no page: the browser's own notice is given by hand."""
+LINKS = """() => {
+  const frame = document.querySelector(".frame"), links = [frame.dataset.link];
+  new MutationObserver(() => links.push(frame.dataset.link))
+    .observe(frame, { attributes: true });
+  window.links = links;
+}"""
+"""Collects the states of the link from now on."""
 
 
 def test_hidden_page_closes_its_stream_and_is_present_again_when_seen(
@@ -92,6 +101,29 @@ def test_sign_in_form_sends_its_token_once(browser: Browser, server: str) -> Non
         )
     assert sent == [f"{server}/session"]
     page.close()
+
+
+def test_page_names_a_cell_that_has_stopped_and_starts_it_again(
+    open_page: Callable[..., Page], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    hang = tmp_path / "hang"
+    monkeypatch.setenv("TANDEM_TEST_HANG", str(hang))
+    module = "tests.support.stalling_server"
+    with serving(tmp_path, free_port(), module) as (address, _):
+        page = open_page(scene=False, address=address)
+        hang.touch()
+        banner = page.locator('[data-role="stale"]')
+        expect(banner).to_contain_text("The server sends nothing.")
+        expect(banner).to_contain_text("The server answers, but the cell has stopped.")
+        page.evaluate(LINKS)
+        page.click("#tab-training")
+        page.wait_for_timeout(14_000)
+        assert set(page.evaluate("() => window.links")) == {"stalled"}
+        expect(page.locator("#panel-training")).to_contain_text("No jobs yet")
+        banner.get_by_role("button", name="Start the cell again").click()
+        page.wait_for_selector('[data-link="live"]')
+        expect(banner).to_have_count(0)
+        hang.unlink()
 
 
 def test_effect_of_a_command_is_unknown_after_a_lost_connection(

@@ -25,6 +25,7 @@ const LINKS = {
   warming: ["Warming up", "warn"],
   live: ["Live", "good"],
   stale: ["Stale", "bad"],
+  stalled: ["Stalled", "bad"],
   lost: ["Disconnected", "bad"],
 };
 
@@ -112,7 +113,7 @@ function useMedia(condition) {
 function Link({ cell: { link, world, heardAt, pending } }) {
   const waiting = useLate(pending > 0 && link === "live");
   const [text, tone] = waiting ? ["Waiting", "warn"] : LINKS[link];
-  const seconds = useSeconds(heardAt, link === "stale" && world);
+  const seconds = useSeconds(heardAt, ["stale", "stalled"].includes(link) && world);
   return html`<span class=${`link ${tone}`} role="status" data-role="link"
     data-pending=${pending}><i></i><span>${text}${
     seconds !== null && html`<span aria-hidden="true"> for ${seconds} s</span>`}</span></span>`;
@@ -130,18 +131,21 @@ function Refusals({ errors, onDismiss }) {
 
 const CAUSES = {
   stale: "The server sends nothing.",
+  stalled: "The server answers, but the cell has stopped.",
   lost: "The server does not answer; trying again every second.",
   warming: "The server starts again.",
 };
 
 /** Says that what is shown is old, how old, and what waits. */
-function Stale({ cell: { link, world, heardAt, pending } }) {
+function Stale({ cell: { link, world, heardAt, pending, show } }) {
   const seconds = useSeconds(heardAt, link in CAUSES && world);
   if (seconds === null) return null;
   const waits = pending === 1 ? " 1 command is pending." : ` ${pending} commands are pending.`;
   return html`<p class="banner warn" role="alert" data-role="stale"><${Icon} name="alert" />
     <span><b>Stale<span aria-hidden="true"> for ${seconds} s</span>.</b> ${CAUSES[link]} Scene and
-    values show the last known state.${pending > 0 && waits}</span></p>`;
+    values show the last known state.${pending > 0 && waits}</span>
+    ${link === "stalled" && html`<button type="button" class="tool" data-action="start-again"
+      disabled=${pending > 0} onClick=${() => show(world.cell)}>Start the cell again</button>`}</p>`;
 }
 
 /** Whole seconds since `start`, counted on while `on`; null otherwise. */

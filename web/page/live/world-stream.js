@@ -14,15 +14,21 @@ const AGAIN_MS = 10000; // silence after which the stream is opened again
 const COMMAND_MS = 8000;
 const CELL_MS = 180000; // another cell may have kernels to compile
 
+/** Whether the server answers requests. */
+export function answers(link) {
+  return link === "live" || link === "stalled";
+}
+
 /**
  * Follow the server and its world.
  *
- * @returns {{link: "connecting"|"warming"|"live"|"stale"|"lost"|"signin", reason: string,
+ * @returns {{link: "connecting"|"warming"|"live"|"stalled"|"stale"|"lost"|"signin", reason: string,
  *            world: object|null, cell: object|null, cells: object[], history: History,
  *            epoch: number, heardAt: number, pending: number, errors: Error[],
  *            send: (command: object) => Promise<void>, show: (cell: string) => Promise<void>}}
  *   `epoch` counts how often the server was found ready; `heardAt` is the time of the last
- *   snapshot, as performance.now() gives it; `pending` counts commands that no snapshot shows
+ *   snapshot, as performance.now() gives it; a world is stalled that no longer moves though the
+ *   server answers; `pending` counts commands that no snapshot shows
  *   yet; `errors` are those of the newest commands.
  */
 export function useCell() {
@@ -86,7 +92,8 @@ async function watch(signal, history, unconfirmed, setState, setEpoch) {
   let isBack = false; // seen again: the scene has its own connection
   while (!signal.aborted) {
     await seen(signal);
-    isBack = (await ready(signal, merge)) && isBack;
+    const { first, stalled } = await ready(signal, merge);
+    isBack &&= first;
     try {
       const [world, cells] = await Promise.all([get(`v1/worlds/${WORLD}`), get("v1/cells")]);
       const list = cells.items;
@@ -94,20 +101,24 @@ async function watch(signal, history, unconfirmed, setState, setEpoch) {
       let replaced = false;
       let link = "lost";
       history.add(world);
-      merge({ world, cell, cells: list, link: "live", reason: "", heardAt: performance.now() });
-      if (!isBack) setEpoch((n) => n + 1);
+      const heardAt = performance.now();
+      if (stalled) setState((now) => ({ ...now, heardAt: now.heardAt ?? heardAt }));
+      else merge({ heardAt });
+      merge({ world, cell, cells: list, link: stalled ? "stalled" : "live", reason: "" });
+      if (!isBack) setEpoch((n) => (stalled ? Math.max(n, 1) : n + 1));
       isBack = false;
       await until(signal, (lost) => {
         const left = new AbortController();
         hidden(left.signal).then(() => left.signal.aborted || lost((isBack = true)));
         const silence = listen((quiet) => {
-          merge({ link: "stale" });
-          if (quiet > AGAIN_MS) lost((link = "stale"));
+          const still = stalled ? "stalled" : "stale";
+          merge({ link: still });
+          if (quiet > AGAIN_MS) lost((link = still));
         });
         const leave = follow(`v1/worlds/${WORLD}/events`, {
           onEvent: (name, snapshot) => {
             if (name === "end") lost((replaced = true));
-            if (!snapshot?.candidates) return;
+            if (!snapshot?.candidates || (stalled && snapshot.tick === world.tick)) return;
             silence.end();
             history.add(snapshot);
             unconfirmed.see(snapshot);
@@ -132,22 +143,22 @@ async function watch(signal, history, unconfirmed, setState, setEpoch) {
   }
 }
 
-/** Wait until the server is ready; whether it was at the first question. */
+/** Wait until the server is ready; whether it was at the first question, and the world stalled. */
 async function ready(signal, merge) {
   for (let first = true; !signal.aborted; first = false) {
     try {
       const late = AbortSignal.any([signal, AbortSignal.timeout(ASK_MS)]);
       const response = await fetch("readyz", { signal: late, cache: "no-store" });
-      if (response.ok) return first;
       const body = await response.json().catch(() => null);
+      if (response.ok) return { first, stalled: WORLD in (body?.stalled ?? {}) };
       merge({ link: "warming", reason: body?.detail ?? "" });
     } catch (error) {
-      if (signal.aborted) return false;
+      if (signal.aborted) break;
       merge({ link: error.name === "TimeoutError" ? "stale" : "lost", reason: "" });
     }
     await pause(signal);
   }
-  return false;
+  return { first: false, stalled: false };
 }
 
 /**

@@ -4,6 +4,7 @@ import { Ask, Fault, useAction } from "../action.js";
 import { postFile, put, remove } from "../api.js";
 import * as format from "../format.js";
 import { Alert, Icon } from "../icons.js";
+import { answers } from "../live/world-stream.js";
 import { Facts, FieldName, fieldValue, presetTitle } from "./fieldnames.js";
 import { PURPOSES, protocolTitle } from "./formfields.js";
 import { useListFocus } from "./listfocus.js";
@@ -20,7 +21,7 @@ export function CheckpointCards({ link, jobs, acting, presets, protocols }) {
   const refresh = () => storedCheckpoints().then(
     (stored) => { setList(stored); setError(null); }, setError);
   const stamp = (jobs ?? []).map((job) => job.state).join();
-  useEffect(() => { if (link === "live") refresh(); }, [link, stamp]);
+  useEffect(() => { if (answers(link)) refresh(); }, [link, stamp]);
   const choose = (sha256) => setPair((now) =>
     (now.includes(sha256) ? now.filter((one) => one !== sha256) : [...now, sha256].slice(-2)));
   const compared = pair.map((sha256) => list?.find((c) => c.sha256 === sha256)).filter(Boolean);

@@ -2,6 +2,7 @@
 import { html, useCallback, useEffect, useState } from "../vendor/htm-preact-standalone.module.js";
 import { get } from "../api.js";
 import * as format from "../format.js";
+import { answers } from "../live/world-stream.js";
 import { presetTitle } from "./fieldnames.js";
 import { useItems } from "./formfields.js";
 
@@ -31,7 +32,7 @@ export function useCheckpoints(link, stamp) {
   const [list, setList] = useState([]);
   const [unstored, setUnstored] = useState([]);
   const refresh = useCallback(() => {
-    if (link !== "live") return;
+    if (!answers(link)) return;
     storedCheckpoints().then(setList, () => {});
     get("v1/worlds").then(({ items }) => setUnstored(items.flatMap((one) => one.unstored)), () => {});
   }, [link]);

@@ -3,6 +3,7 @@ import { html, useEffect, useRef, useState } from "../vendor/htm-preact-standalo
 import { get, Unreachable } from "../api.js";
 import { capital, grouped, sentence } from "../format.js";
 import { Alert, Close } from "../icons.js";
+import { answers } from "../live/world-stream.js";
 
 export const PURPOSES = { "choosing tasks": "task selection", "reaching goals": "reach", sorting: "sorting" };
 const AGAIN_MS = 3000; // pause before a request that failed is sent again
@@ -49,7 +50,7 @@ export function useForm({ typed: first = {}, names, onDone, prefix = "train" }) 
 export function useItems(link, path) {
   const [state, setState] = useState({ items: null, error: null });
   useEffect(() => {
-    if (link !== "live" || state.items) return undefined;
+    if (!answers(link) || state.items) return undefined;
     const stop = new AbortController();
     let timer = null;
     const ask = () => get(path, { signal: stop.signal }).then(

@@ -1,6 +1,7 @@
 // Jobs: the list, and for the open one its learning curves, numbers and what can be done.
 import { html, useCallback, useEffect, useRef, useState } from "../vendor/htm-preact-standalone.module.js";
 import { follow, get } from "../api.js";
+import { answers } from "../live/world-stream.js";
 import * as format from "../format.js";
 import { Alert, Icon } from "../icons.js";
 import { CurvePlot } from "../plots.js";
@@ -35,7 +36,7 @@ export function useJobs(link) {
   const [state, setState] = useState({ jobs: null, error: null, waiting: null });
   const refresh = useRef(() => {});
   useEffect(() => {
-    if (link !== "live") return undefined;
+    if (!answers(link)) return undefined;
     let [over, asking, again] = [false, false, false];
     const ask = async () => {
       try {
