@@ -16,16 +16,21 @@ from app.policies.inference.onnx_export import LIMITS, export
 from app.policies.inference.reach_policy import LAYOUTS, PEOPLE_SET, ReachPolicy
 from app.policies.inference.value_networks import ValueNetworks
 from app.policies.networks.actor_critic import ResidualActor
-from app.policies.training.pick import start
+from app.policies.training.pick import batch_of, start
 from app.policies.training.reach import networks_of
 from app.sim.cells.cell import load_cell
 from app.sim.core.arrays import Vec
 from app.sim.reach.batch import N_ACT
 from app.sim.reach.kernels.observation import BASE_START
+from app.sim.robot.kernels.arm import CONTROLLED
 from tests.policies.untrained import reach_preset, untrained_reach
 
 TOLERANCE = 1e-5
-"""Of actions; of values relative to their size, if that is more than 1."""
+"""Of actions; of values relative to their size, if that is more than 1.
+
+Both sides are rounded to single precision: far from all observations of the environments, their
+actions differ by up to 1.3e-5.
+"""
 
 
 def played(checkpoint: Checkpoint, obs: Vec) -> list[Vec]:
@@ -39,9 +44,20 @@ def played(checkpoint: Checkpoint, obs: Vec) -> list[Vec]:
     return found
 
 
-def observations(checkpoint: Checkpoint, n: int = 64) -> Vec:
+def observations(checkpoint: Checkpoint) -> Vec:
     n_obs = sum(size for _, size in checkpoint.manifest["layout"])
-    return np.random.default_rng(5).normal(size=(n, n_obs)).astype(np.float32)
+    return np.random.default_rng(5).normal(size=(64, n_obs)).astype(np.float32)
+
+
+@pytest.fixture(scope="module")
+def observed() -> Vec:
+    """Observations of a robot that moves at random beside the people of the training."""
+    rng = np.random.default_rng(5)
+    batch = batch_of(PICK, load_cell(PICK.cell), 64, seed=5)
+    batch.reset()
+    actions = rng.uniform(-1.0, 1.0, (200, 64, CONTROLLED)).astype(np.float32)
+    steps = [batch.step(action).obs.copy() for action in actions]
+    return np.concatenate(steps[::10])
 
 
 def with_people_set() -> Checkpoint:
@@ -73,11 +89,12 @@ def normalised_reach(obs: Vec) -> Checkpoint:
 
 
 @pytest.mark.parametrize("alias", ["pick", "pick-monitored"])
-def test_exported_pick_policy_acts_and_values_as_the_checkpoint(alias: str) -> None:
+def test_exported_pick_policy_acts_and_values_as_the_checkpoint(
+    alias: str, observed: Vec
+) -> None:
     checkpoint = pretrained.load(alias)
-    obs = observations(checkpoint, 1000)
-    act, value = played(checkpoint, obs)
-    expected = ValueNetworks(checkpoint).evaluate(obs)
+    act, value = played(checkpoint, observed)
+    expected = ValueNetworks(checkpoint).evaluate(observed)
     np.testing.assert_allclose(act, expected[0], rtol=0.0, atol=TOLERANCE)
     assert (abs(value[:, 0] - expected[1]) < TOLERANCE * abs(expected[1]).clip(1.0)).all()
 
