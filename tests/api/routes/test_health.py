@@ -91,7 +91,7 @@ def test_readiness_names_a_live_world_whose_loop_hangs_until_it_is_replaced(
 def test_readiness_names_a_live_world_whose_thread_has_ended(
     client: TestClient, other: LiveCell
 ) -> None:
-    assert "stalled" not in client.get("/readyz").json()
+    wait_until(lambda: "stalled" not in client.get("/readyz").json())
     other.stop()
     wait_until(lambda: list(client.get("/readyz").json().get("stalled", ())) == ["other"])
 
