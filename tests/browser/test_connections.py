@@ -107,7 +107,7 @@ def test_page_names_a_cell_that_has_stopped_and_starts_it_again(
     open_page: Callable[..., Page], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     hang = tmp_path / "hang"
-    monkeypatch.setenv("TANDEM_TEST_HANG", str(hang))
+    monkeypatch.setenv("HANG_FILE", str(hang))
     module = "tests.support.stalling_server"
     with serving(tmp_path, free_port(), module) as (address, _):
         page = open_page(scene=False, address=address)

@@ -1,6 +1,6 @@
 """A server whose first live world hangs in its tick for as long as a file exists.
 
-``python -m tests.support.stalling_server serve``; ``TANDEM_TEST_HANG`` names the file. Worlds
+``python -m tests.support.stalling_server serve``; ``HANG_FILE`` names the file. Worlds
 that are started later go on.
 """
 
@@ -13,7 +13,7 @@ from typing import Any
 from app.cli.entry import main
 from web.viewer.loop import LiveCell
 
-HANG = Path(os.environ["TANDEM_TEST_HANG"])
+HANG = Path(os.environ["HANG_FILE"])
 tick = LiveCell._tick
 cells: list[LiveCell] = []
 
