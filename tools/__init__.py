@@ -1,5 +1,6 @@
 """Offline generators, run by hand.
 
+arguments               Arguments of the generators and scripts
 augmentation            Variation of the elbow along the same palm path, an augmentation of
                         demonstrations
 check_vocabulary        Find words that the glossary replaces, and class names that occur twice

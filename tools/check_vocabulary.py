@@ -1,6 +1,6 @@
 """Find words that the glossary replaces, and class names that occur twice.
 
-    python tools/check_vocabulary.py [PATH ...]    print file:line: word; status 1 if any
+    python -m tools.check_vocabulary [PATH ...]    print file:line: word; status 1 if any
 
 Paths restrict the search to files below them; class names are compared in the whole repository.
 ``docs/glossary.md`` lists the terms to use. A test runs the same checks.
@@ -15,6 +15,8 @@ import tokenize
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
+
+from tools.arguments import parser_of
 
 ROOT = (
     Path.cwd() if Path.cwd().joinpath("pyproject.toml").exists() else Path(__file__).parents[1]
@@ -180,7 +182,10 @@ def duplicates() -> Iterator[str]:
 
 def main() -> int:
     """Print what is found below the given paths; return the exit status."""
-    prefixes = tuple(arg.removeprefix("./") for arg in sys.argv[1:]) or ("",)
+    parser = parser_of(__doc__)
+    parser.add_argument("paths", nargs="*", metavar="PATH", help="all files, if none is given")
+    given = parser.parse_args().paths
+    prefixes = tuple(path.removeprefix("./") for path in given) or ("",)
     found = list(banned(prefixes))
     twice = [line for line in duplicates() if any(one in line for one in prefixes)]
     sys.stdout.write("".join(f"{line}\n" for line in found + twice))

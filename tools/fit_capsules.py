@@ -9,7 +9,6 @@ The result is committed as ``app/sim/robot/data/ur10_capsules.json``;
 ``tests/sim/robot/test_capsules.py`` checks the containment again.
 """
 
-import argparse
 import json
 import logging
 import math
@@ -26,6 +25,7 @@ from app.sim.collision.fcl_reference import collision_mesh
 from app.sim.core.arrays import Vec
 from app.sim.robot.capsules import CAPSULE_FILE
 from app.sim.robot.ur10 import LINK_NAMES
+from tools.arguments import parser_of
 
 Fit = tuple[Vec, Vec, float]
 """End points [m] and radius [m] of a fitted capsule."""
@@ -189,8 +189,6 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    ).parse_args()
+    parser_of(__doc__).parse_args()
     logging.basicConfig(level=logging.INFO, format="%(message)s")
     main()

@@ -10,6 +10,7 @@ from pydantic import BaseModel
 
 from app.main import create_app
 from app.settings import Settings
+from tools.arguments import parser_of
 
 TARGET = Path(__file__).parents[1] / "app" / "client" / "operations"
 MAX_VARIANTS = 4
@@ -227,6 +228,7 @@ def render() -> dict[str, str]:
 
 
 if __name__ == "__main__":
+    parser_of(__doc__).parse_args()
     TARGET.mkdir(exist_ok=True)
     for stale in TARGET.glob("*.py"):
         stale.unlink()

@@ -6,10 +6,9 @@ the bind pose of :mod:`web.viewer.people.skeleton`, rigid ones in the frame of t
 Requires the development extras (scipy, scikit-image).
 """
 
-import argparse
-
 import numpy as np
 
+from tools.arguments import parser_of
 from tools.distance_fields import Cone, Grid, mirrored, smooth_min
 from web.viewer.people import skeleton
 from web.viewer.people.mannequin import Surface, save
@@ -197,7 +196,5 @@ def model() -> dict[str, Surface]:
 
 
 if __name__ == "__main__":
-    argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    ).parse_args()
+    parser_of(__doc__).parse_args()
     save(model())

@@ -9,7 +9,6 @@ are written to ``worst_people.json``, which is committed.
 Takes about five minutes on one core.
 """
 
-import argparse
 import json
 import logging
 from collections.abc import Sequence
@@ -30,6 +29,7 @@ from app.policies.evaluation.pick.worst_people import FILE, HandMotion, beside
 from app.policies.inference.task_selection import HYSTERESIS
 from app.policies.inference.value_networks import ValueNetworks, pick_preset_of
 from app.sim.core.arrays import Vec
+from tools.arguments import parser_of
 
 logger = logging.getLogger(__name__)
 
@@ -127,7 +127,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    ).parse_args()
+    parser_of(__doc__).parse_args()
     main()

@@ -10,7 +10,6 @@ is committed. A test trains briefly and checks the errors of the shipped network
 pedestrians.
 """
 
-import argparse
 import logging
 import math
 from pathlib import Path
@@ -53,6 +52,7 @@ from app.sim.prediction.kernels.networks import (
 )
 from app.sim.prediction.weights import FILE, KINDS
 from app.sim.scene.scene import pedestrian_settings
+from tools.arguments import parser_of
 
 logger = logging.getLogger(__name__)
 
@@ -272,7 +272,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    ).parse_args()
+    parser_of(__doc__).parse_args()
     main()

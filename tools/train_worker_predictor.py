@@ -9,7 +9,6 @@ Takes about two minutes on one core and writes ``app/sim/prediction/data/worker.
 committed.
 """
 
-import argparse
 import logging
 from dataclasses import replace
 from pathlib import Path
@@ -29,6 +28,7 @@ from app.sim.people.human_motion_config import HumanMotionConfig
 from app.sim.pick.batch import PickBatch, PickSettings
 from app.sim.prediction.kernels.worker import N_JOINTS, TIMES, WorkerPredictor, predict_worker
 from app.sim.prediction.weights import WORKER_FILE, worker_predictor
+from tools.arguments import parser_of
 from tools.train_motion_predictor import network_of
 
 logger = logging.getLogger(__name__)
@@ -175,7 +175,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    ).parse_args()
+    parser_of(__doc__).parse_args()
     main()

@@ -20,6 +20,7 @@ from app.sim.human.kernels.kinematics import N_CAPSULES
 from app.sim.human.model import rest_posture
 from app.sim.robot.kernels.arm import new_robot_pose, place_robot
 from app.sim.scene.scene import arm_of, people_geometry_of, people_of
+from tools.arguments import parser_of
 from tools.docs.world.plots import BLUE, GREEN, GREY, LIGHT, ORANGE, RED, panels, save
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -103,4 +104,5 @@ def _worker(cell: Cell) -> tuple[Vec, Vec]:
 
 
 if __name__ == "__main__":
+    parser_of(__doc__).parse_args()
     save(frame, IMAGE, load_cell("pick-and-place"))

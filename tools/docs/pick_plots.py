@@ -15,6 +15,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from app.sim.pick.cases import find_case
+from tools.arguments import parser_of
 from tools.docs.world.plots import BLUE, GREEN, GREY, ORANGE, RED, panels, save
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -94,4 +95,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
+    parser_of(__doc__).parse_args()
     main()

@@ -19,6 +19,7 @@ from matplotlib.ticker import FuncFormatter, NullFormatter, PercentFormatter
 from numpy.typing import NDArray
 
 from app.policies.configs import presets
+from tools.arguments import parser_of
 from tools.docs.world.plots import BLUE, GREEN, GREY, ORANGE, RED, panels, save
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -170,4 +171,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
+    parser_of(__doc__).parse_args()
     main()

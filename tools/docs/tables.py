@@ -16,6 +16,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from tools.arguments import parser_of
 from tools.docs import headline, pick_seeds, pick_tables
 from tools.docs.reach import tables as reach_tables
 from tools.docs.sorting.tables import is_sorting, lines_of
@@ -170,4 +171,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
+    parser_of(__doc__).parse_args()
     main()

@@ -22,6 +22,7 @@ from matplotlib.patches import Circle, Rectangle
 
 from app.sim.people.kernels.pedestrian import WALKING
 from app.sim.people.pedestrian import PedestrianSettings
+from tools.arguments import parser_of
 from tools.docs.reach.other_plots import curves, others, smoothness
 from tools.docs.reach.style import INK, MODES, PURPLE, Json, draw_rates, percent
 from tools.docs.reach.tables import policy_of, siblings
@@ -269,4 +270,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
+    parser_of(__doc__).parse_args()
     main()

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from tools.arguments import parser_of
 from tools.docs.world.plots import BLUE, GREEN, GREY, ORANGE, RED, panels, save
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -98,4 +99,5 @@ def main() -> int:
 
 
 if __name__ == "__main__":
+    parser_of(__doc__).parse_args()
     sys.exit(main())

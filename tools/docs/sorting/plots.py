@@ -20,6 +20,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, NullFormatter, PercentFormatter
 from numpy.typing import NDArray
 
+from tools.arguments import parser_of
 from tools.docs.world.plots import BLUE, GREEN, GREY, MISSES, ORANGE, RED, panels, save
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -193,4 +194,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
+    parser_of(__doc__).parse_args()
     main()

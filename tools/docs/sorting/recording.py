@@ -27,6 +27,7 @@ from app.sim.sorting.batch import SortingBatch, SortingSettings, fail_of
 from app.sim.sorting.benchmark_tasks import TESTS
 from app.sim.sorting.layout import block_height, half_size
 from app.sim.sorting.state import NULL, SortingShape, SortingState
+from tools.arguments import parser_of
 from tools.docs.world.plots import LIGHT, STYLE
 
 IMAGE = Path(__file__).resolve().parents[3] / "docs/img/sorting/test-4.gif"
@@ -134,4 +135,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
+    parser_of(__doc__).parse_args()
     main()

@@ -92,7 +92,7 @@ async function watch(signal, history, unconfirmed, setState, setEpoch) {
   let isBack = false; // seen again: the scene has its own connection
   while (!signal.aborted) {
     await seen(signal);
-    const { first, stalled } = await ready(signal, merge);
+    let { first, stalled } = await ready(signal, merge);
     isBack &&= first;
     try {
       const [world, cells] = await Promise.all([get(`v1/worlds/${WORLD}`), get("v1/cells")]);
@@ -119,6 +119,7 @@ async function watch(signal, history, unconfirmed, setState, setEpoch) {
           onEvent: (name, snapshot) => {
             if (name === "end") lost((replaced = true));
             if (!snapshot?.candidates || (stalled && snapshot.tick === world.tick)) return;
+            stalled = false;
             silence.end();
             history.add(snapshot);
             unconfirmed.see(snapshot);
