@@ -29,7 +29,7 @@ TOLERANCE = 1e-5
 """Of actions; of values relative to their size, if that is more than 1.
 
 Both sides are rounded to single precision: far from all observations of the environments, their
-actions differ by up to 1.3e-5.
+actions differ by up to 1.2e-5 in 20,000 random ones.
 """
 
 
@@ -93,10 +93,11 @@ def test_exported_pick_policy_acts_and_values_as_the_checkpoint(
     alias: str, observed: Vec
 ) -> None:
     checkpoint = pretrained.load(alias)
-    act, value = played(checkpoint, observed)
-    expected = ValueNetworks(checkpoint).evaluate(observed)
-    np.testing.assert_allclose(act, expected[0], rtol=0.0, atol=TOLERANCE)
-    assert (abs(value[:, 0] - expected[1]) < TOLERANCE * abs(expected[1]).clip(1.0)).all()
+    for obs in (observed, observations(checkpoint)):
+        act, value = played(checkpoint, obs)
+        expected = ValueNetworks(checkpoint).evaluate(obs)
+        np.testing.assert_allclose(act, expected[0], rtol=0.0, atol=TOLERANCE)
+        assert (abs(value[:, 0] - expected[1]) < TOLERANCE * abs(expected[1]).clip(1.0)).all()
 
 
 @pytest.mark.parametrize("preset", [PICK, THESIS], ids=["quantiles", "raw-state"])

@@ -27,12 +27,14 @@ export function answers(link) {
  *            epoch: number, heardAt: number, pending: number, errors: Error[],
  *            send: (command: object) => Promise<void>, show: (cell: string) => Promise<void>}}
  *   `epoch` counts how often the server was found ready; `heardAt` is the time of the last
- *   snapshot, as performance.now() gives it; a world is stalled that no longer moves though the
- *   server answers; `pending` counts commands that no snapshot shows
- *   yet; `errors` are those of the newest commands.
+ *   snapshot, as performance.now() gives it, or of the page's start; a world is stalled that no
+ *   longer moves though the server answers; `pending` counts commands that no snapshot shows yet;
+ *   `errors` are those of the newest commands.
  */
 export function useCell() {
-  const [state, setState] = useState({ link: "connecting", reason: "", world: null, cell: null, cells: [] });
+  const [state, setState] = useState(() => ({
+    link: "connecting", reason: "", world: null, cell: null, cells: [], heardAt: performance.now(),
+  }));
   const [epoch, setEpoch] = useState(0);
   const [errors, setErrors] = useState([]);
   const [pending, setPending] = useState(0);
@@ -101,10 +103,8 @@ async function watch(signal, history, unconfirmed, setState, setEpoch) {
       let replaced = false;
       let link = "lost";
       history.add(world);
-      const heardAt = performance.now();
-      if (stalled) setState((now) => ({ ...now, heardAt: now.heardAt ?? heardAt }));
-      else merge({ heardAt });
       merge({ world, cell, cells: list, link: stalled ? "stalled" : "live", reason: "" });
+      if (!stalled) merge({ heardAt: performance.now() });
       if (!isBack) setEpoch((n) => (stalled ? Math.max(n, 1) : n + 1));
       isBack = false;
       await until(signal, (lost) => {
