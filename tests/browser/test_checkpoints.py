@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Page, expect
+from playwright.sync_api import Page, Route, expect
 
 from app.policies.checkpoints import pretrained
 from tests.support import patient_http
@@ -87,6 +87,35 @@ def test_active_policy_that_is_no_longer_stored_says_so(open_page: Callable[...,
     page.locator("[data-role=acting]").focus()
     chosen = page.locator(f'[data-role=acting] option[value="{acting}"]')
     expect(chosen).to_contain_text("no longer stored")
+
+
+def test_newest_list_of_checkpoints_is_not_replaced_by_an_older_answer(
+    open_page: Callable[..., Page], server: str
+) -> None:
+    page = open_page(scene=False)
+    acting = page.locator("[data-role=acting]")
+    expect(acting.locator("optgroup[label=Shipped] option")).not_to_have_count(0)
+    pick = patient_http.get(f"{server}/v1/checkpoints/pick").json()
+    newer = {"items": [{**pick, "aliases": ["newer"]}], "next_cursor": None}
+    older: list[Route] = []
+
+    def answer(route: Route) -> None:
+        if older:
+            route.fulfill(json=newer)
+        else:
+            older.append(route)
+
+    newest = "**/v1/checkpoints?limit=100"
+    page.route(newest, answer)
+    with page.expect_request(newest):
+        acting.focus()
+    acting.blur()
+    acting.focus()
+    page.wait_for_timeout(500)
+    with page.expect_response(newest):
+        older[0].continue_()
+    page.wait_for_timeout(500)
+    expect(acting.locator("option:checked")).to_contain_text("newer")
 
 
 def test_uploaded_files_make_the_same_checkpoint(open_page: Callable[..., Page]) -> None:

@@ -86,6 +86,26 @@ export const postFile = (path, file) => send(path, {
 });
 
 /**
+ * A question that can be asked again at any time, answered one at a time: asked again before its
+ * answer has come, it is sent once more after it. No answer is overtaken by an older one.
+ *
+ * @param {() => Promise<void>} ask sends the question, handles its answer and never fails
+ */
+export function inTurn(ask) {
+  let [asking, again] = [false, false];
+  const run = async () => {
+    again = true;
+    if (asking) return;
+    for (asking = true; again;) {
+      again = false;
+      await ask();
+    }
+    asking = false;
+  };
+  return { run, isAsking: () => asking };
+}
+
+/**
  * Follow a server-sent event stream, for good: after a loss it connects again and resumes
  * after the last event it saw (Last-Event-ID). EventSource cannot do that once a server has
  * answered an error, so the stream is read through fetch.

@@ -1,6 +1,6 @@
 // The people in the cell: who is there, who moves each, what is played, how large each is.
-import { html, useCallback, useEffect, useState } from "../vendor/htm-preact-standalone.module.js";
-import { get } from "../api.js";
+import { html, useEffect, useState } from "../vendor/htm-preact-standalone.module.js";
+import { get, inTurn } from "../api.js";
 import { Segmented } from "../choice.js";
 import * as format from "../format.js";
 import { Icon } from "../icons.js";
@@ -184,13 +184,11 @@ function Note({ children, role }) {
 /** The stored recordings; null until they are known. */
 function useMotions() {
   const [found, setFound] = useState({ list: null, error: null });
-  const refresh = useCallback(() => {
-    get("v1/recordings").then(
-      (answer) => setFound({ list: answer.items, error: null }),
-      (problem) => setFound({ list: null, error: problem.message }));
-  }, []);
-  useEffect(refresh, [refresh]);
-  return { ...found, refresh };
+  const [ask] = useState(() => inTurn(() => get("v1/recordings").then(
+    (answer) => setFound({ list: answer.items, error: null }),
+    (problem) => setFound({ list: null, error: problem.message }))));
+  useEffect(() => void ask.run(), [ask]);
+  return { ...found, refresh: ask.run };
 }
 
 /** Calls `act(name, value)` at most every SEND_MS, and with each name's last value in the end. */

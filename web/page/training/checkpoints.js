@@ -1,6 +1,6 @@
 // Active policy of the cell, and task planner of a sorting cell.
 import { html, useCallback, useEffect, useState } from "../vendor/htm-preact-standalone.module.js";
-import { get } from "../api.js";
+import { get, inTurn } from "../api.js";
 import * as format from "../format.js";
 import { answers } from "../live/world-stream.js";
 import { presetTitle } from "./fieldnames.js";
@@ -31,12 +31,12 @@ export function useCheckpoints(link, stamp) {
   const presets = useItems(link, "v1/presets");
   const [list, setList] = useState([]);
   const [unstored, setUnstored] = useState([]);
-  const refresh = useCallback(() => {
-    if (!answers(link)) return;
-    storedCheckpoints().then(setList, () => {});
-    get("v1/worlds").then(({ items }) => setUnstored(items.flatMap((one) => one.unstored)), () => {});
-  }, [link]);
-  useEffect(refresh, [refresh, stamp]);
+  const [ask] = useState(() => inTurn(() => Promise.allSettled([
+    storedCheckpoints().then(setList),
+    get("v1/worlds").then(({ items }) => setUnstored(items.flatMap((one) => one.unstored))),
+  ])));
+  const refresh = useCallback(() => answers(link) && ask.run(), [link]);
+  useEffect(() => void refresh(), [refresh, stamp]);
   return { list, unstored, presets, refresh };
 }
 

@@ -1,5 +1,5 @@
 // The live cell follows a training: its newest checkpoint acts as soon as it is stored.
-import { html, useEffect, useState } from "../vendor/htm-preact-standalone.module.js";
+import { html, useEffect, useRef, useState } from "../vendor/htm-preact-standalone.module.js";
 import { Fault, useAction } from "../action.js";
 import { get, put, remove } from "../api.js";
 import * as format from "../format.js";
@@ -11,17 +11,24 @@ const LOOK_MS = 1000;
 
 export function Follow({ job }) {
   const [follow, setFollow] = useState(null);
-  const action = useAction((answer) => setFollow(answer));
+  const changes = useRef(0);
+  const action = useAction((answer) => {
+    changes.current += 1;
+    setFollow(answer);
+  });
   useEffect(() => {
     let over = false;
     let timer = null;
-    const look = () => get("v1/worlds").then(({ items }) => {
-      if (over) return;
-      const now = items.find(({ id }) => id === WORLD)?.follow ?? null;
-      setFollow(now);
-      const isBehind = now?.job === job.id && now.active && !isActive(job);
-      if (isBehind) timer = setTimeout(look, LOOK_MS);
-    }, () => {});
+    const look = () => {
+      const before = changes.current; // an answer older than the last click is left out
+      get("v1/worlds").then(({ items }) => {
+        if (over || before !== changes.current) return;
+        const now = items.find(({ id }) => id === WORLD)?.follow ?? null;
+        setFollow(now);
+        const isBehind = now?.job === job.id && now.active && !isActive(job);
+        if (isBehind) timer = setTimeout(look, LOOK_MS);
+      }, () => {});
+    };
     look();
     return () => {
       over = true;

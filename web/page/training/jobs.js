@@ -1,6 +1,6 @@
 // Jobs: the list, and for the open one its learning curves, numbers and what can be done.
 import { html, useCallback, useEffect, useRef, useState } from "../vendor/htm-preact-standalone.module.js";
-import { follow, get } from "../api.js";
+import { follow, get, inTurn } from "../api.js";
 import { answers } from "../live/world-stream.js";
 import * as format from "../format.js";
 import { Alert, Icon } from "../icons.js";
@@ -37,8 +37,9 @@ export function useJobs(link) {
   const refresh = useRef(() => {});
   useEffect(() => {
     if (!answers(link)) return undefined;
-    let [over, asking, again] = [false, false, false];
-    const ask = async () => {
+    let over = false;
+    const ask = inTurn(async () => {
+      if (over) return;
       try {
         const [own, all] = await Promise.all([get(`v1/jobs?part_of=none&limit=${PAGE}`), get("v1/jobs")]);
         const items = [...own.items, ...all.items.filter((one) => one.part_of)];
@@ -46,19 +47,10 @@ export function useJobs(link) {
       } catch (error) {
         if (!over) setState((now) => ({ ...now, error }));
       }
-    };
-    // One question at a time: a slow server is not asked again, and no answer is overtaken.
-    refresh.current = async () => {
-      again = true;
-      if (asking) return;
-      for (asking = true; again && !over;) {
-        again = false;
-        await ask();
-      }
-      asking = false;
-    };
-    refresh.current();
-    const timer = setInterval(() => document.hidden || asking || refresh.current(), POLL_MS);
+    });
+    refresh.current = ask.run;
+    ask.run();
+    const timer = setInterval(() => document.hidden || ask.isAsking() || ask.run(), POLL_MS);
     return () => {
       over = true;
       clearInterval(timer);
