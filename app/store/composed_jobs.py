@@ -44,7 +44,9 @@ def start(store: Store, job_id: str) -> None:
 
 
 def record(store: Store, job_id: str, done: int, values: Mapping[str, float | None]) -> None:
-    """Add a point to the curve of a job, where more of its parts have ended than before.
+    """Add a point to the curve of a job, where the number of its ended parts has changed.
+
+    It falls when parts are repeated: later points are deleted, as when a training is resumed.
 
     Args:
         done: Number of ended trials or evaluations.
@@ -52,8 +54,10 @@ def record(store: Store, job_id: str, done: int, values: Mapping[str, float | No
     """
     with store.writing() as connection:
         job = read_job(connection, job_id, for_update=True)
-        if done <= job.step or job.is_final:
+        if done == job.step or job.is_final:
             return
+        repeated = sa.and_(metrics.c.job_id == job_id, metrics.c.step >= done)
+        connection.execute(sa.delete(metrics).where(repeated))
         event = job.last_event + 1
         statement = sa.update(jobs).where(jobs.c.id == job_id)
         connection.execute(statement.values(step=done, last_event=event))

@@ -7,7 +7,7 @@ import sqlalchemy as sa
 
 from app.errors import InvalidInput, WrongState
 from app.policies.report.page import RESULTS, evaluations, page
-from app.store import attempts, completion, job_actions, jobs
+from app.store import attempts, completion, job_actions, jobs, metrics
 from app.store.database import tables
 from app.store.engine import Store
 from app.store.records import JobRecord
@@ -94,7 +94,8 @@ def test_report_with_failed_evaluations_repeats_these_when_resumed(store: Store)
     with pytest.raises(WrongState, match="retry job 1: resume it"):
         job_actions.require_repeatable(report, "retry")
     job_actions.resume_job(store, report.id)
-    assert look(store, report).state == "running"
+    report = look(store, report)
+    assert (report.state, report.step) == ("running", len(evaluations()) - 1)
     again = parts_of(store, report)[-1]
     assert (again.state, again.spec) == ("queued", failed.spec)
     run_one(store)
@@ -102,6 +103,8 @@ def test_report_with_failed_evaluations_repeats_these_when_resumed(store: Store)
     assert (report.state, report.ended_by) == ("succeeded", None)
     assert report.result is not None
     assert (report.result["failed"], report.result["measured"]) == ([], len(evaluations()))
+    points = [point.step for point in metrics.list_metrics(store, report.id)]
+    assert points == sorted(set(points)) and points[-1] == report.step == len(evaluations())
     with pytest.raises(WrongState, match="resume job 1: clone it"):
         job_actions.resume_job(store, report.id)
 

@@ -1,6 +1,6 @@
 // Forms: what is typed, one submission at a time, and the faults that the service finds in it.
-import { html, useEffect, useRef, useState } from "../vendor/htm-preact-standalone.module.js";
-import { get, Unreachable } from "../api.js";
+import { html, useEffect, useMemo, useRef, useState } from "../vendor/htm-preact-standalone.module.js";
+import { get, inTurn, Unreachable } from "../api.js";
 import { capital, grouped, sentence } from "../format.js";
 import { Alert, Close } from "../icons.js";
 import { answers } from "../live/world-stream.js";
@@ -72,13 +72,15 @@ export function useItems(link, path) {
 /** The answer of a route, asked for again whenever one of `causes` has changed. */
 export function useAnswer(path, ...causes) {
   const [state, setState] = useState({ answer: null, error: null });
-  useEffect(() => {
+  const { ask, stop } = useMemo(() => {
     const stop = new AbortController();
-    get(path, { signal: stop.signal }).then(
-      (answer) => setState({ answer, error: null }),
-      (error) => error.name !== "AbortError" && setState((now) => ({ ...now, error })));
-    return () => stop.abort();
-  }, [path, ...causes]);
+    const ask = inTurn(() => get(path, { signal: stop.signal }).then(
+      (answer) => stop.signal.aborted || setState({ answer, error: null }),
+      (error) => stop.signal.aborted || setState((now) => ({ ...now, error }))));
+    return { ask, stop };
+  }, [path]);
+  useEffect(() => () => stop.abort(), [stop]);
+  useEffect(() => void ask.run(), [ask, ...causes]);
   return state;
 }
 
