@@ -97,6 +97,9 @@ tables: $(VENV)/dev.stamp ## write the tables, figures and report of the documen
 	@$(PY) -m tools.docs.tables
 	@$(PY) -m tools.docs.world.page --page
 	@$(PY) -m tools.docs.pick_plots
+	@$(PY) -m tools.docs.reach.plots
+	@$(PY) -m tools.docs.reach.ssm_plots
+	@$(PY) -m tools.docs.sorting.plots
 	@$(PY) -m tools.docs.recipe_plots
 	@$(PY) -m app report
 

@@ -105,22 +105,22 @@ def draw(one: Visit) -> Figure:
     top.plot(one.time, one.separation, color=BLUE)
     top.axhline(one.protective, color=RED, lw=1.1, ls="--")
     top.annotate(
-        "kept while the robot moves",
+        f"protective distance {one.protective:g} m",
         (one.time[-1], one.protective),
         xytext=(-4, 4),
         textcoords="offset points",
         ha="right",
         color=RED,
     )
-    top.set(title="Robot to person", ylabel="distance [m]", ylim=(0.0, 2.6))
+    top.set(title="Separation distance", ylabel="distance [m]", ylim=(0.0, 2.6))
     middle.step(one.time, one.override, where="pre", color=BLUE)
     middle.fill_between(one.time, one.override, step="pre", color=BLUE, alpha=0.12)
     middle.set(title="Override", ylabel="override [%]", ylim=(0.0, 105.0))
     low.plot(one.time, one.speed, color=BLUE)
-    low.set(title="Tool", ylabel="tcp speed [m/s]", xlabel="time [s]", ylim=(0.0, None))
+    low.set(title="Speed of the TCP", ylabel="speed [m/s]", xlabel="time [s]", ylim=(0.0, None))
     low.set_xlim(0.0, one.time[-1])
     for axis in (top, middle, low):
-        for begin, text in ((COMES, "sets out"), (STAYS, "at the table"), (LEAVES, "leaves")):
+        for begin, text in ((COMES, "approaches"), (STAYS, "at the table"), (LEAVES, "leaves")):
             axis.axvline(begin, color=GREY, lw=0.8, ls=":")
             if axis is top:
                 axis.annotate(

@@ -80,7 +80,7 @@ def mesh_gap(found: Sequence[Gap]) -> Figure:
     top = max(meshes.max(), capsules.max())
     left.plot([0, top], [0, top], color=GREY, lw=0.9, label="equal")
     left.set(
-        title="Never above the diagonal",
+        title="Distance of capsules and of meshes",
         xlabel="distance of raw meshes to the person [mm]",
         ylabel="distance of capsules to the person [mm]",
         xlim=(0, top),
