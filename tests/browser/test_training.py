@@ -1,5 +1,6 @@
 """A visitor starts a training job on the page and watches it learn."""
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -183,6 +184,7 @@ def test_ended_job_is_retried_cloned_and_named(
     retry = row.locator('[data-action="retry"]')
     again = posted(page, f"{ended['id']}/retry", lambda: retry.click())
     assert (again["spec"], again["priority"]) == (ended["spec"], 5)
+    expect(page.locator(f'[data-job="{again["id"]}"]')).to_have_class(re.compile("is-open"))
     row.locator(".job-head").click()
     retry.click()
     expect(row.locator(".job-actions .field-error")).to_contain_text("wait for it")
