@@ -305,6 +305,40 @@ def test_people_are_identified_by_their_index_among_many(client: TestClient) -> 
     assert all(answer["people"][i]["separation"] is None for i in dropped)
 
 
+@pytest.mark.parametrize("turns", [-3, -1, 1, 2, 1000])
+def test_a_person_turned_by_whole_turns_is_the_same(
+    client: TestClient, state: dict[str, Any], turns: int
+) -> None:
+    for yaw in (-3.2, -1.7, 0.3, 1.5):
+        q = [*WHOLE["q"][:2], yaw, *WHOLE["q"][3:]]
+        turned = [*q[:2], yaw + 2.0 * np.pi * turns, *q[3:]]
+        first, second = (asked(client, state, {**WHOLE, "q": one}) for one in (q, turned))
+        np.testing.assert_allclose(values(first), values(second), atol=1e-5)
+        assert first["chosen"] == second["chosen"]
+
+
+APPROACHING = {"x": 1.2, "y": 1.2, "vx": -2.5, "vy": -2.5, "r": 0.3}
+BEHIND = [{"x": -1.0 - 0.01 * k, "y": -0.6, "vx": 0, "vy": 0, "r": 0.3} for k in range(4)]
+
+
+def test_safety_layer_monitors_people_whom_the_policy_does_not_observe(
+    client: TestClient,
+) -> None:
+    question = {
+        "cell": "shared-workspace",
+        "robot": {"q": [0, -2.5, 2.0, 0, 0, 0], "qd": [0.9, 0, 0, 0, 0, 0]},
+        "goal": [0.05, 0.75, 0.31],
+        "rollout": False,
+        "safety": {"use_measured_velocity": True},
+    }
+    people = [*BEHIND, APPROACHING]
+    answer = client.post("/v1/motion", json={**question, "people": people}).json()
+    alone = client.post("/v1/motion", json={**question, "people": [APPROACHING]}).json()
+    assert "dropped" in answer["people"][4]["flags"]
+    assert answer["safety"]["override"] == alone["safety"]["override"] < 1.0
+    assert answer["safety"]["set_by"] == 4
+
+
 def test_wrong_people_among_many_are_refused_by_their_places(
     client: TestClient, state: dict[str, Any]
 ) -> None:

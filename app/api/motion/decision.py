@@ -60,10 +60,12 @@ def decide(
     present = {i: one.person for i, one in enumerate(people) if one.person is not None}
     last = {i: one.observed for i, one in enumerate(people) if one.observed is not None}
     q = request.robot.joints(request.robot.q)
-    seen, monitored = (nearest_places(some, cell, q) for some in (present, last))
+    # The policy observes the nearest, the safety layer everybody: a person farther away may be
+    # the one who comes too near.
+    seen, monitored = nearest_places(present, cell, q), list(last)
     query = request.to_domain(
         [present[i] for i in seen],
-        None if as_seen else [last[i] for i in monitored],
+        None if as_seen and seen == monitored else [last[i] for i in monitored],
         safety_settings(cell),
         max((one.age_s for one in people), default=0.0),
         max((one.displaced_m for one in people), default=0.0),
@@ -79,7 +81,7 @@ def decide(
         )
     weights = dict(zip(seen, decision.person_weights, strict=True))
     uses = [
-        one.use(i == decision.nearest_person, i in last and i not in monitored)
+        one.use(i == decision.nearest_person, i in present and i not in seen)
         | (weights[i]._asdict() if i in weights else NO_WEIGHT)
         for i, one in enumerate(people)
     ]

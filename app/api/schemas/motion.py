@@ -50,7 +50,8 @@ class MotionRequest(Body):
     people: list[PersonInput] = Field(
         max_length=MAX_SKELETONS,
         description="people in the cell, each as joint angles, key-points, a cylinder or a "
-        "track; of more than four the nearest four are used, the others are flagged `dropped`",
+        "track; of more than four the policy uses the nearest four, the others are flagged "
+        "`dropped`; the safety layer monitors all",
     )
     goal: Vector3 = Field(description="goal of the tool, in `frame` [m]")
     inference_mode: MotionMode | None = Field(

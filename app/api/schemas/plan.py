@@ -31,6 +31,7 @@ from app.policies.inference.sorting_plan import (
 from app.sim.core.arrays import Vec
 from app.sim.human.person import Person
 from app.sim.perception.multi_person_tracker import MAX_SKELETONS
+from app.sim.pick.kernels.grasp import LIFT
 from app.sim.pick.task_policy import Objective, PickProgress
 from app.sim.sorting.names import SortingNames
 from app.sim.sorting.near_optimal_moves import MARGIN, MAX_MARGIN
@@ -229,7 +230,7 @@ class PlanAnswer(Answer):
             if segment is None
             else SegmentPublic(**SegmentPublic.commanded(segment, query.q, query.qd, plan.dt)),
             dt=plan.dt,
-            because=reason(plan, query.objective),
+            because=reason(plan, query.objective, lifts=query.progress.phase == LIFT),
             moves=[
                 PlannedMove(
                     **dict(move(one)),

@@ -32,9 +32,11 @@ from app.sim.core.jit import direct
 from app.sim.human import model as human
 from app.sim.human.person import Person
 from app.sim.perception.observed_people import (
+    bodies_first,
     checked_and_known,
-    checked_people,
+    checked_person,
     checked_vector,
+    people_shapes,
     person_from_cylinder,
 )
 from app.sim.reach.batch import goal_region_of
@@ -56,7 +58,7 @@ from app.sim.robot.measured_state import MeasuredState, StateLimits, returning
 from app.sim.robot.trajectory_segment import TrajectorySegment
 from app.sim.safety.decision import SafetyDecision, SeparationTerms
 from app.sim.safety.layer import SafetyLayer, SafetySettings
-from app.sim.scene.scene import FAR_AWAY, arm_of
+from app.sim.scene.scene import FAR_AWAY, arm_of, people_of
 
 _FAR = np.full(3, 10.0)
 _WHOLE = np.ones(1)
@@ -79,6 +81,7 @@ class MotionDecider:
     def __init__(self, actor: ReachActor, cell: Cell) -> None:
         require_cell(cell, actor.cell, actor.cell_sha256)
         self.actor, self.cell, self.arm = actor, cell, arm_of(cell)
+        self._shared = people_of(cell)
         self._between = Interpolation(actor) if interpolates(actor) else None
         self._can_roll_out = can_roll_out(actor)
         self._rule = actor.action.rule()
@@ -86,7 +89,6 @@ class MotionDecider:
         self._limits = StateLimits(self.arm, limits_jerk=actor.action.degree == 3)
         self._trained = TrainedValues(actor.trained_range)
         self._states: dict[tuple[int, int], QueryState] = {}
-        self._last_observed: dict[tuple[int, int], QueryState] = {}
         self._improvements: dict[QueryState, RolloutImprovement] = {}
         self._layer = SafetyLayer(self.arm, SafetySettings())
         self._busy = threading.Lock()
@@ -111,10 +113,10 @@ class MotionDecider:
         people, known_people = checked_and_known(query.people)
         mode = self._mode(query.inference_mode)
         rollout = self._rollout(query.rollout)
-        order = _bodies_first(people)
+        order = bodies_first(people)
         known, viewed = [people[i] for i in order], [known_people[i] for i in order]
         with self._busy:
-            query_state = self._state_of(known, self._states)
+            query_state = self._state_of(known)
             time_left = min(max(0.0, query.time_left_s), HORIZON_S)
             query_state.load(robot.measured, known, time_left)
             separations, clearance = query_state.distances.tolist(), query_state.clear.tolist()
@@ -130,7 +132,7 @@ class MotionDecider:
             act, targets, weights, observed = self._act(query_state, query, goal, mode)
             candidate = self._improve(query_state, query, goal, act) if rollout else None
             segment, unfeasible = self._segment(robot, act)
-            last = self._observed(query.observed, robot) or (shapes, order)
+            last = self._observed(query.observed) or (shapes, order)
             safe, terms_of, terms = self._monitored(query, robot, segment, *last)
             state = np.concatenate((robot.clamped.q, robot.clamped.qd, goal))
             outside = self._trained.outside(state, as_given(observed, known, viewed), order)
@@ -233,27 +235,20 @@ class MotionDecider:
         act[:] = improved[0]
         return CANDIDATES[chosen]
 
-    def _observed(
-        self, observed: Sequence[Person] | None, robot: MeasuredState
-    ) -> tuple[Shapes, list[int]] | None:
+    def _observed(self, observed: Sequence[Person] | None) -> tuple[Shapes, list[int]] | None:
         """Return people as last observed, bodies first, and their indices; None: not given."""
         if observed is None:
             return None
-        people = checked_people(observed)
-        places = _bodies_first(people)
-        last = [people[i] for i in places]
-        query_state = self._state_of(last, self._last_observed)
-        query_state.load(robot.measured, last, 0.0)
-        return query_state.shapes, places
+        people = [checked_person(one, f"people[{i}]") for i, one in enumerate(observed)]
+        places = bodies_first(people)
+        return people_shapes(self._shared, [people[i] for i in places]), places
 
-    def _state_of(
-        self, people: Sequence[Person], states: dict[tuple[int, int], QueryState]
-    ) -> QueryState:
+    def _state_of(self, people: Sequence[Person]) -> QueryState:
         n_bodies = sum(person.cylinder is None for person in people)
         kinds = (n_bodies, len(people) - n_bodies)
-        if kinds not in states:
-            states[kinds] = QueryState(self.cell, *kinds, self.actor.view)
-        return states[kinds]
+        if kinds not in self._states:
+            self._states[kinds] = QueryState(self.cell, *kinds, self.actor.view)
+        return self._states[kinds]
 
     def _act(
         self, query_state: QueryState, query: MotionQuery, goal: Vec, mode: MotionMode
@@ -333,11 +328,6 @@ class MotionDecider:
         if decisive is None:
             return safe, None, None
         return safe, order[decisive[0]], decisive[1]
-
-
-def _bodies_first(people: Sequence[Person]) -> list[int]:
-    """Return the indices of people with joint angles, then of cylinders."""
-    return sorted(range(len(people)), key=lambda i: people[i].cylinder is not None)
 
 
 def _require_no_overlap(separations: Sequence[float], order: Sequence[int]) -> None:

@@ -15,7 +15,12 @@ from app.sim.people.kernels.people import (
     person_clearance,
     place_workers,
 )
-from app.sim.perception.observed_people import as_known, is_far, nearest_index
+from app.sim.perception.observed_people import (
+    as_known,
+    is_far,
+    nearest_index,
+    with_known_yaw,
+)
 from app.sim.pick.task_policy import MovedPerson
 from app.sim.robot.kernels.arm import Arm, new_robot_pose, place_robot
 from app.sim.scene.scene import people_geometry_of
@@ -23,7 +28,7 @@ from app.sim.scene.scene import people_geometry_of
 
 def scenes_of(
     arm: Arm, shared: People, q: Vec, people: tuple[Person, ...], moved: MovedPerson
-) -> tuple[Vec, Vec, Vec]:
+) -> tuple[tuple[Vec, Vec, Vec], Vec | None]:
     """Return the observed people beside each posture, the nearest to the robot first.
 
     Args:
@@ -34,7 +39,9 @@ def scenes_of(
 
     Returns:
         Joint positions [m, rad] and speeds [m/s, rad/s], shape (m, P, 18) each, and body
-        dimensions [m], shape (m, P, N_SIZE).
+        dimensions [m], shape (m, P, N_SIZE); then the distance of the robot to the nearest
+        person [m], shape (m,), None where observations contain it: cylinders are observed as
+        people who stand in them.
 
     Raises:
         InvalidInput: There is no such person, or a posture is no person's.
@@ -43,25 +50,29 @@ def scenes_of(
     if not 0 <= who < n:
         rule = f"must be less than {n}, the number of people"
         raise InvalidInput("grid.person", who, rule)
-    postures = as_kernel_array(moved.q)
+    postures = with_known_yaw(as_kernel_array(moved.q))
     if postures.ndim != 2 or postures.shape[1:] != (18,) or not np.isfinite(postures).all():
         raise InvalidInput("moved.q", postures.shape, "must be finite, of shape (m, 18)")
     present = [i for i in range(n) if i == who or not is_far(people[i])]
     others, m = [i for i in present if i != who], len(postures)
-    order = np.tile([who, *others], (m, 1))
+    order, clearance = np.tile([who, *others], (m, 1)), None
+    if others or people[who].cylinder is not None:
+        clearance = _clearances(arm, shared, q, people[who], postures)
     if others:
         place = nearest_index(arm, shared, q, [people[i] for i in others])
         first = others[place or 0]
         near = people[first]
         gap = _clearances(arm, shared, q, near, as_kernel_array(near.q)[None])
-        beyond = _clearances(arm, shared, q, people[who], postures) > gap
+        beyond = clearance > gap
         order[beyond] = [first, *(i for i in present if i != first)]
+        clearance = np.minimum(clearance, gap)
     known = [as_known(person) for person in people]
     sizes = np.stack([shared.bodies[0] if p.size is None else p.size for p in known])
     joints = np.tile(np.stack([person.q for person in known]), (m, 1, 1))
     joints[:, who] = postures.clip(human.Q_MIN, human.Q_MAX)
     speeds = np.stack([person.qd for person in known])
-    return joints[np.arange(m)[:, None], order], speeds[order], sizes[order]
+    scenes = joints[np.arange(m)[:, None], order], speeds[order], sizes[order]
+    return scenes, clearance
 
 
 def _clearances(arm: Arm, shared: People, q: Vec, person: Person, postures: Vec) -> Vec:

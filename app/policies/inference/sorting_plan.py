@@ -307,8 +307,12 @@ def _offered(near: NearOptimalMoves, held: int | None) -> tuple[Symbol, NearOpti
     return "return", back
 
 
-def reason(plan: SortingPlan, objective: Objective) -> str:
-    """Return the reason of a choice as a sentence."""
+def reason(plan: SortingPlan, objective: Objective, *, lifts: bool = False) -> str:
+    """Return the reason of a choice as a sentence.
+
+    Args:
+        lifts: Whether the object of the chosen move is being lifted.
+    """
     if plan.symbol is None:
         return "Every tower matches the goal."
     if plan.symbol == "return":
@@ -324,11 +328,18 @@ def reason(plan: SortingPlan, objective: Objective) -> str:
         "success": "the greatest probability of success",
         "time": "the least expected time per success [s]",
     }[objective]
-    return (
-        f"Of {len(plan.options)} moves with about as many expected attempts it has {text}: "
-        f"{abs(own) if objective == 'time' else own:.2f}; the next has "
-        f"{abs(max(scores)) if objective == 'time' else max(scores):.2f}."
+    mine, best = (
+        f"{abs(one) if objective == 'time' else one:.2f}" for one in (own, max(scores))
     )
+    among = f"Of {len(plan.options)} moves with about as many expected attempts"
+    if own >= max(scores):
+        return f"{among} it has {text}: {mine}; the next has {best}."
+    why = (
+        "its object is being lifted"
+        if lifts
+        else "it was chosen before, and they differ little"
+    )
+    return f"{among} {text} is {best}; this one has {mine} and is kept: {why}."
 
 
 def score_of(option: PlanOption, objective: Objective) -> float:

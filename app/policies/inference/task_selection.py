@@ -41,7 +41,7 @@ from app.sim.perception.observed_people import (
 from app.sim.pick.batch import step_robot
 from app.sim.pick.candidate_observer import CandidateObserver
 from app.sim.pick.kernels.grasp import LIFT, GraspRules
-from app.sim.pick.kernels.observation_layout import DISTANCE_SCALE
+from app.sim.pick.kernels.observation_layout import DISTANCE_SCALE, FARTHEST
 from app.sim.pick.task_policy import (
     FRESH,
     NOT_BEGUN,
@@ -201,18 +201,19 @@ class TaskChooser(TrainedPolicy):
         started = time.perf_counter()
         query = self._query(q, qd, candidates, terms)
         known, at = checked_people(people), query.state.measured.q
-        scenes = scenes_of(self._arm, self._people, at, known, moved)
+        scenes, clearance = scenes_of(self._arm, self._people, at, known, moved)
         found = self._evaluate(query, scenes)
         m, k = found.values.shape
         rows = np.arange(m) * k + found.chosen
         risk = None if found.outcomes is None else found.outcomes.probability[rows]
-        distance = found.obs[::k, CLEARANCE].astype(np.float64)
+        if clearance is None:
+            clearance = DISTANCE_SCALE * found.obs[::k, CLEARANCE].astype(np.float64)
         return RiskMap(
             chosen=found.chosen,
             value=found.values.ravel()[rows].astype(np.float64),
             success=None if risk is None else risk[:, 0].astype(np.float64),
             contact=None if risk is None else risk[:, 1].astype(np.float64),
-            clearance_m=DISTANCE_SCALE * distance,
+            clearance_m=np.minimum(clearance, FARTHEST),
             elapsed_ms=1e3 * (time.perf_counter() - started),
         )
 

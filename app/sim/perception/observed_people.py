@@ -18,14 +18,15 @@ from dataclasses import replace
 import numpy as np
 
 from app.errors import InvalidInput, digits, interval
+from app.sim.collision.checker import Shapes
 from app.sim.core.arrays import Vec, as_kernel_array
 from app.sim.core.kernels.bounds import are_inside
 from app.sim.human import model as human
-from app.sim.human.kernels.kinematics import N_SIZE, PELVIS_Z
+from app.sim.human.kernels.kinematics import N_SIZE, PELVIS_Z, capsule_columns
 from app.sim.human.person import Person
 from app.sim.people.kernels import people as people_kernel
 from app.sim.people.kernels.pedestrian import N_PAST
-from app.sim.people.kernels.people import MAX_PEOPLE, People
+from app.sim.people.kernels.people import MAX_PEOPLE, People, PeopleGeometry
 from app.sim.perception.keypoints import FARTHEST_M
 from app.sim.perception.person_estimator import PersonEstimate
 from app.sim.robot.kernels import arm as arm_kernel
@@ -60,7 +61,9 @@ _KNOWN_LOW[_YAW], _KNOWN_HIGH[_YAW] = -_MOST_YAW, _MOST_YAW
 _KNOWN_BODY = _KNOWN_LOW[:36], _KNOWN_HIGH[:36]
 """Bounds of a person with joint angles."""
 _FLOATS = np.dtype(np.float64)
-_MOST_TURN = float(human.Q_MAX[_YAW])
+_FACING = -0.5 * math.pi
+"""Yaw of a person beyond the table who faces the robot [rad]. A yaw is taken within half a turn
+of it, as policies know it from their training."""
 _KNOWN_PAST = np.array([KNOWN_RADIUS, KNOWN_WALK])
 
 
@@ -265,15 +268,25 @@ def is_plain(person: Person) -> bool:
             continue
         if type(part) is not np.ndarray or part.dtype is not _FLOATS or part.shape != shape:
             return False
-    return _is_known(person) and -_MOST_TURN <= person.q.item(_YAW) <= _MOST_TURN
+    return _is_known(person) and abs(person.q.item(_YAW) - _FACING) <= math.pi
 
 
 def _checked_q(path: str, q: Vec) -> Vec:
     found = checked_vector(path, q, 18, _Q_LOW, _Q_HIGH, "m or rad")
-    if abs(found[_YAW]) <= human.Q_MAX[_YAW]:
-        return found
-    turned = found.copy()
-    turned[_YAW] = math.remainder(turned[_YAW], 2.0 * math.pi)
+    return with_known_yaw(found)
+
+
+def with_known_yaw(q: Vec) -> Vec:
+    """Return the same postures with the yaw that policies know; the same object if it is.
+
+    Args:
+        q: Joint positions [m, rad], shape (..., 18).
+    """
+    beyond = q[..., _YAW] - _FACING
+    if (np.abs(beyond) <= math.pi).all():
+        return q
+    turned = q.copy()
+    turned[..., _YAW] -= 2.0 * math.pi * np.rint(beyond / (2.0 * math.pi))
     return turned
 
 
@@ -301,20 +314,50 @@ def nearest_index(arm: Arm, shared: People, q: Vec, people: Sequence[Person]) ->
     """
     if len(people) < 2:
         return len(people) - 1 if people else None
-    workers = [i for i, person in enumerate(people) if person.cylinder is None]
-    pedestrians = [i for i, person in enumerate(people) if person.cylinder is not None]
-    sizes = [shared.bodies[0] if (s := people[i].size) is None else s for i in workers]
-    geometry = people_geometry_of(
-        shared,
-        np.array([people[i].q for i in workers]).reshape(-1, 18),
-        np.array([people[i].cylinder for i in pedestrians], dtype=np.float64).reshape(-1, 3),
-        np.array(sizes).reshape(-1, N_SIZE),
-    )
+    order = bodies_first(people)
+    geometry = _placed(shared, [people[i] for i in order])
     robot = arm_kernel.new_robot_pose(arm)
     arm_kernel.place_robot(arm, as_kernel_array(q), robot)
-    return (workers + pedestrians)[
-        people_kernel.nearest_person(shared, robot.columns, geometry)
+    return order[people_kernel.nearest_person(shared, robot.columns, geometry)]
+
+
+def bodies_first(people: Sequence[Person]) -> list[int]:
+    """Return the indices of people with joint angles, then of cylinders."""
+    return sorted(range(len(people)), key=lambda i: people[i].cylinder is not None)
+
+
+def people_shapes(shared: People, people: Sequence[Person]) -> Shapes:
+    """Return people as shapes, for a safety layer.
+
+    Args:
+        shared: From :func:`~app.sim.scene.scene.people_of`.
+        people: Checked people, any number; those with joint angles first, then cylinders.
+    """
+    geometry = _placed(shared, people)
+    cylinders = [person for person in people if person.cylinder is not None]
+    tops = [max(shared.top_z, person.top or shared.top_z) for person in cylinders]
+    going = [
+        (*person.qd[:2], person.growth) if person.measured else (math.nan,) * 3
+        for person in cylinders
     ]
+    return Shapes(
+        columns=geometry.columns,
+        cylinders=np.column_stack([geometry.cylinders, tops]),
+        going=np.reshape(going, (-1, 3)),
+    )
+
+
+def _placed(shared: People, people: Sequence[Person]) -> PeopleGeometry:
+    """Return people placed as shapes; those with joint angles come first."""
+    workers = [person for person in people if person.cylinder is None]
+    cylinders = [person.cylinder for person in people if person.cylinder is not None]
+    sizes = [shared.bodies[0] if one.size is None else one.size for one in workers]
+    return people_geometry_of(
+        shared._replace(columns=capsule_columns(len(workers))),
+        np.reshape([one.q for one in workers], (-1, 18)),
+        np.reshape(cylinders, (-1, 3)).astype(np.float64),
+        np.reshape(sizes, (-1, N_SIZE)),
+    )
 
 
 def checked_vector(path: str, values: Vec, size: int, low: Vec, high: Vec, unit: str) -> Vec:

@@ -22,7 +22,8 @@ class PersonGrid:
     y: Vec
     """Positions along y [m], shape (ny,)."""
     hand: human.Hand | None = None
-    """The moved hand; None: the whole person is moved, with the same yaw."""
+    """The moved hand; None: the whole person is moved, with the same yaw. A person given by a
+    cylinder faces the robot base at each position."""
     z: float = 0.0
     """Height of the palm [m]."""
 
@@ -44,6 +45,8 @@ class PersonGrid:
         q, reached = np.tile(person.q, (len(x), 1)), np.ones(len(x), dtype=bool)
         if self.hand is None:
             q[:, 0], q[:, 1] = x, y
+            if person.cylinder is not None:
+                q[:, 2] = np.arctan2(-y, -x)
             return q, reached
         for i, point in enumerate(np.column_stack([x, y, np.full(len(x), self.z)])):
             found = human.reach(self.hand, point, person.q, size)

@@ -32,7 +32,7 @@ class MotionQuery:
     people: Sequence[Person] = ()
     """The people in the cell as the policy observes them, at most four."""
     observed: Sequence[Person] | None = None
-    """The people for the safety layer: as last observed, ``age_s`` ago, at most four; None for
+    """The people for the safety layer: as last observed, ``age_s`` ago, any number; None for
     ``people``."""
     qdd: Vec | None = None
     """Joint accelerations [rad/s^2], shape (6,); required by policies that limit jerk."""

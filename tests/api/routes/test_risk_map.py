@@ -47,6 +47,44 @@ def test_each_position_has_the_answer_of_task_selection(
             assert found["reason"][j][i] is None and found["clearance_m"][j][i] > 0.0
 
 
+def test_a_cylinder_has_the_answers_of_task_selection_and_its_own_clearance(
+    client: TestClient,
+) -> None:
+    grid = {"x": [-0.6, 0.9], "y": [0.8, 1.4], "nx": 3, "ny": 2}
+    clearances = []
+    for r in (0.1, 0.3, 2.0):
+        one = {"x": 0.3, "y": 1.2, "vx": 0.0, "vy": 0.0, "r": r}
+        other = person(-1.2, 1.6)
+        found = mapped(client, people=[one, other], grid=grid)
+        clearances.append(found["clearance_m"][1][1])
+        for i, y in enumerate(found["y"]):
+            for j, x in enumerate(found["x"]):
+                if found["reason"][i][j] is not None:
+                    assert r == 2.0
+                    continue
+                there = [{**one, "x": x, "y": y}, other]
+                body = TASK_SELECTION | {"people": there}
+                single = client.post("/v1/task-selection", json=body).json()
+                values = {c["id"]: c["value"] for c in single["candidates"]}
+                assert found["chosen"][i][j] == single["chosen"]
+                np.testing.assert_allclose(
+                    found["value"][i][j], values[single["chosen"]], atol=1e-5
+                )
+    assert clearances[0] - clearances[1] == pytest.approx(0.2, abs=1e-6)
+    assert clearances[2] is None
+
+
+def test_a_turn_of_the_person_changes_nothing(client: TestClient) -> None:
+    grid = {"x": [-0.6, 0.9], "y": [0.8, 1.4], "nx": 3, "ny": 2}
+    maps = [
+        mapped(client, people=[person(0.3, 1.2, -1.4 + 2.0 * np.pi * k)], grid=grid)
+        for k in (-3, -1, 0, 1, 2)
+    ]
+    for found in maps:
+        for name in ("value", "clearance_m", "success"):
+            np.testing.assert_allclose(found[name], maps[2][name], atol=1e-5)
+
+
 def test_a_position_inside_the_robot_has_no_values_but_a_reason(client: TestClient) -> None:
     grid = {"x": [0.0, 0.0], "y": [0.25, 1.4], "nx": 1, "ny": 2}
     found = mapped(client, people=[person(0.0, 1.4)], grid=grid)

@@ -13,7 +13,7 @@ from app.sim.human import model as human
 from app.sim.human.person import Person
 from app.sim.pick.batch import step_robot
 from app.sim.pick.kernels.grasp import LIFT
-from app.sim.pick.task_policy import Decision, PickProgress
+from app.sim.pick.task_policy import NOT_BEGUN, Decision, Objective, PickProgress
 from app.sim.scene.scene import arm_of
 from app.sim.sorting.names import names_of
 from app.sim.sorting.state import Move, SortingState, empty_state
@@ -203,3 +203,26 @@ def test_reason_states_the_value_of_the_choice_and_of_the_next_one() -> None:
     text = reason(found, "value")
     assert f"{values[1]:.2f}; the next has {values[0]:.2f}" in text
     assert "Of 2 moves" in text
+
+
+@pytest.mark.parametrize("lifts", [False, True])
+@pytest.mark.parametrize("objective", ["value", "success", "time"])
+def test_reason_of_a_move_that_is_kept_states_its_score_and_the_best(
+    objective: Objective, lifts: bool
+) -> None:
+    one, kept = planner(), 0
+    progress = PickProgress(phase=LIFT, closing_s=0.0) if lifts else NOT_BEGUN
+    for number in (5, 9):
+        previous = CELL.stations[number].id
+        asked = replace(
+            query(task(5, 9)), previous=previous, progress=progress, objective=objective
+        )
+        found = one.plan(asked)
+        scores = [score_of(option, objective) for option in found.options]
+        own, other = scores[found.index], scores[1 - found.index]
+        text = reason(found, objective, lifts=lifts)
+        assert all(f"{abs(score):.2f}" in text for score in scores)
+        assert ("it has" in text) == (own >= other)
+        assert ("is kept" in text) == (own < other)
+        kept += own < other
+    assert kept or (objective, lifts) != ("value", True)  # the other scores are all equal here
