@@ -16,6 +16,8 @@ from jobs.start import child_command
 
 PROJECT_ROOT = Path(__file__).resolve().parent.parent
 """Working folder of child processes."""
+NO_CPU = "no free CPU in the Ray cluster"
+"""Reason for which a job waits that was started on a busy cluster."""
 TAIL_BYTES = 4000
 """Length of the end of a worker's output in an error [bytes]."""
 

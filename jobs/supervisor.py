@@ -34,7 +34,7 @@ from app.store.database.schema import check_schema
 from app.store.engine import Store
 from app.store.records import Claim
 from jobs.composed.composer import Composer
-from jobs.executor import Exit, LocalHandle, LocalProcess
+from jobs.executor import NO_CPU, Exit, LocalHandle, LocalProcess
 from jobs.resume_files import remove_unneeded
 from jobs.retention import Retention
 from jobs.timeouts import Timeouts
@@ -235,7 +235,8 @@ class Supervisor:
 
     def _wait_for(self, short: str, message: str) -> None:
         if self._waiting != short:
-            logger.error("the queue waits: %s", message)
+            level = logging.WARNING if short == NO_CPU else logging.ERROR
+            logger.log(level, "the queue waits: %s", message)
         self._waiting = short
 
     def _lack_of_room(self) -> str | None:

@@ -27,7 +27,7 @@ from app.storage_errors import StaleAttempt, StorageFull, StorageUnavailable
 from app.store import attempts
 from app.store.engine import Store
 from app.store.records import Claim
-from jobs.executor import Exit
+from jobs.executor import NO_CPU, Exit
 from jobs.remote.ray_node import NodeWorker
 
 logger = logging.getLogger(__name__)
@@ -38,7 +38,6 @@ PATIENCE_S = 10.0
 """Time until a job that finds no free CPU says so [s]."""
 HEARTBEAT_S = 5.0
 """Period of heartbeats until the process has started [s]."""
-NO_CPU = "no free CPU in the Ray cluster"
 
 
 class RayDriver:

@@ -6,7 +6,7 @@ import sqlite3
 import threading
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,12 +15,13 @@ import sqlalchemy as sa
 from sqlalchemy import event
 from sqlalchemy.pool import PoolProxiedConnection
 
+from app.storage_errors import StaleAttempt
 from app.store import attempts, completion, jobs
 from app.store.engine import Store
 from app.store.records import Claim
 from jobs import worker as jobs_worker
 from jobs.access import StoreAccess
-from jobs.executor import LocalHandle, LocalProcess
+from jobs.executor import NO_CPU, Exit, LocalHandle, LocalProcess
 from jobs.supervisor import Supervisor
 from jobs.worker import JobWorker
 from tests.jobs.counting_worker import count
@@ -151,6 +152,32 @@ def test_worker_that_cannot_be_started_for_now_is_started_later(
         wait_until(lambda: supervisor.waiting == reason)
         job = wait_until_final(store, job_id)
     assert (job.state, job.attempt, job.failures) == ("succeeded", 5, 0)
+
+
+class Crowded(LocalProcess):
+    """An executor on which every job lacks a free CPU of the cluster."""
+
+    def __init__(self, store: Store, data_dir: Path) -> None:
+        super().__init__(store.url, data_dir, "tests.jobs.counting_worker")
+        self.store = store
+
+    def poll(self, handle: LocalHandle) -> Exit | None:
+        for job in attempts.running_jobs(self.store):
+            with suppress(StaleAttempt):
+                attempts.heartbeat(self.store, job.claim, NO_CPU)
+        return super().poll(handle)
+
+
+def test_wait_for_a_cpu_of_the_cluster_is_a_warning(
+    store: Store, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    job_id = queue(store, steps=20, hold_at=[10])
+    with supervised(store, tmp_path, executor=Crowded(store, tmp_path)) as supervisor:
+        wait_until(lambda: supervisor.waiting == NO_CPU)
+        jobs.request_cancel(store, job_id)
+        assert wait_until_final(store, job_id).state == "cancelled"
+    found = [one.levelname for one in caplog.records if "the queue waits" in one.message]
+    assert set(found) == {"WARNING"}
 
 
 def test_lock_beyond_every_timeout_costs_no_job_a_failure(store: Store, tmp_path: Path) -> None:
