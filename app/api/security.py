@@ -35,7 +35,8 @@ def sign_in_page(root_path: str, fault: str = "") -> str:
         fault: What was wrong with the token that was given, as HTML.
     """
     page = (resources.files("app.api") / "signin.html").read_text("utf-8")
-    page = page.replace('action="/', f'action="{root_path}/')
+    for name in ("action", "href"):
+        page = page.replace(f'{name}="/', f'{name}="{root_path}/')
     return page.replace("<!-- fault -->", fault and f'<p role="alert">{fault}</p>')
 
 

@@ -172,6 +172,8 @@ def test_signing_in_works_below_the_path(tmp_path: Path) -> None:
     asked = below.get(f"{PREFIX}/v1/jobs", headers={"Accept": "text/html"})
     assert asked.status_code == 401
     assert f'action="{PREFIX}/session"' in asked.text
+    assert f'href="{PREFIX}/favicon.ico"' in asked.text
+    assert below.get(f"{PREFIX}/favicon.ico").headers["content-type"] == "image/x-icon"
     signed = below.post(f"{PREFIX}/session", content=f"token={TOKEN}", headers=FORM)
     assert (signed.status_code, signed.headers["location"]) == (303, f"{PREFIX}/")
     assert f"Path={PREFIX};" in signed.headers["set-cookie"]
