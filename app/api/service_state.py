@@ -142,7 +142,7 @@ STATE_METRICS = (
     ),
     StateMetric(
         "tandem_queue_waiting",
-        "Whether no job runs because the disk is full or the database takes no writes.",
+        "Whether jobs cannot start or be written for now; /readyz contains the reason.",
         (),
         lambda services: [((), services.supervisor.waiting is not None)],
     ),
