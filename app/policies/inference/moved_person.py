@@ -57,15 +57,14 @@ def scenes_of(
     others, m = [i for i in present if i != who], len(postures)
     order, clearance = np.tile([who, *others], (m, 1)), None
     if others or people[who].cylinder is not None:
-        clearance = _clearances(arm, shared, q, people[who], postures)
-    if others:
-        place = nearest_index(arm, shared, q, [people[i] for i in others])
-        first = others[place or 0]
-        near = people[first]
-        gap = _clearances(arm, shared, q, near, as_kernel_array(near.q)[None])
-        beyond = clearance > gap
-        order[beyond] = [first, *(i for i in present if i != first)]
-        clearance = np.minimum(clearance, gap)
+        clearance = own = _clearances(arm, shared, q, people[who], postures)
+        if others:
+            place = nearest_index(arm, shared, q, [people[i] for i in others])
+            first = others[place or 0]
+            near = people[first]
+            gap = _clearances(arm, shared, q, near, as_kernel_array(near.q)[None])
+            order[own > gap] = [first, *(i for i in present if i != first)]
+            clearance = np.minimum(own, gap)
     known = [as_known(person) for person in people]
     sizes = np.stack([shared.bodies[0] if p.size is None else p.size for p in known])
     joints = np.tile(np.stack([person.q for person in known]), (m, 1, 1))
