@@ -1,7 +1,8 @@
 """Jobs of requests: the one a path names, pages of them, checks before one is queued."""
 
+from collections.abc import Mapping
 from dataclasses import replace
-from typing import Annotated, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 from fastapi import Depends, Header, Response
 
@@ -78,10 +79,29 @@ def checked(body: AnySpec, services: Services) -> NewJob:
     return new
 
 
-def queued(new: NewJob, services: Services, response: Response, key: str | None) -> JobPublic:
-    """Queue a job; ``Location`` says where to follow it."""
+def queued(
+    new: NewJob,
+    services: Services,
+    response: Response,
+    key: str | None,
+    submitted: Mapping[str, Any] | None = None,
+) -> JobPublic:
+    """Queue a job; ``Location`` says where to follow it.
+
+    Args:
+        key: Idempotency key of the request.
+        submitted: JSON data that repetitions of the request have in common; None: spec, labels
+            and budgets of the job.
+
+    Raises:
+        Conflict: The key was used for another request.
+    """
     job = jobs.create_job(
-        services.store, new, idempotency_key=key, references=stored_references(new)
+        services.store,
+        new,
+        idempotency_key=key,
+        references=stored_references(new),
+        submitted=submitted,
     )
     services.supervisor.wake()
     response.headers["Location"] = f"/v1/jobs/{job.id}"

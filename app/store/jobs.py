@@ -14,11 +14,12 @@ import uuid
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from datetime import UTC, datetime
-from typing import Any, get_args
+from typing import Any, NamedTuple, get_args
 
 import sqlalchemy as sa
 from sqlalchemy.exc import IntegrityError
 
+from app.digests import digest
 from app.errors import Conflict, InvalidInput, NotFound, WrongState
 from app.store.cursors import check_limit, decode_cursor, encode_cursor
 from app.store.database.reserve import write_with_reserve
@@ -41,6 +42,16 @@ NOTHING = References()
 """A job that refers to nothing that can be deleted."""
 NO_PARTS = "none"
 """Selects the jobs that are part of no other job."""
+DERIVED = frozenset({"preset", "seed", "overrides", "total_steps"})
+"""Members of a new job that follow from its spec; an update of Tandem may change them."""
+
+
+class _Key(NamedTuple):
+    """An idempotency key."""
+
+    text: str
+    digest: str
+    """SHA-256 of what is submitted with it."""
 
 
 def create_job(
@@ -49,15 +60,18 @@ def create_job(
     *,
     idempotency_key: str | None = None,
     references: References = NOTHING,
+    submitted: Mapping[str, Any] | None = None,
 ) -> JobRecord:
-    """Queue a job; the same key with the same spec returns the existing job.
+    """Queue a job; the same key with the same submission returns the existing job.
 
     Args:
         idempotency_key: Identifies this submission.
         references: What must be stored.
+        submitted: JSON data that repetitions of the submission have in common; None: spec,
+            labels and budgets of the job.
 
     Raises:
-        Conflict: The key was used for another spec.
+        Conflict: The key was used for another submission.
         NotFound: The parent was deleted.
         WrongState: An equal repetition of its parent has not ended.
         InvalidInput: The key is empty or too long, or a reference is not stored.
@@ -66,18 +80,22 @@ def create_job(
     if idempotency_key is not None and not 1 <= len(idempotency_key) <= MAX_KEY_LENGTH:
         rule = f"must have 1 to {MAX_KEY_LENGTH} characters"
         raise InvalidInput("idempotency_key", idempotency_key, rule)
+    key = None
+    if idempotency_key is not None:
+        key = _Key(idempotency_key, digest(_members(new) if submitted is None else submitted))
     try:
         with store.writing() as connection:
-            earlier = _by_key(connection, idempotency_key)
+            earlier = _by_key(connection, key)
             if earlier is None:
                 require_stored(connection, references)
-                return _insert(connection, new, idempotency_key)
+                return _insert(connection, new, key)
     except IntegrityError:  # another server process was faster with the same key
         with store.reading() as connection:
-            earlier = _by_key(connection, idempotency_key)
+            earlier = _by_key(connection, key)
         if earlier is None:
             raise
-    return _same_submission(earlier, new)
+    assert key is not None
+    return _same_submission(earlier, new, key)
 
 
 def get_job(store: Store, job_id: str) -> JobRecord:
@@ -246,7 +264,17 @@ def _record(row: Mapping[Any, Any]) -> JobRecord:
     return JobRecord(**fields)
 
 
-def _insert(connection: sa.Connection, new: NewJob, key: str | None) -> JobRecord:
+def _members(new: NewJob) -> dict[str, Any]:
+    """Return what was submitted for a new job; absent members and null are the same."""
+    members = {**asdict(new), "spec": dict(new.spec)}
+    return {
+        name: value
+        for name, value in members.items()
+        if name not in DERIVED and value is not None
+    }
+
+
+def _insert(connection: sa.Connection, new: NewJob, key: _Key | None) -> JobRecord:
     """Insert a queued job with its first event.
 
     Raises:
@@ -261,7 +289,8 @@ def _insert(connection: sa.Connection, new: NewJob, key: str | None) -> JobRecor
         "spec": dict(new.spec),
         "checkpoint": named_checkpoint(connection, new.spec.get("checkpoint")),
         "state": "queued",
-        "idempotency_key": key,
+        "idempotency_key": None if key is None else key.text,
+        "submission_digest": None if key is None else key.digest,
         "created_at": datetime.now(UTC),
         "last_event": 1,
     }
@@ -295,14 +324,23 @@ def _cancel(connection: sa.Connection, job: JobRecord) -> None:
     append_event(connection, job.id, job.last_event + 1, "state", data=data)
 
 
-def _by_key(connection: sa.Connection, key: str | None) -> JobRecord | None:
+def _by_key(connection: sa.Connection, key: _Key | None) -> JobRecord | None:
     if key is None:
         return None
-    return next(iter(select_jobs(connection, jobs.c.idempotency_key == key)), None)
+    return next(iter(select_jobs(connection, jobs.c.idempotency_key == key.text)), None)
 
 
-def _same_submission(earlier: JobRecord, new: NewJob) -> JobRecord:
-    if dict(earlier.spec) != dict(new.spec):
+def _same_submission(earlier: JobRecord, new: NewJob, key: _Key) -> JobRecord:
+    """Return the job of an earlier submission.
+
+    Raises:
+        Conflict: It was another submission.
+    """
+    if earlier.submission_digest is None:  # a job queued before migration 0015
+        same = dict(earlier.spec) == dict(new.spec)
+    else:
+        same = earlier.submission_digest == key.digest
+    if not same:
         raise Conflict(
             f"idempotency key {earlier.idempotency_key!r} belongs to job {earlier.id}, which "
             "was submitted with another body: use a new key"

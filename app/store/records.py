@@ -118,6 +118,8 @@ class JobRecord(NewJob):
     """Whether a cancel was requested."""
     idempotency_key: str | None
     """Key of its submission."""
+    submission_digest: str | None
+    """SHA-256 of what was submitted with its key; None without one or before migration 0015."""
     result: Mapping[str, Any] | None
     """Result once succeeded: an evaluation's JSON, a training's summary."""
     last_event: int

@@ -48,7 +48,7 @@ class Reports(Composer):
                 name = f"report {job.number}, {file}"
                 new = replace(_evaluation(spec, *tested).new_job(), name=name, trial=number)
                 new = replace(new, priority=job.priority, part_of=job.id)
-                jobs.create_job(store, new, idempotency_key=key)
+                jobs.create_job(store, new, idempotency_key=key, submitted=new.spec)
                 active += 1
         composed_jobs.record(store, job.id, len(ended), {})
         if len(ended) == len(wanted):

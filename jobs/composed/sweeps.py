@@ -219,7 +219,7 @@ def _evaluate(store: Store, job: JobRecord, spec: SweepSpec, trial: SweepTrial) 
 
 
 def _queue(store: Store, job: JobRecord, number: int, body: Mapping[str, Any]) -> None:
-    """Queue a job of a trial; once, however often this is repeated."""
+    """Queue a job of a trial; once, however often this is repeated, with any priority."""
     new = replace(
         parse_spec(body).new_job(),
         name=f"sweep {job.number}, trial {number}",
@@ -227,7 +227,8 @@ def _queue(store: Store, job: JobRecord, number: int, body: Mapping[str, Any]) -
         part_of=job.id,
         trial=number,
     )
-    jobs.create_job(store, new, idempotency_key=f"{job.id}-{number}-{new.kind}")
+    key = f"{job.id}-{number}-{new.kind}"
+    jobs.create_job(store, new, idempotency_key=key, submitted=new.spec)
 
 
 def _drawn(spec: SweepSpec, trials: Sequence[SweepTrial], number: int) -> dict[str, Any]:

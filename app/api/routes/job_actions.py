@@ -98,7 +98,7 @@ def retry_job(
     labels = {"name": job.name, "priority": job.priority}
     body = validated(spec_type(job.kind), {**job.spec, **labels, **budgets(job)})
     new = replace(checked(body, services), parent=job.id)
-    return queued(new, services, response, idempotency_key)
+    return queued(new, services, response, idempotency_key, {"retry": job.id})
 
 
 @router.post(
@@ -117,7 +117,8 @@ def clone_job(
     """Queue a new job with the spec of this one and the given changes."""
     body = validated(spec_type(job.kind), merge({**job.spec, **budgets(job)}, changes))
     new = replace(checked(body, services), parent=job.id)
-    return queued(new, services, response, idempotency_key)
+    submitted = {"clone": job.id, "changes": changes}
+    return queued(new, services, response, idempotency_key, submitted)
 
 
 @router.patch(

@@ -111,6 +111,7 @@ jobs = Table(
     Column("trial", Integer),
     Column("checkpoint", String(64)),
     Column("end_number", Integer),
+    Column("submission_digest", String(64)),
     Index("ix_jobs_state_number", "state", "number"),  # pages of jobs in a state
     Index("ix_jobs_part_of_number", "part_of", "number"),  # pages without parts, or of them
     Index("ix_jobs_end_number", "end_number"),  # the last one, and the ended jobs in order

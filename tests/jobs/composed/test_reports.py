@@ -7,7 +7,7 @@ import sqlalchemy as sa
 
 from app.errors import InvalidInput, WrongState
 from app.policies.report.page import RESULTS, evaluations, page
-from app.store import attempts, completion, job_actions, jobs, metrics
+from app.store import attempts, completion, composed_jobs, job_actions, jobs, metrics
 from app.store.database import tables
 from app.store.engine import Store
 from app.store.records import JobRecord
@@ -66,6 +66,19 @@ def test_evaluations_are_queued_a_few_at_once_and_fill_the_page(store: Store) ->
     assert f"job {second.number}: `python -m app evaluate" in ended.result["markdown"]
     oracle = [one.spec["episodes"] for one in parts_of(store, report)]
     assert max(oracle) == 300
+
+
+def test_evaluation_that_is_queued_again_with_another_priority_is_the_same(
+    store: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    report = look(store, post(store, measure=True))
+    parts = parts_of(store, report)
+    job_actions.change_labels(store, report.id, {"priority": 5})
+    with monkeypatch.context() as patch:  # a server that was paused after it had read the parts
+        patch.setattr(composed_jobs, "parts_of", lambda *_: ())
+        Reports().advance(store)
+    assert look(store, report).state == "running"
+    assert parts_of(store, report) == parts
 
 
 def test_evaluation_without_a_result_is_named_and_not_replaced_by_a_stored_one(

@@ -223,6 +223,20 @@ def test_sweep_that_cannot_go_on_fails_alone(store: Store) -> None:
     assert "was submitted with another body" in str(reasons[taken.id])
 
 
+def test_trial_that_is_queued_again_with_another_priority_is_the_same(
+    store: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    sweep = post(store)
+    _, (trial,) = look(store, sweep)
+    job_actions.change_labels(store, sweep.id, {"priority": 5})
+    with monkeypatch.context() as patch:  # a server that was paused after it had read the parts
+        patch.setattr(composed_jobs, "parts_of", lambda *_: ())
+        Sweeps().advance(store)
+    job, trials = look(store, sweep)
+    assert job.state == "running"
+    assert [one.training.id for one in trials] == [trial.training.id]
+
+
 def put_spec(store: Store, sweep: JobRecord, spec: Mapping[str, Any]) -> None:
     """Change the stored spec of a sweep; an empty one is damaged."""
     with store.writing() as connection:

@@ -1,0 +1,110 @@
+"""The header Idempotency-Key on a service without supervisor and live worlds."""
+
+from collections.abc import AsyncIterator, Iterator
+from contextlib import asynccontextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+from fastapi import FastAPI
+from fastapi.testclient import TestClient
+
+from app.api.application import build_app
+from app.main import STATIC
+from app.store.engine import Store
+from tests.api.conftest import ADDRESS, require_description
+from tests.support.idle_service import idle_service
+
+TRAIN = {"kind": "train", "preset": "pick-td3", "step_budget": 1000}
+KEY = {"Idempotency-Key": "z1"}
+
+
+@pytest.fixture
+def idle(store: Store, tmp_path: Path) -> Iterator[TestClient]:
+    """A client of the routes; no job runs."""
+    parts = idle_service(store, tmp_path)
+
+    @asynccontextmanager
+    async def lifespan(app: FastAPI) -> AsyncIterator[None]:
+        app.state.services = parts
+        yield
+
+    app = build_app(
+        lifespan=lifespan,
+        static=STATIC,
+        token=None,
+        version="test",
+        counts=parts.metrics,
+        traces=None,
+    )
+    with TestClient(app, base_url=ADDRESS) as client:
+        client.event_hooks = {"response": [require_description(app)]}
+        yield client
+
+
+@pytest.fixture
+def ended(idle: TestClient) -> str:
+    """Path of a training that was cancelled while it was queued."""
+    job = idle.post("/v1/jobs", json={**TRAIN, "name": "first"}).json()
+    path = f"/v1/jobs/{job['id']}"
+    idle.post(f"{path}/cancel").raise_for_status()
+    return path
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"name": "second"},
+        {"notes": "slow"},
+        {"priority": 3},
+        {"step_budget": 2000},
+        {"step_budget": None},
+        {"time_budget_s": 60},
+    ],
+    ids=str,
+)
+def test_key_of_another_body_is_a_conflict(idle: TestClient, change: dict[str, Any]) -> None:
+    first = idle.post("/v1/jobs", json=TRAIN, headers=KEY).json()
+    other = idle.post("/v1/jobs", json={**TRAIN, **change}, headers=KEY)
+    assert other.status_code == 409
+    assert "was submitted with another body" in other.json()["detail"]
+    idle.patch(f"/v1/jobs/{first['id']}", json=change).raise_for_status()
+    again = idle.post("/v1/jobs", json=TRAIN, headers=KEY)
+    assert (again.status_code, again.json()["id"]) == (202, first["id"])
+
+
+@pytest.mark.parametrize("action", ["retry", "clone"])
+def test_repetition_is_the_same_job_after_its_parent_was_changed(
+    idle: TestClient, ended: str, action: str
+) -> None:
+    first = idle.post(f"{ended}/{action}", json={}, headers=KEY).json()
+    changes = {"name": "second", "priority": 3, "step_budget": 2000, "time_budget_s": 60}
+    idle.patch(ended, json=changes).raise_for_status()
+    again = idle.post(f"{ended}/{action}", json={}, headers=KEY)
+    assert (again.status_code, again.json()["id"]) == (202, first["id"])
+
+
+@pytest.mark.parametrize(
+    "change",
+    [{"seed": 1}, {"name": "second"}, {"priority": 3}, {"step_budget": None}],
+    ids=str,
+)
+def test_key_of_another_clone_is_a_conflict(
+    idle: TestClient, ended: str, change: dict[str, Any]
+) -> None:
+    assert idle.post(f"{ended}/clone", json={}, headers=KEY).status_code == 202
+    assert idle.post(f"{ended}/clone", json=change, headers=KEY).status_code == 409
+
+
+@pytest.mark.parametrize("action", ["retry", "clone"])
+def test_key_of_another_action_or_parent_is_a_conflict(
+    idle: TestClient, ended: str, action: str
+) -> None:
+    assert idle.post(f"{ended}/{action}", json={}, headers=KEY).status_code == 202
+    other = idle.post("/v1/jobs", json={**TRAIN, "name": "first"}).json()
+    path = f"/v1/jobs/{other['id']}"
+    idle.post(f"{path}/cancel").raise_for_status()
+    assert idle.post(f"{path}/{action}", json={}, headers=KEY).status_code == 409
+    different = {"retry": "clone", "clone": "retry"}[action]
+    assert idle.post(f"{ended}/{different}", json={}, headers=KEY).status_code == 409
+    assert idle.post("/v1/jobs", json=TRAIN, headers=KEY).status_code == 409
