@@ -124,5 +124,4 @@ def newest_point(services: Services, job: JobRecord) -> MetricRow | None:
     """Return the last point of a job's curve, None before the first."""
     if job.step <= 0:
         return None
-    rows = metrics.list_metrics(services.store, job.id, after_step=job.step - 1, limit=1)
-    return rows[-1] if rows else None
+    return metrics.newest_point(services.store, job.id)

@@ -1,6 +1,7 @@
 """Ends of attempts: succeeded, cancelled, failed, crashed, interrupted, orphaned.
 
-Crashes of its worker count as failures of a job; deaths of the server do not.
+Crashes of its worker count as failures of a job; deaths of the server do not. The step of the
+job becomes that of its last checkpoint, where this lies beyond the last point of the curve.
 """
 
 import math
@@ -11,7 +12,7 @@ import sqlalchemy as sa
 
 from app.errors import InvalidInput
 from app.store.database.reserve import write_with_reserve
-from app.store.database.tables import jobs, resume_states
+from app.store.database.tables import job_checkpoints, jobs, resume_states
 from app.store.engine import Store
 from app.store.fencing import change_state, fenced_update
 from app.store.jobs import ended_now, read_job
@@ -178,10 +179,21 @@ def _end(
         if changes.get(name):
             data[name] = changes[name]
     values = {"error": None, **changes, **ended_now(), "waiting": None}
+    values["step"] = _steps_done(connection, claim.job_id, changes.get("result"))
     values["heartbeat_at"] = values["finished_at"]
     if state != "cancelled":  # its end came before the cancel of the pruner
         values.setdefault("ended_by", None)
     change_state(connection, claim.job_id, state, values, data)
+
+
+def _steps_done(
+    connection: sa.Connection, job_id: str, result: Mapping[str, Any] | None = None
+) -> int:
+    """Return the steps that the attempts of a job have done, by all that they have recorded."""
+    saved = sa.select(sa.func.max(job_checkpoints.c.step))
+    step = connection.execute(saved.where(job_checkpoints.c.job_id == job_id)).scalar() or 0
+    stated = (result or {}).get("step")  # results of trainings state it
+    return max(read_job(connection, job_id).step, step, stated if type(stated) is int else 0)
 
 
 def _requeue_killed(connection: sa.Connection, job_id: str) -> None:
@@ -202,7 +214,7 @@ def _requeue_killed(connection: sa.Connection, job_id: str) -> None:
 def _requeue(connection: sa.Connection, job_id: str, changes: Mapping[str, Any]) -> None:
     job = read_job(connection, job_id, for_update=True)
     data: dict[str, Any] = {"attempt": job.attempt}
-    changes = {**changes, "waiting": None}
+    changes = {**changes, "step": _steps_done(connection, job_id), "waiting": None}
     if job.cancel_requested:
         values = {**changes, "error": None, **ended_now()}
         change_state(connection, job_id, "cancelled", values, data)

@@ -1,5 +1,8 @@
 """Learning curves of jobs: one row per step."""
 
+from collections.abc import Mapping
+from typing import Any
+
 import sqlalchemy as sa
 
 from app.errors import NotFound
@@ -32,4 +35,17 @@ def list_metrics(
         if known is None:
             raise NotFound("job", job_id)
         rows = connection.execute(query).mappings().all()
-    return tuple(MetricRow(step=r["step"], values=r["values"], at=r["at"]) for r in rows)
+    return tuple(_point(row) for row in rows)
+
+
+def newest_point(store: Store, job_id: str) -> MetricRow | None:
+    """Return the last point of a job's curve; None without one."""
+    query = sa.select(table).where(table.c.job_id == job_id)
+    with store.reading() as connection:
+        found = connection.execute(query.order_by(table.c.step.desc()).limit(1))
+        row = found.mappings().first()
+    return None if row is None else _point(row)
+
+
+def _point(row: Mapping[Any, Any]) -> MetricRow:
+    return MetricRow(step=row["step"], values=row["values"], at=row["at"])

@@ -6,13 +6,16 @@ from typing import Any
 import pytest
 from fastapi.testclient import TestClient
 
+from app.api.job_requests import shown
 from app.api.routes.jobs import stream_job
+from app.store import attempts, completion
 from app.store.engine import Store
-from app.store.jobs import create_job, request_cancel
+from app.store.jobs import create_job, get_job, request_cancel
 from app.store.records import NewJob
 from tests.api.answers import post_json, problem_of
 from tests.api.conftest import services_of
 from tests.sim.recorded_person import csv_text, working
+from tests.support.databases import claimed
 from tests.support.idle_service import idle_service
 
 TINY = {
@@ -231,6 +234,18 @@ def test_stream_after_an_event_that_a_restored_database_lacks_sends_later_ones(
         return [one.event async for one in stream]
 
     assert asyncio.run(sent()) == ["state", "end"]
+
+
+def test_training_that_ended_between_two_points_shows_the_last_one(
+    store: Store, tmp_path: Path
+) -> None:
+    services = idle_service(store, tmp_path)
+    create_job(store, NewJob(kind="count", spec={}))
+    claim, _ = claimed(store)
+    attempts.record_progress(store, claim, 100, {"success": 0.5})
+    completion.finish(store, claim, result={"step": 128}, ended_by="time budget")
+    job = shown(get_job(store, claim.job_id), services)
+    assert (job.step, job.latest) == (128, {"success": 0.5})
 
 
 def test_presets_are_described_for_a_form(client: TestClient) -> None:
