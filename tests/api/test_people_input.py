@@ -321,7 +321,7 @@ APPROACHING = {"x": 1.2, "y": 1.2, "vx": -2.5, "vy": -2.5, "r": 0.3}
 BEHIND = [{"x": -1.0 - 0.01 * k, "y": -0.6, "vx": 0, "vy": 0, "r": 0.3} for k in range(4)]
 
 
-def test_safety_layer_monitors_people_whom_the_policy_does_not_observe(
+def test_safety_layer_monitors_people_beyond_those_of_the_policy(
     client: TestClient,
 ) -> None:
     question = {

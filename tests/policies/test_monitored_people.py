@@ -51,10 +51,10 @@ def test_override_beside_many_is_the_lowest_beside_one_of_them(as_measured: bool
     for _ in range(40):
         q = np.array([*rng.uniform([-1.0, -2.2, 0.5], [1.0, -1.0, 1.8]), 0.0, 0.0, 0.0])
         qd = np.array([*rng.uniform(-1.0, 1.0, 3), 0.0, 0.0, 0.0])
-        everybody = people_near(rng)
-        for seen in ([], everybody[:2]):
-            beside = decided(seen, everybody)
-            each = [decided(seen, [one]) for one in everybody]
+        crowd = people_near(rng)
+        for seen in ([], crowd[:2]):
+            beside = decided(seen, crowd)
+            each = [decided(seen, [one]) for one in crowd]
             assert beside.safe is not None
             overrides = [one.safe.override for one in each if one.safe is not None]
             assert beside.safe.override == min(overrides)
@@ -62,7 +62,7 @@ def test_override_beside_many_is_the_lowest_beside_one_of_them(as_measured: bool
                 assert beside.terms_of is not None
                 assert overrides[beside.terms_of] < 1.0
                 lowered_by.add(beside.terms_of)
-        same = decided(everybody[:4], None), decided(everybody[:4], everybody[:4])
+        same = decided(crowd[:4], None), decided(crowd[:4], crowd[:4])
         assert same[0].safe is not None and same[1].safe is not None
         assert same[0].safe.override == same[1].safe.override
         assert (same[0].terms, same[0].terms_of) == (same[1].terms, same[1].terms_of)

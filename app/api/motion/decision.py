@@ -60,7 +60,7 @@ def decide(
     present = {i: one.person for i, one in enumerate(people) if one.person is not None}
     last = {i: one.observed for i, one in enumerate(people) if one.observed is not None}
     q = request.robot.joints(request.robot.q)
-    # The policy observes the nearest, the safety layer everybody: a person farther away may be
+    # The policy observes the nearest, the safety layer all: a person farther away may be
     # the one who comes too near.
     seen, monitored = nearest_places(present, cell, q), list(last)
     query = request.to_domain(
