@@ -49,6 +49,17 @@ def test_a_broken_link_is_found(link: str) -> None:
     assert broken_links(DOCS / "method.md", f"# Title\n[one]({link})") == [link]
 
 
+def test_every_picture_is_shown_in_a_document() -> None:
+    shown = {
+        (page.parent / link).resolve()
+        for page in PAGES
+        for link in LINK.findall(page.read_text("utf-8"))
+        if not re.match(r"[a-z]+:", link)
+    }
+    stored = {path for path in (DOCS / "img").glob("**/*") if path.is_file()}
+    assert stored and stored <= shown
+
+
 def test_the_site_lists_every_page() -> None:
     text = (ROOT / "tools/docs/mkdocs.yml").read_text("utf-8")
     listed = set(re.findall(r"[\w/-]+\.md", text.split("\nnav:")[1]))
