@@ -44,12 +44,12 @@ FEW_PICTURES = """if (location.pathname.includes("/viewer/")) {
     context[name] = function (...all) { return skips ? undefined : draw.apply(this, all); };
   }
   window.requestAnimationFrame = (act) => frame.call(window, (now) => {
-    if (now - last >= 2000) last = now;
+    if (now - last >= 10000) last = now;
     skips = now !== last;
     act(now);
   });
 }"""
-"""Lets Chromium draw the scene's pictures every 2 s. The viewer still makes all its calls, but
+"""Lets Chromium draw the scene's pictures every 10 s. The viewer still makes all its calls, but
 software needs 0.3 s of a core for each picture and draws without a pause."""
 
 OpenPage = Callable[..., Page]

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Page, expect
+from playwright.sync_api import Page, Route, expect
 
 from app.sim.cells.cell import load_cell
 from tests.browser.conftest import free_port, serving
@@ -76,6 +76,26 @@ def test_scene_follows_into_other_cells_and_back_in_every_window(
             expect(page.locator('[data-role="cell"]')).to_have_value(cell)
             expect_drawing(page)
             assert page.locator('[data-role="scene-note"]').all_inner_texts() == []
+
+
+@SERVERS
+def test_world_that_is_replaced_before_its_stream_begins_is_asked_for_again(
+    open_page: Callable[..., Page], shown: str
+) -> None:
+    page = open_page(scene=False)
+    states = "**/v1/worlds/main"
+
+    def replace_then_answer(route: Route) -> None:
+        page.unroute(states)
+        old = route.fetch()
+        show(shown, SORT)
+        route.fulfill(response=old)
+
+    page.route(states, replace_then_answer)
+    show(shown, REACH)
+    expect(page.locator('[data-role="cell"]')).to_have_value(SORT)
+    expect(page.locator("[data-link]")).to_have_attribute("data-link", "live")
+    assert page.problems == []  # type: ignore[attr-defined]
 
 
 @WINDOWS

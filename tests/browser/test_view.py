@@ -2,10 +2,11 @@
 
 from collections.abc import Callable
 
+import numpy as np
 import pytest
 from playwright.sync_api import Page, expect
 
-from tests.browser.scene import VIEWER
+from tests.browser.scene import VIEWER, scene_of
 from tests.browser.test_scene import WINDOWS
 
 pytestmark = [pytest.mark.browser, WINDOWS]
@@ -13,6 +14,26 @@ pytestmark = [pytest.mark.browser, WINDOWS]
 SMALL, PHONE = (400, 320), (390, 500)
 BEHIND = "getComputedStyle(document.querySelector('[data-dock-root]')).backgroundImage"
 SEEN_PANELS = "all => all.filter((one) => one.checkVisibility()).length"
+
+LISTS = """() => {
+  const all = [];
+  addEventListener("message", ({ data }) => data?.tag === "view-settings" && all.push(data));
+  return all;
+}"""
+"""The view settings that the scene sends from now on."""
+SLOW_MS = 120
+SLOW_FRAMES = f"""() => new Promise((resolve) => {{
+  const starts = [];
+  const draw = () => {{
+    const start = performance.now();
+    starts.push(start);
+    while (performance.now() < start + {SLOW_MS});
+    if (starts.length < 5) requestAnimationFrame(draw);
+    else resolve(starts);
+  }};
+  requestAnimationFrame(draw);
+}})"""
+"""Resolves to the starts of five frames, each of which takes that long [ms]."""
 
 
 def shown_by_viewer(page: Page, name: str) -> bool:
@@ -53,6 +74,29 @@ def test_each_window_has_its_own_view_settings(open_page: Callable[..., Page]) -
     expect(one.locator('[data-view="Values"]')).to_have_count(0)
     expect(one.locator('[data-action="view"]')).to_be_focused()
     assert one.problems == []  # type: ignore[attr-defined]
+
+
+def test_menu_stays_open_with_the_focus_while_the_scene_is_loaded_again(
+    open_page: Callable[..., Page],
+) -> None:
+    page = open_page(SMALL)
+    press(page, '[data-action="view"]')
+    page.locator('[data-view="Values"]').focus()
+    told = page.evaluate_handle(LISTS)
+    scene_of(page).evaluate("location.reload()")
+    page.wait_for_function("all => all.length > 0", arg=told)
+    expect(page.locator('[data-view="Values"]')).to_be_focused()
+    page.keyboard.press("Escape")
+    expect(page.locator('[data-action="view"]')).to_be_focused()
+    assert page.problems == []  # type: ignore[attr-defined]
+
+
+def test_scene_that_draws_slowly_leaves_as_much_time_to_the_page(
+    open_page: Callable[..., Page],
+) -> None:
+    scene = scene_of(open_page(SMALL))
+    starts = scene.evaluate(SLOW_FRAMES)
+    assert min(np.diff(starts)) >= 2 * SLOW_MS
 
 
 def test_viewers_own_panel_is_never_seen_and_the_scene_follows_dark(

@@ -117,7 +117,10 @@ async function watch(signal, history, unconfirmed, setState, setEpoch) {
         });
         const leave = follow(`v1/worlds/${WORLD}/events`, {
           onEvent: (name, snapshot) => {
-            if (name === "end") lost((replaced = true));
+            // It may have been replaced after the question for its state, before the stream began.
+            const isOther = snapshot?.candidates
+              && (snapshot.cell !== world.cell || snapshot.tick < world.tick);
+            if (name === "end" || isOther) return lost((replaced = true));
             if (!snapshot?.candidates || (stalled && snapshot.tick === world.tick)) return;
             stalled = false;
             silence.end();
