@@ -1,17 +1,20 @@
 """A service whose supervisor and live cells have not been started."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import AsyncIterator, Callable, Mapping
+from contextlib import asynccontextmanager
 from dataclasses import replace
 from itertools import count
 from pathlib import Path
 from typing import Any
 
+from fastapi import FastAPI
 from opentelemetry.trace import NoOpTracer
 
+from app.api.application import build_app
 from app.api.metrics import Metrics
 from app.api.registry import DEFAULT_ALIAS, CheckpointNames, PolicyRegistry
 from app.api.services import LiveWorld, Services
-from app.main import acting_in, assemble, build_task_policy
+from app.main import STATIC, acting_in, assemble, build_task_policy
 from app.policies.checkpoints import pretrained
 from app.policies.checkpoints.checkpoint import Checkpoint
 from app.sim.cells.cell import load_cell
@@ -48,6 +51,25 @@ def idle_service(store: Store, data_dir: Path) -> Services:
         worlds=worlds,
         metrics=Metrics("test"),
         tracer=NoOpTracer(),
+    )
+
+
+def app_of(parts: Services, token: str | None = None) -> FastAPI:
+    """Return the routes of a service; requests need the token."""
+
+    @asynccontextmanager
+    async def lifespan(app: FastAPI) -> AsyncIterator[None]:
+        app.state.services = parts
+        yield
+        parts.stopping.set()
+
+    return build_app(
+        lifespan=lifespan,
+        static=STATIC,
+        token=token,
+        version="test",
+        counts=parts.metrics,
+        traces=None,
     )
 
 

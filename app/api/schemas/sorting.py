@@ -215,7 +215,8 @@ class SortingValue(SortingMove):
 
     value: float | None = Field(
         description="policy: Q, expected discounted reward; planner: minus the expected number "
-        "of attempts to the goal with this move first, null in tasks too large for it"
+        "of attempts of its best plan that begins with this move (the optimum may have fewer), "
+        "null in tasks too large for it"
     )
     fewest: bool = Field(description="whether a plan with the fewest moves begins with it")
 

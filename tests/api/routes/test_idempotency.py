@@ -1,19 +1,15 @@
 """The header Idempotency-Key on a service without supervisor and live worlds."""
 
-from collections.abc import AsyncIterator, Iterator
-from contextlib import asynccontextmanager
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
-from fastapi import FastAPI
 from fastapi.testclient import TestClient
 
-from app.api.application import build_app
-from app.main import STATIC
 from app.store.engine import Store
 from tests.api.conftest import ADDRESS, require_description
-from tests.support.idle_service import idle_service
+from tests.support.idle_service import app_of, idle_service
 
 TRAIN = {"kind": "train", "preset": "pick-td3", "step_budget": 1000}
 KEY = {"Idempotency-Key": "z1"}
@@ -22,21 +18,7 @@ KEY = {"Idempotency-Key": "z1"}
 @pytest.fixture
 def idle(store: Store, tmp_path: Path) -> Iterator[TestClient]:
     """A client of the routes; no job runs."""
-    parts = idle_service(store, tmp_path)
-
-    @asynccontextmanager
-    async def lifespan(app: FastAPI) -> AsyncIterator[None]:
-        app.state.services = parts
-        yield
-
-    app = build_app(
-        lifespan=lifespan,
-        static=STATIC,
-        token=None,
-        version="test",
-        counts=parts.metrics,
-        traces=None,
-    )
+    app = app_of(idle_service(store, tmp_path))
     with TestClient(app, base_url=ADDRESS) as client:
         client.event_hooks = {"response": [require_description(app)]}
         yield client
