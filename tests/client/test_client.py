@@ -34,6 +34,13 @@ def client(address: str) -> Iterator[Client]:
         yield one
 
 
+@pytest.fixture
+def silent() -> Iterator[str]:
+    """Yield the address of a server that takes connections and never answers."""
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        yield f"http://127.0.0.1:{listener.getsockname()[1]}"
+
+
 def test_operations_are_those_of_the_document() -> None:
     written = {one.stem: one.read_text("utf-8") for one in TARGET.glob("*.py")}
     assert written == render(), "run `make client`"
@@ -120,11 +127,11 @@ def test_redirection_is_no_success(client: Client) -> None:
         client.delete_cell("")  # redirected to the list
 
 
-def test_a_file_has_more_time_than_other_requests(address: str) -> None:
+def test_a_file_has_more_time_than_other_requests(address: str, silent: str) -> None:
+    with Client(silent, timeout_s=1e-3) as hasty, pytest.raises(httpx.ReadTimeout):
+        hasty.list_recordings()
     content = csv_text(working(60)).encode()
     with Client(address, token=TOKEN, timeout_s=1e-3) as hasty:
-        with pytest.raises(httpx.TimeoutException):
-            hasty.list_recordings()
         assert hasty.create_recording(content, file_name="clip.csv", name="nods").name == "nods"
     with Client(address, token=TOKEN) as client:
         client.delete_recording("nods")
@@ -140,9 +147,7 @@ def test_time_to_ask_again_is_given_in_seconds_or_as_a_date() -> None:
         assert transport.retry_after_s(header) is None
 
 
-def test_stream_without_a_byte_fails(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_stream_without_a_byte_fails(monkeypatch: pytest.MonkeyPatch, silent: str) -> None:
     monkeypatch.setattr(transport, "SILENCE_S", 0.2)
-    with socket.create_server(("127.0.0.1", 0)) as listener:
-        address = f"http://127.0.0.1:{listener.getsockname()[1]}"
-        with Client(address, timeout_s=0.2) as one, pytest.raises(httpx.ReadTimeout):
-            next(one.stream_world("main"))  # the connection is taken, never answered
+    with Client(silent, timeout_s=0.2) as one, pytest.raises(httpx.ReadTimeout):
+        next(one.stream_world("main"))
