@@ -27,13 +27,13 @@ SLOW_FRAMES = f"""() => new Promise((resolve) => {{
   const draw = () => {{
     const start = performance.now();
     starts.push(start);
-    while (performance.now() < start + {SLOW_MS});
+    while (performance.now() <= start + {SLOW_MS});
     if (starts.length < 5) requestAnimationFrame(draw);
     else resolve(starts);
   }};
   requestAnimationFrame(draw);
 }})"""
-"""Resolves to the starts of five frames, each of which takes that long [ms]."""
+"""Resolves to the starts of five frames, each of which takes longer than that [ms]."""
 
 
 def shown_by_viewer(page: Page, name: str) -> bool:

@@ -55,7 +55,7 @@ def idle_service(store: Store, data_dir: Path) -> Services:
 
 
 def app_of(parts: Services, token: str | None = None) -> FastAPI:
-    """Return the routes of a service; requests need the token."""
+    """Return the routes of a service; requests need the token, if there is one."""
 
     @asynccontextmanager
     async def lifespan(app: FastAPI) -> AsyncIterator[None]:

@@ -117,7 +117,7 @@ async function watch(signal, history, unconfirmed, setState, setEpoch) {
         });
         const leave = follow(`v1/worlds/${WORLD}/events`, {
           onEvent: (name, snapshot) => {
-            // It may have been replaced after the question for its state, before the stream began.
+            // The world may have been replaced after its state was read, before the stream began.
             const isOther = snapshot?.candidates
               && (snapshot.cell !== world.cell || snapshot.tick < world.tick);
             if (name === "end" || isOther) return lost((replaced = true));
