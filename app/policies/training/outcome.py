@@ -1,8 +1,9 @@
 """Fit of the outcome probabilities of a pick to episodes of the finished policy.
 
 The policy acts greedily in the environments of its training. At random steps the observation is
-kept; when the episode ends it is labelled with the outcome and the time that was left to it.
-Each member of the ensemble learns from a bootstrap sample of the episodes.
+kept; when the episode ends it is labelled with the outcome and the time that it still took.
+Half of the episodes have less time than those of the training, down to almost none. Each member
+of the ensemble learns from a bootstrap sample of the episodes.
 """
 
 from typing import NamedTuple
@@ -23,7 +24,9 @@ LABELS = {SUCCESS: 0, COLLISION: 1, TIMEOUT: 2, UNFEASIBLE: 2}
 timeouts."""
 KEEP = 0.05
 """Share of the steps that are kept; first steps are always kept."""
-EPOCHS, BATCH, RATE, DECAY = 12, 1024, 1e-3, 1e-3
+SHORTENED = 0.5
+"""Share of the episodes whose time left at the start is drawn from 0 to their limit."""
+EPOCHS, BATCH, RATE, DECAY = 12, 1024, 1e-3, 0.1
 """Passes over the data, size of a minibatch, learning rate and weight decay."""
 LEAST_BATCHES = 16
 """Fewest minibatches of a pass; they are smaller where there is little data."""
@@ -61,11 +64,14 @@ def collect(
     rows: list[tuple[NDArray[np.float32], float, int, float, int]] = []
     episode, dt = np.arange(n), batch.arm.dt
     for _ in range(n_steps):
+        first = batch.state.elapsed < 0.5 * dt
+        shortened = np.flatnonzero(first & (rng.random(n) < SHORTENED))
+        limit = batch.state.time_left[shortened]
+        batch.set_time_left(shortened, np.ceil(rng.random(len(limit)) * limit / dt) * dt)
         with torch.inference_mode():
             obs = torch.as_tensor(batch.obs)
             act = actor(obs)
             value = critic.least(obs, act).numpy()
-        first = batch.state.elapsed < 0.5 * dt
         for e in np.flatnonzero(first | (rng.random(n) < KEEP)).tolist():
             sample = batch.obs[e].copy(), float(value[e]), float(batch.state.elapsed[e])
             kept[e].append(sample)

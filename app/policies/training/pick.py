@@ -42,7 +42,7 @@ from app.sim.scene.scene import HumanKind
 
 OUTCOME_SEED = 7_000_003
 """Added to the seed of a training for the episodes that outcomes are fitted to."""
-OUTCOME_SHARE = 0.15
+OUTCOME_SHARE = 0.25
 """Steps of these episodes, relative to the training."""
 FIRST_MODE = 0.05
 """First mode and lower limit of the starts of the curriculum: "close to 0" (thesis 5.3.4)."""

@@ -207,6 +207,11 @@ class PickBatch(EnvBatch):
         for e, goal in zip(envs, goals, strict=True):
             starts.set_goal(*shared, int(e), as_kernel_array(goal), self._work.robot)
 
+    def set_time_left(self, envs: Indices, time_left_s: Vec) -> None:
+        """Set the time left [s], shape (len(envs),), in some environments; observe again."""
+        self.state.time_left[envs] = time_left_s
+        self._look(envs)
+
     def set_starts(self, q: Vec) -> None:
         """Put the robots at rest at other starts [rad], shape (n_envs, 6)."""
         shared = self.world, self.settings.grasp, self.state

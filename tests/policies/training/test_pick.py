@@ -5,10 +5,13 @@ import pytest
 
 from app.policies.configs.pick import MONITORED, REACH_ONLY, THESIS, PickPreset
 from app.policies.inference.value_networks import ValueNetworks
+from app.policies.networks.pick import actor_of, critics_for
+from app.policies.training.outcome import collect
 from app.policies.training.pick import batch_of, collision_cost, settings_of, start, start_range
 from app.sim.cells.cell import load_cell
 from app.sim.pick.batch import DEFAULT_WEIGHTS, PickBatch
 from app.sim.pick.curriculum_batch import CurriculumPickBatch
+from app.sim.pick.kernels.observation_layout import SCALARS, TIME_SCALE
 from app.sim.pick.monitored_batch import MonitoredPickBatch
 from app.sim.scenario.kernels.episode import COLLISION, TIMEOUT
 from tests.policies.conftest import Recorder, preset_of
@@ -34,6 +37,23 @@ def test_rewards_contain_the_cost_that_was_set():
         result = batch.step(act)
         costs += result.rew[result.ended == COLLISION].tolist()
     assert costs and max(costs) < -95.0
+
+
+def test_outcomes_are_learned_from_episodes_of_any_length():
+    """Half of the episodes are shortened, and their labels obey the time they were given."""
+    preset = PickPreset()
+    batch = batch_of(preset, CELL, 32, 3)
+    networks = (make(preset, batch.obs_size) for make in (actor_of, critics_for))
+    data = collect(batch, *networks, n_steps=420, seed=3)
+    first = np.unique(data.episode, return_index=True)[1]
+    seen = TIME_SCALE * data.obs[:, SCALARS + 3]
+    left = seen[first]
+    usual = np.isin(left.round(2), (preset.episode.short_limit_s, preset.episode.time_limit_s))
+    assert 0.3 < usual.mean() < 0.7
+    assert left.min() < 2.0
+    assert (data.time_s <= seen + 1e-3).all()
+    timeout = data.label[first] == 2
+    assert data.time_s[first][timeout] == pytest.approx(left[timeout], abs=1e-3)
 
 
 def test_monitored_preset_steps_under_the_layer_with_the_settings_of_the_cell():
