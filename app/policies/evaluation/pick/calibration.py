@@ -1,9 +1,10 @@
 """Protocol ``risk-calibration``: whether predicted probabilities of outcomes agree with rates.
 
-Each row has people of one kind. In every episode one random target is pursued; at the start and
-at one random step the probabilities of success and contact are compared with the outcome. The
-expected calibration error (ECE) is the mean absolute difference of probability and rate over
-ten bins of equal counts; ``ece_floor`` is the ECE of perfectly calibrated predictions with
+Each row has people of one kind; in ``short-time`` they are the library's, and the episodes have
+any time left, down to almost none. In every episode one random target is pursued; at the start
+and at one random step the probabilities of success and contact are compared with the outcome.
+The expected calibration error (ECE) is the mean absolute difference of probability and rate
+over ten bins of equal counts; ``ece_floor`` is the ECE of perfectly calibrated predictions with
 these counts, if the two predictions of an episode come true together as often as possible. The
 Brier score is compared with that of a constant; AUC measures how well the probability ranks
 episodes.
@@ -17,6 +18,7 @@ Source: Guo et al., *On calibration of modern neural networks* (2017); Brier (19
 """
 
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -32,7 +34,7 @@ from app.policies.evaluation.pick.tasks import FASTER, PAIR, settings_of
 from app.policies.evaluation.rows import EvaluationRequest, Json
 from app.policies.inference.recalibration import fit_map, with_timeout
 from app.policies.inference.value_networks import ValueNetworks, pick_preset_of
-from app.sim.pick.batch import PickSettings
+from app.sim.pick.batch import PickBatch, PickSettings
 from app.sim.scenario.kernels.episode import COLLISION, SUCCESS
 
 DEFAULT_EPISODES = 2000
@@ -42,6 +44,8 @@ FEW = 200
 """Predictions of a recalibration by few of them."""
 LATEST_S = 4.0
 """Latest time at which a prediction is taken [s]."""
+SHORT_TIME = "short-time"
+"""Row of episodes with any time left."""
 Float = NDArray[np.float64]
 
 
@@ -84,6 +88,7 @@ def run_calibration(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
         "two-people": replace(usual, people=PAIR),
         "off-task": replace(usual, work=replace(usual.work, off_task=1.0)),
         "stops": replace(usual, work=replace(usual.work, at_rest=1.0)),
+        SHORT_TIME: usual,
     }
     if request.motions:
         kinds["recorded"] = beside_recordings(usual, request.motions, cell)
@@ -91,7 +96,8 @@ def run_calibration(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
     for name, settings in kinds.items():
         evaluator = Evaluator(networks, cell, n, request.seed, settings)
         rule = _Predictions(n, evaluator.batch.arm.dt, request.seed)
-        run = evaluator.run(rule, predicts=True)
+        start = partial(_shorten, seed=request.seed) if name == SHORT_TIME else _keep
+        run = evaluator.run(rule, start=start, predicts=True)
         kept = np.concatenate(rule.rows)
         found = np.concatenate(rule.predictions)
         row: dict[str, Any] = {"name": name, "n": n, "predictions": len(kept)}
@@ -105,6 +111,17 @@ def run_calibration(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
         rows.append(row)
         stated[name] = settings_of(evaluator)
     return {"settings": stated, "results": rows}
+
+
+def _keep(batch: PickBatch) -> None:
+    """Leave the starts of the episodes as they are."""
+
+
+def _shorten(batch: PickBatch, seed: int) -> None:
+    """Draw the time left of each episode from 0 to its limit, in control periods."""
+    left, dt = batch.state.time_left, batch.arm.dt
+    drawn = np.random.default_rng(seed).random(batch.n_envs) * left
+    left[:] = np.ceil(drawn / dt) * dt
 
 
 def calibration(
