@@ -55,7 +55,10 @@ def reliability(result: Json) -> Figure:
         view.plot([0, 100], [0, 100], color=GREY, lw=0.9)
         view.set_title(row["name"])
     axes[0, 0].legend(loc="upper left")
-    for view in axes[-1]:
+    for view in axes.flat[len(rows) :]:
+        view.set_axis_off()
+    for view in axes.flat[len(rows) - axes.shape[1] : len(rows)]:
+        view.tick_params(labelbottom=True)
         view.set_xlabel("predicted probability [%]")
     for view in axes[:, 0]:
         view.set_ylabel("observed rate [%]")
