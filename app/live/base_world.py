@@ -391,6 +391,7 @@ class BaseWorld(ABC, Generic[P]):
             contact=self.contact,
             checkpoint=None if policy is None else policy.checkpoint,
             policy_title=None if policy is None else policy.title,
+            observed_people=None if policy is None else policy.observed_people,
             elapsed_ms=None if decision is None else decision.elapsed_ms,
             counters=self.counters,
             decided_s=None if decision is None else self.decided_s,

@@ -274,6 +274,8 @@ class WorldSnapshot(ReadModel):
     """SHA-256 of the active checkpoint"""
     policy_title: str | None
     """title of the active policy"""
+    observed_people: int | None
+    """greatest number of people that the policy observes at once; null without one"""
     elapsed_ms: float | None
     """duration of the decision [ms]"""
     case: str | None = None

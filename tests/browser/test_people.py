@@ -43,6 +43,19 @@ def test_double_click_removes_one_person(open_page: Callable[..., Page]) -> None
     assert page.problems == []  # type: ignore[attr-defined]
 
 
+@pytest.mark.usefixtures("one_person")
+def test_page_says_how_many_of_the_people_the_policy_observes(
+    open_page: Callable[..., Page],
+) -> None:
+    page = open_page(scene=False)
+    hint = page.locator(".dock-hint", has_text="Observed")
+    for present in (2, 3):
+        expect(hint).to_have_count(0)
+        page.click('[data-action="add-person"]')
+        expect(page.locator("[data-person]")).to_have_count(present)
+    expect(hint).to_have_text("Observed: 2 of 3")
+
+
 def test_visitor_adds_a_person_changes_its_size_and_plays_a_recording(
     open_page: Callable[..., Page], one_person: str
 ) -> None:

@@ -33,6 +33,7 @@ class StraightPolicy:
     title = "straight moves"
     action = ActionSettings()
     grasp = GraspRules()
+    observed_people = 2
 
     def __init__(self, cell: Cell) -> None:
         self.cell, self.cell_sha256 = cell.name, cell.sha256

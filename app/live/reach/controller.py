@@ -15,7 +15,9 @@ from app.live.reach.interfaces import LiveReachPolicy
 from app.sim.cells.cell import Cell
 from app.sim.core.arrays import Vec
 from app.sim.people.kernels.pedestrian import R, X, Y
+from app.sim.people.kernels.people import MAX_PEOPLE
 from app.sim.reach.batch import ReachBatch, ReachSettings
+from app.sim.reach.reach_actor import observed_people
 from app.sim.robot.kernels.arm import Arm
 from app.sim.safety.layer import SafetySettings
 from app.sim.scene.scene import HumanKind
@@ -47,6 +49,14 @@ class ReachController:
     def inference_modes(self) -> tuple[str, ...]:
         """Inference modes of the policy."""
         return () if self.policy is None else self.policy.inference_modes
+
+    @property
+    def observed_people(self) -> int | None:
+        """Greatest number of people that the policy observes; None without a policy."""
+        if self.policy is None:
+            return None
+        alone = "distance-weighted" in self.inference_mode  # beside each of them
+        return MAX_PEOPLE if alone else observed_people(self.policy.view)
 
     def act(
         self,

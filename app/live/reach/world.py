@@ -200,5 +200,6 @@ class LiveReachWorld(BaseWorld[LivePedestrians]):
             known,
             checkpoint=policy.checkpoint,
             policy_title=policy.title,
+            observed_people=controller.observed_people,
             elapsed_ms=controller.elapsed_ms,
         )

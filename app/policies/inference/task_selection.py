@@ -135,10 +135,13 @@ class TaskChooser(TrainedPolicy):
         super().__init__(checkpoint)
         if cell is not None:
             require_cell(cell, self.cell, self.cell_sha256)
-        self.action: ActionSettings = pick_preset_of(checkpoint).action.settings
+        preset = pick_preset_of(checkpoint)
+        self.action: ActionSettings = preset.action.settings
         """Meaning of the actions (docs/method.md 2.2)."""
-        self.grasp: GraspRules = pick_preset_of(checkpoint).episode.grasp
+        self.grasp: GraspRules = preset.episode.grasp
         """Phases of a pick."""
+        self.observed_people = 2 if preset.episode.observation == "two-people" else 1
+        """Greatest number of people that the policy observes at once."""
         self._networks = ValueNetworks(checkpoint)
         self._arm, self._people = arm_of(self._cell), people_of(self._cell)
         n_obs = self._networks.n_obs

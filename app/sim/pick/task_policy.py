@@ -152,6 +152,10 @@ class TaskPolicy(PolicyIdentity, Protocol):
     def grasp(self) -> GraspRules:
         """Phases of a pick; ``depth`` 0 where targets are only reached."""
 
+    @property
+    def observed_people(self) -> int:
+        """Greatest number of people that it observes at once."""
+
     def decide(
         self,
         q: Vec,

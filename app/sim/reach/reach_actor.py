@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from app.sim.core.arrays import Vec
 from app.sim.core.policy_identity import PolicyIdentity
+from app.sim.people.kernels.people import MAX_PEOPLE
 from app.sim.reach.batch import GoalRule, ViewName
 from app.sim.robot.actions import ActionSettings
 
@@ -30,6 +31,11 @@ class ReachPolicyInfo(PolicyIdentity, Protocol):
     @property
     def targets(self) -> Vec | None:
         """Training goals [m], shape (n, 3); None for a whole box."""
+
+
+def observed_people(view: ViewName) -> int:
+    """Return the greatest number of people that an observation contains."""
+    return MAX_PEOPLE if view == "people-set" else 1
 
 
 class ReachActor(ReachPolicyInfo, Protocol):

@@ -34,6 +34,16 @@ def test_policy_without_targets_cannot_be_interpolated() -> None:
     )
 
 
+@pytest.mark.parametrize(("view", "direct"), [("features", 1), ("people-set", 4)])
+def test_snapshot_says_how_many_people_the_policy_observes(view: str, direct: int) -> None:
+    policy = ReachPolicy(untrained_reach(width=32, observation=view))
+    world = LiveReachWorld(CELL, TrainedReachPolicy(policy), seed=1)
+    for mode, observed in (("direct", direct), ("distance-weighted", 4)):
+        world.apply(SetInferenceMode(inference_mode=mode))
+        assert world.snapshot().observed_people == observed
+    assert LiveReachWorld(CELL, None, seed=1).snapshot().observed_people is None
+
+
 def test_live_state_is_seen_as_the_batch_sees_it(policy: ReachPolicy) -> None:
     live = TrainedReachPolicy(policy)
     batch = ReachBatch(CELL, 1, 11, ReachSettings(observation=policy.view))

@@ -57,6 +57,16 @@ def test_order_of_candidates_does_not_change_their_values(chooser):
     assert one.values == pytest.approx(other.values[::-1], abs=1e-5)
 
 
+def test_as_many_people_change_the_values_as_the_policy_observes(chooser):
+    nearer_and_nearer = [person(0.5, y) for y in (2.2, 1.8, 1.4)]
+    values = [
+        chooser.decide(HOME, np.zeros(6), nearer_and_nearer[n:], cubes("cube1")).values
+        for n in range(3)
+    ]
+    assert chooser.observed_people == 2
+    assert values[0] == values[1] != values[2]
+
+
 @pytest.mark.parametrize("hand", ["r", "l"])
 @pytest.mark.parametrize(
     ("start", "taken", "free"),

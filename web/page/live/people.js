@@ -31,7 +31,6 @@ export function People({ world, send, children }) {
   const [picked, setPicked] = useState(0);
   const person = people.find((one) => one.id === picked) ?? people[0] ?? null;
   const [sized, setSized] = useState(false);
-  const tracked = people.length > 1 && people.find((one) => one.nearest);
   return html`<div class="dock-row">
       <span class="dock-label" id="people-label">People</span>
       <div class="people" role="group" aria-labelledby="people-label">
@@ -43,8 +42,7 @@ export function People({ world, send, children }) {
           data-action="add-person" title="A further person enters the cell" onClick=${() => send({ tag: "add-person" })}>
           <${Icon} name="plus" />Add</button>`}
       </div>
-      ${tracked && !world.reach?.inference_mode.includes("distance-weighted") && html`<p class="dock-hint" title="This policy knows one person at a time.">
-        The policy sees the nearest: ${nameOf(tracked.id)}.</p>`}
+      <${Observed} people=${people} most=${world.observed_people} />
       <span class="spacer"></span>
       ${children}
     </div>
@@ -55,6 +53,17 @@ export function People({ world, send, children }) {
     ${person && !person.cylinder && html`<${MotionSource} key=${person.id} person=${person} send=${send}
       sized=${sized} onSized=${() => setSized(!sized)} />`}
     ${person && !person.cylinder && sized && html`<${Size} key=${`size-${person.id}`} person=${person} send=${send} />`}`;
+}
+
+/** Which people the policy observes, where it does not observe all. */
+function Observed({ people, most }) {
+  if (most === null || people.length <= most) return null;
+  const nearest = people.find((one) => one.nearest);
+  return most === 1
+    ? html`<p class="dock-hint" title="This policy observes one person: the nearest to the robot">
+      Observed: ${nameOf(nearest.id)}</p>`
+    : html`<p class="dock-hint" title="This policy observes the person nearest to the robot and, of the others, the one nearest to the target">
+      Observed: ${most} of ${people.length}</p>`;
 }
 
 /** Who moves a person; with a recording, which one and how far it is. */
