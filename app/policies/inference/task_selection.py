@@ -182,7 +182,9 @@ class TaskChooser(TrainedPolicy):
             actions=found.act,
             qd_target=self._speeds(q, qd, found.act),
             reachable=tuple(found.reachable.tolist()),
-            outside=query.state.outside + self._ranges.of_state(q, qd, person, nearest),
+            outside=query.state.outside
+            + self._ranges.of_state(q, qd, person, nearest)
+            + self._ranges.of_time(time_left_s),
             outside_candidates=self._ranges.of_goals(query.goals),
             outcomes=None if found.outcomes is None else estimates_of(found.outcomes),
             checkpoint=self.checkpoint,

@@ -23,7 +23,9 @@ class TrainedRanges:
 
     def __init__(self, checkpoint: Checkpoint) -> None:
         ranges = checkpoint.manifest["trained_range"]
-        self._trained_without_people = pick_preset_of(checkpoint).people.human_absent > 0.0
+        preset = pick_preset_of(checkpoint)
+        self._trained_without_people = preset.people.human_absent > 0.0
+        self._time_limit_s = preset.episode.time_limit_s
         self._low = {name: np.array(entry["low"]) for name, entry in ranges.items()}
         self._high = {name: np.array(entry["high"]) for name, entry in ranges.items()}
         self._state, self._goal = (
@@ -66,6 +68,13 @@ class TrainedRanges:
             *self._outside("human_q", person.q, f"{path}.q", human.JOINT_NAMES),
             *self._outside("human_qd", person.qd, f"{path}.qd", human.JOINT_NAMES),
         )
+
+    def of_time(self, time_left_s: float) -> tuple[OutOfRangeValue, ...]:
+        """Return the time left [s], where no episode of the training had it."""
+        limit = self._time_limit_s
+        if 0.0 <= time_left_s <= limit:
+            return ()
+        return (OutOfRangeValue(field="time_left_s", value=time_left_s, low=0.0, high=limit),)
 
     def of_goals(self, goals: Vec) -> tuple[tuple[OutOfRangeValue, ...], ...]:
         """Return the coordinates of each target outside the range, shape (n, 3) [m]."""
