@@ -74,10 +74,15 @@ def work_of(people: PickPeople) -> HumanMotionConfig:
     )
 
 
+def workers_of(people: PickPeople) -> tuple[HumanKind, ...] | None:
+    """Return the workers of a preset; None for one, as in the cell."""
+    worker: HumanKind = "worker"
+    return None if people.n_people == 1 else (worker,) * people.n_people
+
+
 def settings_of(preset: PickPreset) -> PickSettings:
     """Return the scenario's settings of a preset."""
-    worker: HumanKind = "worker"
-    episode, n_people = preset.episode, preset.people.n_people
+    episode = preset.episode
     return PickSettings(
         time_limit_s=episode.time_limit_s,
         short_limit_s=episode.short_limit_s,
@@ -88,7 +93,7 @@ def settings_of(preset: PickPreset) -> PickSettings:
         at_target_share=episode.at_target_share,
         anywhere_share=episode.anywhere_share,
         grasp=episode.grasp,
-        people=None if n_people == 1 else (worker,) * n_people,
+        people=workers_of(preset.people),
         work=work_of(preset.people),
         observation=episode.observation,
         action=preset.action.settings,

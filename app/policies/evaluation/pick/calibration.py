@@ -1,7 +1,8 @@
 """Protocol ``risk-calibration``: whether predicted probabilities of outcomes agree with rates.
 
-Each row has people of one kind; in ``short-time`` they are the library's, and the episodes have
-any time left, down to almost none. In every episode one random target is pursued; at the start
+Each row has people of one kind. In ``mixture`` they are those of the training, in postures that
+it did not have; in ``short-time`` they are the library's, and the episodes have any time left,
+down to almost none. In every episode one random target is pursued; at the start
 and at one random step the probabilities of success and contact are compared with the outcome.
 The expected calibration error (ECE) is the mean absolute difference of probability and rate
 over ten bins of equal counts; ``ece_floor`` is the ECE of perfectly calibrated predictions with
@@ -34,6 +35,7 @@ from app.policies.evaluation.pick.tasks import FASTER, PAIR, settings_of
 from app.policies.evaluation.rows import EvaluationRequest, Json
 from app.policies.inference.recalibration import fit_map, with_timeout
 from app.policies.inference.value_networks import ValueNetworks, pick_preset_of
+from app.policies.training.pick import work_of, workers_of
 from app.sim.pick.batch import PickBatch, PickSettings
 from app.sim.scenario.kernels.episode import COLLISION, SUCCESS
 
@@ -81,13 +83,16 @@ def run_calibration(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
     networks, cell = ValueNetworks(checkpoint), cell_of(checkpoint.manifest)
     if not networks.predicts:
         raise InvalidInput("checkpoint", checkpoint.sha256[:12], "must predict outcomes")
-    usual = settings_for((1, 1), pick_preset_of(checkpoint))
+    preset = pick_preset_of(checkpoint)
+    usual = settings_for((1, 1), preset)
+    trained = replace(work_of(preset.people), seed=usual.work.seed)
     kinds: dict[str, PickSettings] = {
         "library": usual,
         "faster": replace(usual, work=replace(usual.work, pace=FASTER)),
         "two-people": replace(usual, people=PAIR),
         "off-task": replace(usual, work=replace(usual.work, off_task=1.0)),
         "stops": replace(usual, work=replace(usual.work, at_rest=1.0)),
+        "mixture": replace(usual, people=workers_of(preset.people), work=trained),
         SHORT_TIME: usual,
     }
     if request.motions:

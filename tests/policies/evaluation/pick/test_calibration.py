@@ -83,9 +83,13 @@ def test_a_checkpoint_without_probabilities_is_refused():
 
 def test_every_kind_of_people_has_a_row_with_both_outcomes():
     result = evaluate("risk-calibration", pretrained.load("pick"), episodes=60, seed=5)
-    names = [row["name"] for row in result["results"]]
-    assert names == ["library", "faster", "two-people", "off-task", "stops"]
-    for row in result["results"]:
+    rows = {row["name"]: row for row in result["results"]}
+    one_kind = ["library", "faster", "two-people", "off-task", "stops"]
+    assert list(rows) == [*one_kind, "mixture", "short-time"]
+    assert rows["mixture"]["success"]["rate"] != rows["two-people"]["success"]["rate"]
+    short = rows["short-time"]["success"]
+    assert short["brier"] < 0.7 * short["brier_constant"]
+    for row in rows.values():
         assert 60 <= row["predictions"] <= 120
         for what in ("success", "contact"):
             assert sum(one["n"] for one in row[what]["bins"]) == row["predictions"]
