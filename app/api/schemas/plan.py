@@ -161,8 +161,8 @@ class PlannedMove(SortingMove):
         description="motion to the object, from the present state; null while it is held"
     )
     to_place: PlannedMotion = Field(
-        description="motion with the object, which begins over it, or from the present state "
-        "while it is held; people as they are now"
+        description="motion with the object, which begins over it with 10 s left, or from the "
+        "present state while it is held; people as they are now"
     )
 
 

@@ -41,6 +41,8 @@ from app.sim.sorting.names import names_of
 from app.sim.sorting.near_optimal_moves import MARGIN, NearOptimalMoves, near_optimal_moves
 from app.sim.sorting.state import Move, SortingState
 
+PLACE_S = 10.0
+"""Time left for the motion with an object when it begins [s]."""
 Symbol = Literal["pick", "place", "return"]
 """Kind of a motion: grasp an object, set the held one down, or put it back."""
 
@@ -268,8 +270,9 @@ class SortingPlanner:
             ends = [self._ends(query.state, move) for move in moves]
             over, _, _ = target_configurations(self._arm, self._policy.grasp, ends[0][:1])
             targets = {m.place: end[1] for m, end in zip(moves, ends, strict=True)}
+            candidates = self._candidates(targets)
             decision = self._policy.decide(
-                over[0], np.zeros(6), query.people, self._candidates(targets)
+                over[0], np.zeros(6), query.people, candidates, time_left_s=PLACE_S
             )
             for place, one in _estimates(decision, targets).items():
                 found[Move(pick, place)] = one
