@@ -184,7 +184,7 @@ class TaskChooser(TrainedPolicy):
             reachable=tuple(found.reachable.tolist()),
             outside=query.state.outside
             + self._ranges.of_state(q, qd, person, nearest)
-            + self._ranges.of_time(time_left_s),
+            + self._ranges.of_time(query.terms.time_left_s),
             outside_candidates=self._ranges.of_goals(query.goals),
             outcomes=None if found.outcomes is None else estimates_of(found.outcomes),
             checkpoint=self.checkpoint,
@@ -234,7 +234,8 @@ class TaskChooser(TrainedPolicy):
             rule = "needs a checkpoint with outcome probabilities"
             raise InvalidInput("objective", terms.objective, rule, ("value",))
         last = ids.index(terms.previous) if terms.previous in ids else None
-        return _SelectionQuery(state, ids, goals, last, terms)
+        observed = min(LONGEST_S, max(0.0, terms.time_left_s))
+        return _SelectionQuery(state, ids, goals, last, terms._replace(time_left_s=observed))
 
     def _evaluate(
         self, query: "_SelectionQuery", people: tuple[Vec, Vec, Vec]
@@ -242,9 +243,8 @@ class TaskChooser(TrainedPolicy):
         """Return values and choices beside people, or beside each of m sets of people."""
         terms, last = query.terms, query.last
         q, qd, _ = query.state.clamped
-        left = min(LONGEST_S, max(0.0, terms.time_left_s))
         obs, reachable = self._observer.observe(
-            (q, qd), people, query.goals, left, last, terms.progress
+            (q, qd), people, query.goals, terms.time_left_s, last, terms.progress
         )
         act, values, outcomes = self._networks.evaluate(obs)
         by_set = values.reshape(-1, len(query.ids))

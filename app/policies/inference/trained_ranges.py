@@ -70,9 +70,9 @@ class TrainedRanges:
         )
 
     def of_time(self, time_left_s: float) -> tuple[OutOfRangeValue, ...]:
-        """Return the time left [s], where no episode of the training had it."""
+        """Return the observed time left [s], where no episode of the training had it."""
         limit = self._time_limit_s
-        if 0.0 <= time_left_s <= limit:
+        if time_left_s <= limit:
             return ()
         return (OutOfRangeValue(field="time_left_s", value=time_left_s, low=0.0, high=limit),)
 
