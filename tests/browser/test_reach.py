@@ -45,7 +45,7 @@ def test_visitor_opens_the_cell_sees_it_reach_and_obstructs_it(
 ) -> None:
     page = open_page(scene=False)
     page.locator('[data-role="cell"]').select_option(CELL.name)
-    page.wait_for_selector('[data-role="override"]')
+    page.wait_for_selector('[data-choice="safety:measured"]')  # which other cells lack
     page.click('[data-mode="manual"]')
     tell(server, {"tag": "move-person", "pelvis": [-2.0, 2.0, 0.0]})
     page.locator('[data-role="speed"]').select_option("4")
