@@ -66,8 +66,7 @@ def collect(
     for _ in range(n_steps):
         first = batch.state.elapsed < 0.5 * dt
         shortened = np.flatnonzero(first & (rng.random(n) < SHORTENED))
-        limit = batch.state.time_left[shortened]
-        batch.set_time_left(shortened, np.ceil(rng.random(len(limit)) * limit / dt) * dt)
+        batch.shorten(shortened, rng.random(len(shortened)))
         with torch.inference_mode():
             obs = torch.as_tensor(batch.obs)
             act = actor(obs)

@@ -207,9 +207,15 @@ class PickBatch(EnvBatch):
         for e, goal in zip(envs, goals, strict=True):
             starts.set_goal(*shared, int(e), as_kernel_array(goal), self._work.robot)
 
-    def set_time_left(self, envs: Indices, time_left_s: Vec) -> None:
-        """Set the time left [s], shape (len(envs),), in some environments; observe again."""
-        self.state.time_left[envs] = time_left_s
+    def shorten(self, envs: Indices, shares: Vec) -> None:
+        """Leave a share of the time left, in whole control periods; observe again.
+
+        Args:
+            envs: Environments.
+            shares: Shares in [0, 1], shape (len(envs),); rounded up to a control period.
+        """
+        left, dt = self.state.time_left, self.arm.dt
+        left[envs] = np.ceil(shares * left[envs] / dt) * dt
         self._look(envs)
 
     def set_starts(self, q: Vec) -> None:

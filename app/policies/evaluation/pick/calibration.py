@@ -2,13 +2,12 @@
 
 Each row has people of one kind. In ``mixture`` they are those of the training, in postures that
 it did not have; in ``short-time`` they are the library's, and the episodes have any time left,
-down to almost none. In every episode one random target is pursued; at the start
-and at one random step the probabilities of success and contact are compared with the outcome.
-The expected calibration error (ECE) is the mean absolute difference of probability and rate
-over ten bins of equal counts; ``ece_floor`` is the ECE of perfectly calibrated predictions with
-these counts, if the two predictions of an episode come true together as often as possible. The
-Brier score is compared with that of a constant; AUC measures how well the probability ranks
-episodes.
+down to almost none. In every episode one random target is pursued; at the start and at one
+random step the probabilities of success and contact are compared with the outcome. The expected
+calibration error (ECE) is the mean absolute difference of probability and rate over ten bins of
+equal counts; ``ece_floor`` is the ECE of perfectly calibrated predictions with these counts, if
+the two predictions of an episode come true together as often as possible. The Brier score is
+compared with that of a constant; AUC measures how well the probability ranks episodes.
 
 The probabilities were fitted to the mixture of people of the training; an observation does not
 reveal the kind of a person. ``recalibrated`` states ECE and Brier score after a recalibration
@@ -123,10 +122,9 @@ def _keep(batch: PickBatch) -> None:
 
 
 def _shorten(batch: PickBatch, seed: int) -> None:
-    """Draw the time left of each episode from 0 to its limit, in control periods."""
-    left, dt = batch.state.time_left, batch.arm.dt
-    drawn = np.random.default_rng(seed).random(batch.n_envs) * left
-    left[:] = np.ceil(drawn / dt) * dt
+    """Draw the time left of each episode from 0 to its limit."""
+    shares = np.random.default_rng(seed).random(batch.n_envs)
+    batch.shorten(np.arange(batch.n_envs), shares)
 
 
 def calibration(
