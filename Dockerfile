@@ -15,8 +15,10 @@ RUN apt-get update -qq \
     && rm -rf /var/lib/apt/lists/*
 WORKDIR /srv/tandem
 COPY Makefile requirements.lock ./
+COPY tools/install.py tools/
 ARG TORCH_INDEX=https://download.pytorch.org/whl/cpu
-RUN make .venv/runtime.stamp PYTHON=python${PYTHON} TORCH_INDEX=$TORCH_INDEX
+# Bytecode of all packages: a container cannot write it.
+RUN UV_COMPILE_BYTECODE=1 make .venv/runtime.stamp PYTHON=python${PYTHON} TORCH_INDEX=$TORCH_INDEX
 
 FROM python:${PYTHON}-slim
 # Pinocchio is linked against GNU OpenMP, which slim images do not have.

@@ -14,11 +14,10 @@ PYTHON ?= $(shell for p in python3.11 python3.12 python3; do \
 	&& echo $$p && break; done)
 TORCH ?= 2.13.0
 TORCH_INDEX ?= https://download.pytorch.org/whl/cpu
-UV ?= 0.13.8
 
 VENV := .venv
 PY := $(VENV)/bin/python
-PIP := $(PY) -m pip --disable-pip-version-check
+INSTALL := $(PY) tools/install.py
 # Exact versions with the hashes of every file of each, for all platforms and Pythons; what
 # torch's CUDA build asks for stays out together with torch.
 RESOLVE = $(VENV)/bin/uv pip compile --quiet --no-config --universal --python-version 3.11 \
@@ -33,16 +32,8 @@ CUDA_PACKAGES := triton cuda-bindings cuda-pathfinder cuda-toolkit \
 SIDE_BY_SIDE = --numprocesses $$((1 + $$(getconf _NPROCESSORS_ONLN))) --maxprocesses 4 \
 	--dist loadgroup --no-loadscope-reorder
 
-# $(call INSTALL_LOCK,file): installs exactly what the file lists, and counts along. pip's
-# notes on a configured index that lacks a package are left out: another one has it. pip would
-# write all bytecode in one process, which took half of the time, that of packages' tests too.
-INSTALL_LOCK = $(PIP) install --require-hashes --no-deps --no-compile --progress-bar off -r $(1) \
-	2> >(grep -v '^WARNING: Location' >&2) \
-	| awk -v total=$$(grep -c '==' $(1)) -v every=$$(test -t 2 && echo 1 || echo 25) ' \
-		/^(Collecting|Requirement already)/ && ++n % every == 0 { \
-			printf "%s    %d of %d packages", (every > 1 && n > every ? "\n" : "\r"), n, total; fflush() } \
-		/^Installing/ { printf ", installing them"; fflush() } END { print "" }' \
-	&& { $(PY) -m compileall -q -j 0 -x '/tests?/' $(VENV)/lib/python*/site-packages >/dev/null 2>&1 || true; }
+# $(call INSTALL_LOCK,file): installs exactly what the file lists.
+INSTALL_LOCK = $(INSTALL) --require-hashes --no-deps -r $(1)
 
 SAY := @printf '==> %s\n'
 
@@ -110,9 +101,8 @@ client: $(VENV)/dev.stamp ## write app/client/operations/ from the OpenAPI docum
 	@$(PY) -m tools.generate_client
 
 lock: $(VENV)/dev.stamp ## resolve the lock files (UPGRADE=--upgrade: newest versions)
-	@$(PIP) install --quiet uv==$(UV)
-	@$(RESOLVE) --extra postgres -o requirements.lock
-	@$(RESOLVE) --extra postgres --extra ray --extra dev --extra docs --extra onnx --extra otel -c requirements.lock -o requirements-dev.lock
+	@$(RESOLVE) --extra postgres --extra setup -o requirements.lock
+	@$(RESOLVE) --extra postgres --extra setup --extra ray --extra dev --extra docs --extra onnx --extra otel -c requirements.lock -o requirements-dev.lock
 
 clean: ## remove the virtual environment and the caches
 	rm -rf $(VENV) .mypy_cache .ruff_cache .pytest_cache .import_linter_cache
@@ -125,10 +115,10 @@ $(VENV)/created.stamp:
 
 $(VENV)/torch.stamp: $(VENV)/created.stamp
 	$(SAY) "PyTorch $(TORCH): its CPU build (about 200 MB), where one is to be had"
-	@$(PIP) install --quiet --no-compile --only-binary torch "torch==$(TORCH)+cpu" 2>/dev/null \
-		|| { test -n "$(TORCH_INDEX)" && $(PIP) install --quiet --no-compile --retries 1 --timeout 15 --index-url $(TORCH_INDEX) "torch==$(TORCH)" 2>/dev/null; } \
+	@$(INSTALL) --quiet --only-binary torch "torch==$(TORCH)+cpu" 2>/dev/null \
+		|| { test -n "$(TORCH_INDEX)" && UV_HTTP_TIMEOUT=15 PIP_TIMEOUT=15 PIP_RETRIES=1 $(INSTALL) --quiet --index-url $(TORCH_INDEX) "torch==$(TORCH)" 2>/dev/null; } \
 		|| { echo "    no CPU build found: the default index it is (on Linux several GB of CUDA packages)"; \
-			$(PIP) install --quiet --no-compile "torch==$(TORCH)"; }
+			$(INSTALL) --quiet "torch==$(TORCH)"; }
 	@$(PY) -W ignore -c 'import torch; print("    torch", torch.__version__, "(CUDA build)" if torch.version.cuda else "(CPU build)")'
 	@touch $@
 
@@ -140,7 +130,7 @@ $(VENV)/runtime.stamp: $(VENV)/torch.stamp requirements.lock
 $(VENV)/dev.stamp: $(VENV)/runtime.stamp requirements-dev.lock
 	$(SAY) "what tests and checks need, from requirements-dev.lock"
 	@$(call INSTALL_LOCK,requirements-dev.lock)
-	@$(PIP) check
+	@$(PY) -m pip check
 	@touch $@
 
 # The server does this too, at every start; done here, it starts in seconds.

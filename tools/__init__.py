@@ -12,6 +12,7 @@ fit_capsules            Fit capsules that contain the UR10's collision meshes; r
 generate_client         Writes ``app/client/operations/`` from the OpenAPI document
 import_contracts        Import-linter contract: compiled kernels import only kernels, ``core``
                         and ``geometry``
+install                 Install packages as ``pip install`` does, in a third of its time
 make_primitives         Generate the shipped task primitives: ``python -m
                         tools.make_primitives``
 model_mannequin         Model the drawn person: a worker of round cones, in a helmet and a vest
