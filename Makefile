@@ -32,8 +32,8 @@ CUDA_PACKAGES := triton cuda-bindings cuda-pathfinder cuda-toolkit \
 SIDE_BY_SIDE = --numprocesses $$((1 + $$(getconf _NPROCESSORS_ONLN))) --maxprocesses 4 \
 	--dist loadgroup --no-loadscope-reorder
 
-# $(call INSTALL_LOCK,file): installs exactly what the file lists.
-INSTALL_LOCK = $(INSTALL) --require-hashes --no-deps -r $(1)
+# $(call INSTALL_LOCK,file): installs exactly what the file lists, with progress on a terminal.
+INSTALL_LOCK = $(INSTALL) $$(test -t 2 || echo --quiet) --require-hashes --no-deps -r $(1)
 
 SAY := @printf '==> %s\n'
 
