@@ -14,7 +14,7 @@ RUN apt-get update -qq \
     && apt-get install -y -qq --no-install-recommends make \
     && rm -rf /var/lib/apt/lists/*
 WORKDIR /srv/tandem
-COPY Makefile requirements.lock ./
+COPY Makefile requirements.lock requirements-setup.lock ./
 COPY tools/install.py tools/
 ARG TORCH_INDEX=https://download.pytorch.org/whl/cpu
 # Bytecode of all packages: a container cannot write it.

@@ -22,7 +22,7 @@ INSTALL := $(PY) tools/install.py
 # torch's CUDA build asks for stays out together with torch.
 RESOLVE = $(VENV)/bin/uv pip compile --quiet --no-config --universal --python-version 3.11 \
 	--fork-strategy fewest --generate-hashes --no-annotate --custom-compile-command "make lock" \
-	$(addprefix --no-emit-package ,torch $(CUDA_PACKAGES)) $(UPGRADE) pyproject.toml
+	$(addprefix --no-emit-package ,torch $(CUDA_PACKAGES)) $(UPGRADE)
 CUDA_PACKAGES := triton cuda-bindings cuda-pathfinder cuda-toolkit \
 	$(addprefix nvidia-,cublas cuda-cupti cuda-nvrtc cuda-runtime cudnn-cu13 cufft cufile curand cusolver cusparse cusparselt-cu13 nccl-cu13 nvjitlink nvshmem-cu13 nvtx)
 
@@ -100,9 +100,11 @@ world: $(VENV)/dev.stamp ## measure, draw and write docs/world.md
 client: $(VENV)/dev.stamp ## write app/client/operations/ from the OpenAPI document
 	@$(PY) -m tools.generate_client
 
-lock: $(VENV)/dev.stamp ## resolve the lock files (UPGRADE=--upgrade: newest versions)
-	@$(RESOLVE) --extra postgres --extra setup -o requirements.lock
-	@$(RESOLVE) --extra postgres --extra setup --extra ray --extra dev --extra docs --extra onnx --extra otel -c requirements.lock -o requirements-dev.lock
+lock: $(VENV)/created.stamp ## resolve the lock files (UPGRADE=--upgrade: newest versions)
+	@$(INSTALL) --quiet --require-hashes --no-deps -r requirements-setup.lock
+	@$(RESOLVE) --group setup -o requirements-setup.lock
+	@$(RESOLVE) pyproject.toml --extra postgres -o requirements.lock
+	@$(RESOLVE) pyproject.toml --extra postgres --extra ray --extra dev --extra docs --extra onnx --extra otel -c requirements.lock -o requirements-dev.lock
 
 clean: ## remove the virtual environment and the caches
 	rm -rf $(VENV) .mypy_cache .ruff_cache .pytest_cache .import_linter_cache

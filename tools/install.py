@@ -4,19 +4,18 @@
 
 The arguments are those of ``pip install`` that uv knows, too. uv installs; it does not read
 pip's configuration, so that the places and certificates of that are handed to it in its own
-environment variables. Where uv cannot be had, or fails, pip installs. uv itself comes from
-``requirements.lock``, as every package with its version and its hashes.
+environment variables. Where uv cannot be had, or fails, pip installs. pip installs uv itself
+first, the version of ``requirements-setup.lock``, whose hashes are checked.
 """
 
 import ast
 import os
 import subprocess
 import sys
-import tempfile
 from importlib.util import find_spec
 from pathlib import Path
 
-LOCK = Path(__file__).resolve().parents[1] / "requirements.lock"
+LOCK = Path(__file__).resolve().parents[1] / "requirements-setup.lock"
 PIP = [sys.executable, "-m", "pip", "--disable-pip-version-check"]
 VARIABLES = {
     "index-url": "UV_DEFAULT_INDEX",
@@ -48,24 +47,9 @@ def main(arguments: list[str]) -> int:
 def has_uv() -> bool:
     """Return whether there is uv, after an attempt to install it."""
     if find_spec("uv") is None:
-        with tempfile.NamedTemporaryFile("w", suffix=".txt") as file:
-            file.write(pinned("uv", LOCK.read_text(encoding="utf-8")))
-            file.flush()
-            options = ["--quiet", "--require-hashes", "--no-deps", "-r", file.name]
-            done = subprocess.run([*PIP, "install", *options], capture_output=True)
-        return done.returncode == 0
+        options = ["--quiet", "--require-hashes", "--no-deps", "-r", str(LOCK)]
+        return subprocess.run([*PIP, "install", *options], capture_output=True).returncode == 0
     return True
-
-
-def pinned(name: str, lock: str) -> str:
-    """Return the entry of a package in a lock file: its version and hashes."""
-    lines = iter(lock.splitlines(keepends=True))
-    entry = next(line for line in lines if line.startswith(f"{name}=="))
-    for line in lines:
-        if not line.startswith(" "):
-            break
-        entry += line
-    return entry
 
 
 def configuration() -> str:
