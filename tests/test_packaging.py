@@ -59,6 +59,7 @@ def test_every_declared_package_is_locked_but_torch() -> None:
     runtime, everything = pins("requirements.lock"), pins("requirements-dev.lock")
     for lines, lock in (
         (PROJECT["project"]["dependencies"], runtime),
+        (PROJECT["dependency-groups"]["setup"], pins("requirements-setup.lock")),
         (
             extras["dev"] + extras["client"] + extras["onnx"] + extras["otel"] + extras["ray"],
             everything,
@@ -77,7 +78,7 @@ def test_locks_hold_versions_and_hashes_and_no_address() -> None:
     line = re.compile(
         r"#.*|[a-z0-9.-]+==[^ ]+( ; [^\\]+)? \\|    --hash=sha256:[0-9a-f]{64}( \\)?"
     )
-    for name in ("requirements.lock", "requirements-dev.lock"):
+    for name in ("requirements.lock", "requirements-dev.lock", "requirements-setup.lock"):
         for text in (ROOT / name).read_text(encoding="utf-8").splitlines():
             assert line.fullmatch(text), text
 
@@ -90,6 +91,16 @@ def test_locks_leave_torch_and_its_cuda_packages_out() -> None:
 def test_makefile_installs_the_declared_torch() -> None:
     (torch,) = (line for line in PROJECT["project"]["dependencies"] if line.startswith("torch"))
     assert f"TORCH ?= {torch.removeprefix('torch==')}\n" in (ROOT / "Makefile").read_text()
+
+
+def test_image_copies_files_of_its_build_context() -> None:
+    sent = {
+        line[1:] for line in (ROOT / ".dockerignore").read_text().splitlines() if "!" in line
+    }
+    copied = re.findall(r"^COPY (?!--from)(.+) \S+$", (ROOT / "Dockerfile").read_text(), re.M)
+    files = {name for names in copied for name in names.split()} - {"."}
+    assert "requirements.lock" in files
+    assert files <= sent
 
 
 def test_every_data_file_belongs_to_the_package() -> None:
