@@ -29,6 +29,7 @@ from app.policies.networks.pick import CLEARANCE
 from app.sim.cells.cell import Cell, require_cell
 from app.sim.core.arrays import Vec
 from app.sim.core.kernels.bounds import are_inside
+from app.sim.core.out_of_range import OutOfRangeValue
 from app.sim.human import model as human
 from app.sim.human.person import Person
 from app.sim.perception.observed_people import (
@@ -41,7 +42,7 @@ from app.sim.perception.observed_people import (
 from app.sim.pick.batch import step_robot
 from app.sim.pick.candidate_observer import CandidateObserver
 from app.sim.pick.kernels.grasp import LIFT, GraspRules
-from app.sim.pick.kernels.observation_layout import DISTANCE_SCALE, FARTHEST
+from app.sim.pick.kernels.observation_layout import DISTANCE_SCALE, FARTHEST, PRESENT_WITHIN
 from app.sim.pick.task_policy import (
     FRESH,
     NOT_BEGUN,
@@ -173,7 +174,6 @@ class TaskChooser(TrainedPolicy):
         observed = self._observed(query.state.measured.q, people)
         found = self._evaluate(query, _arrays(observed, self._people.bodies[0]))
         index = int(found.chosen[0])
-        nearest, person = observed[0]
         q, qd, _ = query.state.clamped
         return Decision(
             chosen=query.ids[index],
@@ -183,13 +183,14 @@ class TaskChooser(TrainedPolicy):
             qd_target=self._speeds(q, qd, found.act),
             reachable=tuple(found.reachable.tolist()),
             outside=query.state.outside
-            + self._ranges.of_state(q, qd, person, nearest)
+            + self._ranges.of_robot(q, qd)
+            + self._outside(observed)
             + self._ranges.of_time(query.terms.time_left_s),
             outside_candidates=self._ranges.of_goals(query.goals),
             outcomes=None if found.outcomes is None else estimates_of(found.outcomes),
             checkpoint=self.checkpoint,
             elapsed_ms=1e3 * (time.perf_counter() - started),
-            nearest_person=nearest,
+            nearest_person=observed[0][0],
         )
 
     def risk_map(
@@ -284,6 +285,18 @@ class TaskChooser(TrainedPolicy):
         if first is None:
             return [(None, _FAR_PERSON)]
         return [(i, known[i]) for i in (near.pop(first), *near)]
+
+    def _outside(
+        self, observed: list[tuple[int | None, Person]]
+    ) -> tuple[OutOfRangeValue, ...]:
+        """Return the fields outside the training range of people who may be observed."""
+        (index, first), *others = observed
+        found = self._ranges.of_person(first, index)
+        if self.observed_people > 1:
+            for index, one in others:
+                if math.hypot(one.q[0], one.q[1]) < PRESENT_WITHIN:
+                    found += self._ranges.of_person(one, index)
+        return found
 
 
 def _arrays(observed: list[tuple[int | None, Person]], body: Vec) -> tuple[Vec, Vec, Vec]:

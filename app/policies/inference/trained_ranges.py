@@ -28,12 +28,12 @@ class TrainedRanges:
         self._time_limit_s = preset.episode.time_limit_s
         self._low = {name: np.array(entry["low"]) for name, entry in ranges.items()}
         self._high = {name: np.array(entry["high"]) for name, entry in ranges.items()}
-        self._state, self._goal = (
+        self._robot, self._person, self._goal = (
             tuple(
                 np.concatenate([self._bound(name, n, low) for name, n in sizes])
                 for low in (True, False)
             )
-            for sizes in (STATE_SIZES[:-1], STATE_SIZES[-1:])
+            for sizes in (STATE_SIZES[:2], STATE_SIZES[2:4], STATE_SIZES[4:])
         )
 
     def _bound(self, key: str, n: int, low: bool) -> Vec:
@@ -43,28 +43,33 @@ class TrainedRanges:
             return np.full(n, -np.inf if low else np.inf)
         return bounds[key] - self.SLACK if low else bounds[key] + self.SLACK
 
-    def of_state(
-        self, q: Vec, qd: Vec, person: Person, index: int | None
-    ) -> tuple[OutOfRangeValue, ...]:
-        """Return the fields of robot and observed person outside the range.
+    def of_robot(self, q: Vec, qd: Vec) -> tuple[OutOfRangeValue, ...]:
+        """Return the joint positions and speeds of the robot outside the range.
 
         Args:
             q: Joint positions [rad], shape (6,).
             qd: Joint speeds [rad/s], shape (6,).
-            person: The observed person.
-            index: Index of that person; None: a person far away.
         """
-        if are_inside(np.concatenate([q, qd, person.q, person.qd]), *self._state):
+        if are_inside(np.concatenate([q, qd]), *self._robot):
             return ()
-        path = f"people[{index or 0}]"
-        alone = (
+        return (
             *self._outside("q", q, "robot.q", robot.JOINT_NAMES),
             *self._outside("qd", qd, "robot.qd", robot.JOINT_NAMES),
         )
+
+    def of_person(self, person: Person, index: int | None) -> tuple[OutOfRangeValue, ...]:
+        """Return the joint angles and speeds of an observed person outside the range.
+
+        Args:
+            person: The person.
+            index: Index of that person; None: a person far away, in an empty cell.
+        """
         if index is None and self._trained_without_people:
-            return alone
+            return ()
+        if are_inside(np.concatenate([person.q, person.qd]), *self._person):
+            return ()
+        path = f"people[{index or 0}]"
         return (
-            *alone,
             *self._outside("human_q", person.q, f"{path}.q", human.JOINT_NAMES),
             *self._outside("human_qd", person.qd, f"{path}.qd", human.JOINT_NAMES),
         )

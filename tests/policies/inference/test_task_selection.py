@@ -176,6 +176,15 @@ def test_fields_outside_training_name_the_person_who_is_seen(chooser):
     assert not any(field.startswith("people[0]") for field in named)
 
 
+def test_fields_of_the_second_observed_person_are_flagged(chooser):
+    fast = replace(person(-1.5, 1.6), qd=np.full(18, 9.0))
+    beyond = replace(person(3.5, 2.5), qd=np.full(18, 9.0))  # more than 4 m from the base
+    decision = chooser.decide(HOME, np.zeros(6), [beyond, fast, person()], cubes("cube0"))
+    assert decision.nearest_person == 2
+    assert {one.field.partition(".")[0] for one in decision.outside} == {"people[1]"}
+    assert "people[1].qd.pelvis_y" in {one.field for one in decision.outside}
+
+
 def test_the_size_of_the_person_counts(chooser):
     near = person(0.0, 1.1)
     tall = replace(near, size=percentile_body(99.0, 99.0, 99.0).vector(CELL.floor_z))
