@@ -47,8 +47,9 @@ def main(arguments: list[str]) -> int:
 def has_uv() -> bool:
     """Return whether there is uv, after an attempt to install it."""
     if find_spec("uv") is None:
-        options = ["--quiet", "--require-hashes", "--no-deps", "-r", str(LOCK)]
-        return subprocess.run([*PIP, "install", *options], capture_output=True).returncode == 0
+        options = ["--quiet", "--retries", "1", "--require-hashes", "--no-deps"]
+        command = [*PIP, "install", *options, "-r", str(LOCK)]
+        return subprocess.run(command, capture_output=True).returncode == 0
     return True
 
 

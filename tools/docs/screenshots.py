@@ -3,7 +3,7 @@
     python -m tools.docs.screenshots http://127.0.0.1:8000
 
 Writes ``docs/img/scene.png`` and ``sorting.png``: the live cells with people
-after half a minute, paused. Changes the live world of that server. Needs Chromium, which
+after half a minute, paused while the robot moves. Changes the live world of that server. Needs Chromium, which
 draws the scene in software: about two minutes on two free cores.
 """
 
@@ -21,6 +21,9 @@ SIZE = ViewportSize(width=1440, height=900)
 PATIENCE_MS = 180_000
 RUN_MS = 30_000
 """Time that a cell runs before its picture: the plots show the last 20 s."""
+MOVING = 0.3
+"""Least speed override of a picture: the layer slows the robot, and does not stop it."""
+MOST_LOOKS = 300
 STILL_MS = 8_000
 """Time for the scene to draw the paused cell."""
 
@@ -50,6 +53,11 @@ def take(page: Page, address: str, picture: Picture) -> None:
     for body in ({"tag": "resume"}, picture.begin):
         _command(page, address, body)
     page.wait_for_timeout(RUN_MS)
+    for _ in range(MOST_LOOKS):
+        world = page.request.get(f"{address}/v1/worlds/main").json()
+        if world["safety"]["override"] >= MOVING:
+            break
+        page.wait_for_timeout(200)
     _command(page, address, {"tag": "pause"})
     page.wait_for_timeout(STILL_MS)
     page.screenshot(path=IMAGES / picture.file)
