@@ -3,8 +3,8 @@
     python -m tools.docs.screenshots http://127.0.0.1:8000
 
 Writes ``docs/img/scene.png`` and ``sorting.png``: the live cells with people
-after half a minute, paused while the robot moves. Changes the live world of that server. Needs Chromium, which
-draws the scene in software: about two minutes on two free cores.
+after half a minute, paused while the robot moves. Changes the live world of that server. Needs
+Chromium, which draws the scene in software: about two minutes on two free cores.
 """
 
 import shutil
