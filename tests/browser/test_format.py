@@ -108,3 +108,20 @@ def test_message_of_the_service_is_shown_as_a_sentence(
     page: Page, message: str, sentence: str
 ) -> None:
     assert written(page, "sentence", [message]) == [sentence]
+
+
+@pytest.mark.parametrize(
+    ("person", "separation", "advised", "short"),
+    [
+        (0, 0.36, 1.0, False),
+        (0, 0.36, 0.4, True),
+        (0, 0.38, 0.4, False),
+        (None, None, 1.0, False),
+    ],
+)
+def test_distance_is_too_short_where_the_layer_slows_the_robot(
+    page: Page, person: int | None, separation: float | None, advised: float, short: bool
+) -> None:
+    safety = {"person": person, "separation": separation, "required": 0.37, "advised": advised}
+    call = "(of) => import('/live/safety.js').then((one) => one.isTooNear(of))"
+    assert page.evaluate(call, safety) is short

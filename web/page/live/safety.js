@@ -11,6 +11,11 @@ const ARC = 2 * Math.PI * 40 * 0.75;
 const LINKS = { base_link: "base", shoulder_link: "shoulder", upper_arm_link: "upper arm",
   forearm_link: "forearm", wrist_1_link: "wrist", wrist_2_link: "wrist", wrist_3_link: "tool" };
 
+/** Whether a person nearer than S_p makes the layer slow the robot, or would, if it is disabled. */
+export function isTooNear({ person, separation, required, advised }) {
+  return person !== null && separation < required && advised < SLOW;
+}
+
 /** What the status chip says while the safety layer reduces the speed; null otherwise. */
 export function safetyChip({ status, safety }) {
   if (!["moving", "picking"].includes(status) || !safety.on || safety.override >= SLOW) return null;
@@ -81,7 +86,7 @@ function Terms({ safety, people }) {
     ["margin", "margins C + Z", margin],
   ];
   return html`<dl class="terms">
-    <div class=${separation < required ? "terms-top is-short" : "terms-top"}>
+    <div class=${isTooNear(safety) ? "terms-top is-short" : "terms-top"}>
       <dt>${subject} to ${LINKS[link] ?? "robot"}</dt>
       <dd data-role="separation">${format.gap(separation)}</dd></div>
     <div class="terms-top"><dt>Protective separation distance S<sub>p</sub></dt><dd data-role="required">${format.length(required)}</dd></div>

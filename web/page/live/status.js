@@ -3,7 +3,7 @@ import { html } from "../vendor/htm-preact-standalone.module.js";
 import * as format from "../format.js";
 import { Icon } from "../icons.js";
 import { nameOf } from "./people.js";
-import { safetyChip } from "./safety.js";
+import { isTooNear, safetyChip } from "./safety.js";
 
 const STATUS = {
   moving: ["Moving to target", "accent"],
@@ -59,7 +59,7 @@ function Clearance({ metres, people, safety }) {
   const person = nearest ? nameOf(nearest.id) : "the person";
   const known = Number.isFinite(metres);
   const share = known ? Math.min(1, Math.max(0, metres / CLEARANCE_SCALE_M)) : 0;
-  const short = safety.on && safety.person !== null && safety.separation < safety.required;
+  const short = safety.on && isTooNear(safety);
   const tone = !known ? "" : metres < 0.05 ? "bad" : short || metres < 0.15 ? "warn" : "good";
   return html`<div class="clearance">
     <span class="label">${people.length ? `Separation distance to ${person}` : "No person in the cell"}</span>
