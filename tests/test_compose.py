@@ -1,6 +1,7 @@
-"""The compose file fits the settings and the image."""
+"""The compose file fits the settings and the image, whose build has every file it copies."""
 
 import re
+from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
 
@@ -55,3 +56,25 @@ def test_its_database_is_the_one_that_it_starts(
     password = database["POSTGRES_PASSWORD"]
     assert settings.database == f"postgresql://{user}:{password}@database/{name}"
     assert set(services["tandem"]["depends_on"]) == {"database"}
+
+
+def is_sent_to_the_build(path: str) -> bool:
+    """Return whether ``.dockerignore`` leaves a path: its last matching line counts."""
+    parents = [path, *map(str, Path(path).parents)]
+    sent = True
+    for line in (ROOT / ".dockerignore").read_text().split():
+        pattern = line.removeprefix("!").removeprefix("**/")
+        if any(
+            fnmatchcase(one, pattern) for one in parents if "/" not in one or "/" in pattern
+        ):
+            sent = line.startswith("!")
+    return sent
+
+
+def test_build_has_every_file_that_it_copies() -> None:
+    copies = re.findall(r"^COPY ((?!--from).*) \S+$", (ROOT / "Dockerfile").read_text(), re.M)
+    files = [one for line in copies for one in line.split() if one != "."]
+    assert "Makefile" in files
+    for one in files:
+        assert (ROOT / one).is_file() and is_sent_to_the_build(one), one
+    assert not is_sent_to_the_build("data/tandem.db")

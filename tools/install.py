@@ -38,9 +38,12 @@ def main(arguments: list[str]) -> int:
         uv = [sys.executable, "-m", "uv", "pip", "install", "--python", sys.executable]
         # As pip does, uv is to take the best match of all indexes, not of the first.
         best = ["--index-strategy", "unsafe-best-match"]
-        done = subprocess.run([*uv, *best, *arguments], env=places(configuration()))
-        if done.returncode == 0:
+        env = places(configuration())
+        if any(one.partition("=")[0] in ("--index-url", "-i") for one in arguments):
+            env.pop("UV_DEFAULT_INDEX", None)  # uv would take this one, and not the argument's
+        if subprocess.run([*uv, *best, *arguments], env=env).returncode == 0:
             return 0
+        print("uv failed: pip installs instead", file=sys.stderr)
     return subprocess.run([*PIP, "install", "--progress-bar", "off", *arguments]).returncode
 
 

@@ -3,6 +3,7 @@ import subprocess
 import sys
 import zipfile
 from pathlib import Path
+from urllib.parse import quote
 
 import pytest
 
@@ -15,22 +16,42 @@ SCRIPT = Path(__file__).resolve().parents[2] / "tools/install.py"
 def wheels(tmp_path: Path) -> Path:
     """Return a folder with the wheel of a package ``probe``."""
     folder = tmp_path / "wheels"
-    folder.mkdir()
-    info = "probe-1.0.dist-info"
-    with zipfile.ZipFile(folder / "probe-1.0-py3-none-any.whl", "w") as wheel:
+    add_wheel(folder, "1.0")
+    return folder
+
+
+def add_wheel(folder: Path, version: str) -> None:
+    """Add the wheel of a version of a package ``probe`` to a folder, which is created."""
+    folder.mkdir(parents=True)
+    info = f"probe-{version}.dist-info"
+    with zipfile.ZipFile(folder / f"probe-{version}-py3-none-any.whl", "w") as wheel:
         wheel.writestr("probe.py", "VALUE = 7\n")
-        wheel.writestr(f"{info}/METADATA", "Metadata-Version: 2.1\nName: probe\nVersion: 1.0\n")
+        metadata = f"Metadata-Version: 2.1\nName: probe\nVersion: {version}\n"
+        wheel.writestr(f"{info}/METADATA", metadata)
         wheel.writestr(f"{info}/WHEEL", "Wheel-Version: 1.0\nRoot-Is-Purelib: true\n")
         wheel.writestr(f"{info}/RECORD", "")
-    return folder
+
+
+def add_index(root: Path, version: str) -> str:
+    """Create a package index with a version of ``probe``; return its URL."""
+    folder = root / "probe"
+    add_wheel(folder, version)
+    (wheel,) = folder.iterdir()
+    (folder / "index.html").write_text(f'<a href="{quote(wheel.name)}">{wheel.name}</a>')
+    return root.as_uri()
 
 
 def install(wheels: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
     """Run the script with pip configured for a folder of wheels alone."""
-    kept = {key: value for key, value in os.environ.items() if not key.startswith("UV_")}
+    return install_from({"PIP_FIND_LINKS": str(wheels), "PIP_NO_INDEX": "1"}, *arguments)
+
+
+def install_from(places: dict[str, str], *arguments: str) -> subprocess.CompletedProcess[str]:
+    """Run the script with pip configured by some variables alone."""
+    kept = {k: v for k, v in os.environ.items() if not k.startswith(("UV_", "PIP_"))}
     return subprocess.run(
         [sys.executable, SCRIPT, *arguments],
-        env={**kept, "PIP_FIND_LINKS": str(wheels), "PIP_NO_INDEX": "1"},
+        env={**kept, "PIP_CONFIG_FILE": os.devnull, **places},
         capture_output=True,
         text=True,
         check=True,
@@ -48,10 +69,19 @@ def test_uv_installs_from_where_pip_would(wheels: Path, tmp_path: Path) -> None:
     assert installer_of(tmp_path / "here") == "uv"
 
 
+def test_index_of_the_command_counts_more_than_that_of_pip(tmp_path: Path) -> None:
+    own, cpu = (add_index(tmp_path / f"v{v}", v) for v in ("1.0", "1.0+cpu"))
+    arguments = ["--quiet", "--target", str(tmp_path / "here"), "--index-url", cpu]
+    install_from({"PIP_INDEX_URL": own}, *arguments, "probe==1.0")
+    info = tmp_path / "here/probe-1.0+cpu.dist-info"
+    assert (info / "INSTALLER").read_text().strip() == "uv"
+
+
 def test_pip_installs_where_uv_cannot(wheels: Path, tmp_path: Path) -> None:
     arguments = ["--root-user-action", "ignore", "--target", str(tmp_path / "here"), "probe"]
     answer = install(wheels, *arguments)  # uv has no such option
     assert "--root-user-action" in answer.stderr
+    assert "pip installs instead" in answer.stderr
     assert installer_of(tmp_path / "here") == "pip"
 
 
