@@ -9,7 +9,8 @@ import re
 from pathlib import Path
 from typing import Literal
 
-from pydantic import Field, SecretStr, ValidationError
+from pydantic import Field, SecretStr, ValidationError, field_validator
+from pydantic_core import PydanticCustomError
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
 from app.errors import InvalidInput
@@ -32,7 +33,9 @@ class Settings(BaseSettings):
         None, min_length=1, description="SQLAlchemy URL; a SQLite file in `data` if unset."
     )
     ray: str | None = Field(
-        None, min_length=1, description="Ray cluster that runs the jobs; this machine if unset."
+        None,
+        pattern=r"^\S+$",
+        description="Ray cluster that runs the jobs; this machine if unset.",
     )
     max_jobs: int = Field(1, ge=1, le=1000, description="Jobs that run at once.")
     worker_url: str | None = Field(
@@ -55,6 +58,15 @@ class Settings(BaseSettings):
         pattern=r"^(/[A-Za-z0-9._~-]+)*$",
         description="Path that a reverse proxy removes from requests, such as `/tandem`.",
     )
+
+    @field_validator("data", mode="before")
+    @classmethod
+    def check_data(cls, value: object) -> object:
+        """Refuse texts of the environment that would silently be another folder."""
+        if isinstance(value, str) and (not value.strip() or value.startswith("~")):
+            rule = "must be the path of a folder, without ~, which only a shell replaces"
+            raise PydanticCustomError("folder", rule)
+        return value
 
     @property
     def is_loopback(self) -> bool:
@@ -80,7 +92,7 @@ class Settings(BaseSettings):
     @property
     def secret(self) -> str | None:
         """The token as text, or None."""
-        return self.token.get_secret_value() if self.token else None
+        return None if self.token is None else self.token.get_secret_value()
 
 
 def load_settings(**overrides: object) -> Settings:

@@ -46,6 +46,8 @@ def test_command_line_wins_over_the_environment(monkeypatch: pytest.MonkeyPatch)
     ("name", "values", "named"),
     [
         ("TANDEM_PORT", ("abc", "-1", "65536", ""), "TANDEM_PORT"),
+        ("TANDEM_DATA", ("", " ", "~/tandem"), "TANDEM_DATA"),
+        ("TANDEM_RAY", ("", " ", "10.0.0.5:6379 "), "TANDEM_RAY"),
         ("TANDEM_PROT", ("8130",), "TANDEM_PORT"),  # misspelt: the message has the choices
         (
             "TANDEM_WORKER_URL",
@@ -80,6 +82,12 @@ def test_short_token_is_refused_and_not_shown() -> None:
     with pytest.raises(InvalidInput, match="at least 16") as refused:
         check_access(Settings(token="hunter2"))
     assert "hunter2" not in str(refused.value)
+
+
+def test_empty_token_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("TANDEM_TOKEN", "")  # such as of a command that failed
+    with pytest.raises(InvalidInput, match="at least 16"):
+        check_access(load_settings())
 
 
 @pytest.mark.parametrize(
