@@ -6,12 +6,15 @@ The SDK is an extra (``otel``) and read only then; it has further standard varia
 
 import importlib
 import os
+import threading
 
 from opentelemetry.trace import TracerProvider
 
 from app.errors import MissingPackage
 
 VARIABLES = ("OTEL_EXPORTER_OTLP_ENDPOINT", "OTEL_EXPORTER_OTLP_TRACES_ENDPOINT")
+EXPORT_S = 2.0
+"""Time for the export of the last spans when the service stops [s]."""
 
 
 def provider_of_environment() -> TracerProvider | None:
@@ -33,3 +36,14 @@ def provider_of_environment() -> TracerProvider | None:
     provider: TracerProvider = sdk.TracerProvider()
     provider.add_span_processor(export.BatchSpanProcessor(otlp.OTLPSpanExporter()))  # type: ignore[attr-defined]
     return provider
+
+
+def finish(provider: TracerProvider) -> None:
+    """Export the last spans; a signal ends the process without the handlers of its exit."""
+    export = threading.Thread(
+        target=provider.shutdown,  # type: ignore[attr-defined]
+        name="last-spans",
+        daemon=True,
+    )
+    export.start()
+    export.join(EXPORT_S)

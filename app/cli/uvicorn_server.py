@@ -11,6 +11,7 @@ from types import FrameType
 
 import uvicorn
 from fastapi import FastAPI
+from opentelemetry.trace import TracerProvider
 from starlette.concurrency import run_in_threadpool
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
@@ -18,6 +19,7 @@ from app.api.sockets import MAX_MESSAGE_BYTES
 from app.cli.http_limits import LimitedHttp
 from app.cli.preflight import address_of
 from app.settings import Settings
+from app.traces import finish, provider_of_environment
 
 GRACE_S = 3
 """Time for open requests once the server stops [s]."""
@@ -26,9 +28,11 @@ GRACE_S = 3
 class Server(uvicorn.Server):
     """uvicorn's server; it ends open streams before it waits for them."""
 
-    def __init__(self, config: uvicorn.Config, app: FastAPI) -> None:
+    def __init__(
+        self, config: uvicorn.Config, app: FastAPI, traces: TracerProvider | None = None
+    ) -> None:
         super().__init__(config)
-        self._app = app
+        self._app, self._traces = app, traces
 
     def handle_exit(self, sig: int, frame: FrameType | None) -> None:
         """End the streams, then stop as uvicorn does."""
@@ -43,16 +47,23 @@ class Server(uvicorn.Server):
         if services is not None:
             await run_in_threadpool(services.supervisor.stop)
         await super().shutdown(sockets)
+        if self._traces is not None:
+            await run_in_threadpool(finish, self._traces)
 
 
 def new_server(
-    app: FastAPI, on_tick: Callable[[], Awaitable[None]] | None = None, *, root_path: str = ""
+    app: FastAPI,
+    on_tick: Callable[[], Awaitable[None]] | None = None,
+    *,
+    root_path: str = "",
+    traces: TracerProvider | None = None,
 ) -> Server:
     """Return the server that runs an application.
 
     Args:
         on_tick: Called once a second.
         root_path: Path under which a reverse proxy shows the service and which it removes.
+        traces: Exporter of spans, which is shut down after the application.
     """
     config = uvicorn.Config(
         _with_brief_failure(app),
@@ -67,7 +78,7 @@ def new_server(
         timeout_notify=0,
         server_header=False,
     )
-    return Server(config, app)
+    return Server(config, app, traces)
 
 
 def _with_brief_failure(app: FastAPI) -> ASGIApp:
@@ -98,13 +109,13 @@ def run(settings: Settings, sock: socket.socket, report: Callable[[str], None]) 
     import torch
 
     from app.main import create_app
-    from app.traces import provider_of_environment
 
     gc.enable()
     report(f"Tandem starts: {address_of(sock)}")
     # More threads do not speed up networks this small; waiting for a busy core costs 0.3 s.
     torch.set_num_threads(1)
-    app = create_app(settings, provider_of_environment())
+    traces = provider_of_environment()
+    app = create_app(settings, traces)
     reported = False
 
     async def report_readiness() -> None:
@@ -118,4 +129,5 @@ def run(settings: Settings, sock: socket.socket, report: Callable[[str], None]) 
             report(f"Tandem cannot decide: {services.readiness.reason}")
         reported = services.readiness.ready or services.readiness.failed
 
-    new_server(app, report_readiness, root_path=settings.root_path).run(sockets=[sock])
+    server = new_server(app, report_readiness, root_path=settings.root_path, traces=traces)
+    server.run(sockets=[sock])

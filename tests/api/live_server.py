@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from fastapi import FastAPI
+from opentelemetry.trace import TracerProvider
 
 from app.cli.preflight import address_of, listen
 from app.cli.uvicorn_server import Server, new_server
@@ -20,10 +21,12 @@ WARM_UP_S = 900.0
 
 
 @contextlib.contextmanager
-def running(app: FastAPI, *, root_path: str = "") -> Iterator[tuple[Server, str]]:
+def running(
+    app: FastAPI, *, root_path: str = "", traces: TracerProvider | None = None
+) -> Iterator[tuple[Server, str]]:
     """Run ``app`` on a free port; yields the server and its address."""
     sock = listen("127.0.0.1", 0)
-    server = new_server(app, root_path=root_path)
+    server = new_server(app, root_path=root_path, traces=traces)
     thread = threading.Thread(target=server.run, kwargs={"sockets": [sock]})
     thread.start()
     wait_until(lambda: server.started or not thread.is_alive())
