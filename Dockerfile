@@ -1,7 +1,8 @@
 # The service as an image: same lock as a checkout, CPU build of torch, kernels compiled.
 #
 #   docker build -t tandem .
-#   docker run --read-only --tmpfs /tmp -p 8000:8000 -e TANDEM_TOKEN="$(openssl rand -hex 16)" -v tandem:/data tandem
+#   docker run --read-only --tmpfs /tmp --stop-timeout 45 -p 8000:8000 \
+#       -e TANDEM_TOKEN="$(openssl rand -hex 16)" -v tandem:/data tandem
 #
 # Inside a container the server must listen on all addresses to be reached, and there it
 # refuses to start without TANDEM_TOKEN. Database, checkpoints and compiled kernels live in

@@ -8,7 +8,11 @@ from typing import Any
 import pytest
 import yaml
 
+from app.cli.uvicorn_server import GRACE_S
+from app.main import RAY_SHUTDOWN_S, STOP_S
 from app.settings import Settings, check_access, load_settings
+from app.traces import EXPORT_S
+from jobs.timeouts import Timeouts
 
 ROOT = Path(__file__).parents[1]
 SECRETS = {"TANDEM_TOKEN": "0123456789abcdef", "POSTGRES_PASSWORD": "fedcba9876543210"}
@@ -56,6 +60,15 @@ def test_its_database_is_the_one_that_it_starts(
     password = database["POSTGRES_PASSWORD"]
     assert settings.database == f"postgresql://{user}:{password}@database/{name}"
     assert set(services["tandem"]["depends_on"]) == {"database"}
+
+
+def test_container_is_not_killed_before_the_states_of_trainings_are_stored(
+    services: dict[str, Any],
+) -> None:
+    longest_s = RAY_SHUTDOWN_S + GRACE_S + STOP_S + EXPORT_S
+    assert float(services["tandem"]["stop_grace_period"].removesuffix("s")) > longest_s
+    assert longest_s == 40.0  # docs/setup.md
+    assert longest_s - RAY_SHUTDOWN_S + Timeouts().shutdown_s == 18.0
 
 
 def is_sent_to_the_build(path: str) -> bool:
