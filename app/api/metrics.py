@@ -25,6 +25,8 @@ BUCKETS_S = (
 )
 """Upper bounds of the durations of requests [s]."""
 METHODS = frozenset(("GET", "HEAD", "POST", "PUT", "PATCH", "DELETE", "OPTIONS", "MESSAGE"))
+DECISIONS = ("/v1/motion", "/v1/plan", "/v1/sorting", "/v1/task-selection")
+"""Endpoints whose decisions outside the training range are counted."""
 UNROUTED = "none"
 """Endpoint of a request that no route answers: refused before, or unknown."""
 
@@ -49,6 +51,8 @@ class Metrics:
             ("endpoint",),
             registry=self.registry,
         )
+        for endpoint in DECISIONS:  # from 0 on: Prometheus sees no increase to a first value
+            self._outside.labels(endpoint)
         self._waits = Histogram(
             "tandem_socket_wait_seconds",
             "Time from the arrival of a message on a motion socket to its decision.",

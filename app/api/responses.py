@@ -3,7 +3,8 @@
 Adds security headers, the id of the request and the root path of ``Location``, turns an
 unexpected error into a problem, and measures the time to the answer. ``HEAD`` is answered with
 the headers of ``GET``, without a body, and a client that has the answer (``ETag``) with 304.
-The log has a line for each request that changes something or is refused.
+The log has a line for each request that changes something or is refused, and for each socket
+that the server refuses or closes for a fault.
 """
 
 import logging
@@ -44,6 +45,9 @@ _OF_CONTENT = (b"content-length", b"content-type", b"content-encoding", b"conten
 """Headers that an answer without its content does not have."""
 _ID = re.compile(rb"[A-Za-z0-9._:/+=-]{1,128}")
 _RANDOM = Random()
+_JOB = re.compile(r"/v1/jobs/([0-9a-f]{8}(?:-[0-9a-f]{4}){3}-[0-9a-f]{12})")
+NORMAL_CLOSE = (1000, 1001)
+"""Codes with which the server closes a socket at its end or that of the service."""
 NOT_READY = 503
 """Status that monitors get again and again while the service starts."""
 READS = ("GET", "HEAD", "OPTIONS")
@@ -73,7 +77,7 @@ class ResponseMiddleware:
             return
         REQUEST_ID.set(id_of(scope))
         if scope["type"] == "websocket":
-            await self.app(scope, receive, _with_id(send))
+            await self.app(scope, receive, _complete_socket(scope, send))
             return
         if scope["method"] != "HEAD":
             await self._answer(scope, receive, send)
@@ -102,7 +106,7 @@ class ResponseMiddleware:
                 if unchanged:
                     message["status"] = 304
                     headers[:] = [pair for pair in headers if pair[0] not in _OF_CONTENT]
-                self._count(scope, message["status"], perf_counter() - begin)
+                self._count(scope, message["status"], headers, perf_counter() - begin)
                 if message["status"] == 204:  # FastAPI states the type of its default answer
                     headers[:] = [pair for pair in headers if pair[0] != b"content-type"]
                 given = tuple([name for name, _ in headers])
@@ -124,14 +128,17 @@ class ResponseMiddleware:
             detail = "an unexpected error; the server's log has the trace"
             await problem(500, detail, instance=path)(scope, receive, send_complete)
 
-    def _count(self, scope: Scope, status: int, seconds: float) -> None:
+    def _count(
+        self, scope: Scope, status: int, headers: list[tuple[bytes, bytes]], seconds: float
+    ) -> None:
         """Count an answer; log it where it changes something or is refused."""
         route, method = scope.get("route"), scope["method"]
         self.metrics.observe(method, getattr(route, "path", UNROUTED), status, seconds)
         changes = method not in READS and DECIDING not in getattr(route, "tags", ())
         if (status >= 400 and status != NOT_READY) or changes:
-            fields = {"status": status, "duration_s": round(seconds, 6)}
-            logger.info("%s %s", method, path_of(scope), extra=fields)
+            took = {"status": status, "duration_s": round(seconds, 6)}
+            extra = took | _job_of(scope, headers)
+            logger.info("%s %s", method, path_of(scope), extra=extra)
 
 
 def _is_known(scope: Scope, headers: list[tuple[bytes, bytes]]) -> bool:
@@ -156,15 +163,31 @@ def _below_root_path(message: Message, root_path: str) -> None:
         headers["Location"] = root_path + headers["location"]
 
 
-def _with_id(send: Send) -> Send:
-    """Return ``send`` of a socket that adds the id of the request to the handshake."""
+def _job_of(scope: Scope, headers: list[tuple[bytes, bytes]]) -> dict[str, object]:
+    """Return the job that a request names or created, as a field of its line in the log."""
+    created = [value.decode("latin-1") for name, value in headers if name == b"location"]
+    found = _JOB.search(" ".join([path_of(scope), *created]))
+    return {"job_id": found[1]} if found else {}
+
+
+def _complete_socket(scope: Scope, send: Send) -> Send:
+    """Return ``send`` of a socket that adds the id of its request and logs its refusal."""
+    accepted = False
 
     async def send_complete(message: Message) -> None:
+        nonlocal accepted
         if message["type"] == "websocket.accept":
+            accepted = True
             message["headers"] = [
                 *message["headers"],
                 (ID_HEADER, (REQUEST_ID.get() or "").encode()),
             ]
+        elif message["type"] == "websocket.close":
+            code = message.get("code", NORMAL_CLOSE[0])
+            if not accepted or code not in NORMAL_CLOSE:
+                how = {"code": code} if accepted else {"status": 403}
+                extra = how | {"reason": message.get("reason") or ""}
+                logger.info("WS %s", path_of(scope), extra=extra)
         await send(message)
 
     return send_complete

@@ -5,6 +5,7 @@ from typing import Any
 import pytest
 from fastapi.testclient import TestClient
 from prometheus_client.parser import text_string_to_metric_families
+from starlette.websockets import WebSocketDisconnect
 
 from app.api.metrics import Metrics
 
@@ -52,6 +53,15 @@ def test_decision_outside_the_training_range_is_counted(
     answer = client.post("/v1/task-selection", json={**state, "candidates": far})
     assert answer.json()["candidates"][0]["outside"]
     assert value(client, name, **labels) == before + 1
+
+
+def test_decisions_outside_the_training_range_are_counted_from_zero_on() -> None:
+    registry = Metrics(
+        "1"
+    ).registry  # an increase to a first value is no increase for Prometheus
+    for endpoint in ("/v1/motion", "/v1/plan", "/v1/sorting", "/v1/task-selection"):
+        name, labels = "tandem_decisions_outside_training_total", {"endpoint": endpoint}
+        assert registry.get_sample_value(name, labels) == 0.0
 
 
 def test_live_world_is_read(client: TestClient) -> None:
@@ -140,3 +150,45 @@ def test_messages_on_a_socket_are_counted_with_their_wait(client: TestClient) ->
         assert socket.receive_json()["status"] == 422
     assert value(client, name, **labels, status="422") == before + 1
     assert value(client, "tandem_socket_wait_seconds_count") == waits + 1
+
+
+def log_fields(caplog: pytest.LogCaptureFixture, message: str) -> dict[str, Any]:
+    """Return the fields of the newest line with a message."""
+    return next(vars(one) for one in reversed(caplog.records) if one.message == message)
+
+
+def test_line_of_a_request_names_the_job_that_it_creates_or_changes(
+    client: TestClient, caplog: pytest.LogCaptureFixture
+) -> None:
+    caplog.set_level("INFO", "app.api.responses")
+    job = client.post("/v1/jobs", json={"kind": "evaluate", "protocol": "pick-single"}).json()
+    assert log_fields(caplog, "POST /v1/jobs")["job_id"] == job["id"]
+    client.post(f"/v1/jobs/{job['id']}/cancel")
+    assert log_fields(caplog, f"POST /v1/jobs/{job['id']}/cancel")["job_id"] == job["id"]
+    client.get("/v1/jobs/nothing")
+    assert "job_id" not in log_fields(caplog, "GET /v1/jobs/nothing")
+
+
+def test_refused_socket_has_a_line_in_the_log(
+    client: TestClient, caplog: pytest.LogCaptureFixture
+) -> None:
+    caplog.set_level("INFO", "app.api.responses")
+    foreign = {"Origin": "http://evil.example"}
+    with pytest.raises(WebSocketDisconnect), client.websocket_connect(SOCKET, headers=foreign):
+        pass
+    assert log_fields(caplog, "WS /v1/motion/stream")["status"] == 403
+    with client.websocket_connect(f"{SOCKET}?deadline_ms=soon") as socket:
+        with pytest.raises(WebSocketDisconnect):
+            socket.receive_json()
+    fields = log_fields(caplog, "WS /v1/motion/stream")
+    assert fields["code"] == 1008 and "deadline_ms" in fields["reason"]
+
+
+def test_socket_that_the_client_closes_has_no_line(
+    client: TestClient, caplog: pytest.LogCaptureFixture
+) -> None:
+    caplog.set_level("INFO", "app.api.responses")
+    with client.websocket_connect(SOCKET) as socket:
+        socket.send_json({"cell": "nothing"})
+        socket.receive_json()
+    assert not [one for one in caplog.records if one.message.startswith("WS ")]
