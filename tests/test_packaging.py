@@ -93,16 +93,6 @@ def test_makefile_installs_the_declared_torch() -> None:
     assert f"TORCH ?= {torch.removeprefix('torch==')}\n" in (ROOT / "Makefile").read_text()
 
 
-def test_image_copies_files_of_its_build_context() -> None:
-    sent = {
-        line[1:] for line in (ROOT / ".dockerignore").read_text().splitlines() if "!" in line
-    }
-    copied = re.findall(r"^COPY (?!--from)(.+) \S+$", (ROOT / "Dockerfile").read_text(), re.M)
-    files = {name for names in copied for name in names.split()} - {"."}
-    assert "requirements.lock" in files
-    assert files <= sent
-
-
 def test_every_data_file_belongs_to_the_package() -> None:
     data = PROJECT["tool"]["setuptools"]["package-data"]
     packaged = {
