@@ -146,8 +146,8 @@ class KeypointDetection(Body):
     keypoints: OfKeypoints = Field(
         description="[x, y, z] in m, in the robot's `base_link`, or [x, y, z, confidence] with "
         "a confidence in [0, 1]. Missing: null, [], null or NaN in all coordinates, 0 or -1 in "
-        "all three, confidence 0. Other unusable points are dropped and named. In the order "
-        f"of BODY_25: {ORDER}; or a mapping of these names, absent where missing"
+        "all three, confidence below 0.1. Other unusable points are dropped and named. In the "
+        f"order of BODY_25: {ORDER}; or a mapping of these names, absent where missing"
     )
 
     def points(self) -> tuple[Vec, Vec]:

@@ -120,6 +120,8 @@ def check_keypoints(
     A key-point is missing if all coordinates are NaN, if it is exactly (0, 0, 0) or
     (-1, -1, -1), or if its confidence is NaN or below ``min_confidence``. It is unusable if it
     has only some coordinates, is infinite, beyond 100 m, or has a confidence outside [0, 1].
+    A frame of missing key-points is empty, unless some have low confidences: these show a
+    person, whose place is then unknown.
 
     Args:
         keypoints: Order of BODY_25, cell's frame [m], shape (25, 3).
@@ -142,13 +144,20 @@ def check_keypoints(
     unusable = beyond | ~np.isfinite(points).all(axis=1)
     trust = np.clip(np.nan_to_num(trust, nan=0.0), 0.0, 1.0)
     points = np.clip(points, -_HUGE, _HUGE)
+    low = ~missing & ~beyond & (trust > 0.0) & (trust < min_confidence)
     missing |= ~beyond & (trust < max(min_confidence, 1e-6))
     unusable |= _too_far(points, ~missing & ~unusable)
     unusable &= ~missing
     missing |= unusable
     points[missing], trust[missing] = np.nan, 0.0
     implausible = why_implausible(points, floor_z)
-    if missing.all() and unusable.any():
+    if missing.all() and low.any():
+        greatest = digits(float(given[low].max()))
+        implausible = (
+            f"no usable key-point has a confidence of {min_confidence:g} or more: the greatest "
+            f"is {greatest}"
+        )
+    elif missing.all() and unusable.any():
         implausible = _why_unusable(given[unusable & beyond], int(unusable.sum()))
     outliers = _outliers(points, ~missing) if implausible is None else np.arange(N_KEYPOINTS)
     points[outliers], trust[outliers] = np.nan, 0.0

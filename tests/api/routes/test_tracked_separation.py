@@ -88,12 +88,12 @@ class Scene:
             turned = points @ np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0]]).T + [0.0, 0.0, 2.0]
             points = 1000.0 * points if self.rng.uniform() < 0.5 else turned
         people = [] if event == "empty" else [points]
-        trust = np.full(25, 90.0 if event == "percent" else 1.0)
+        trust = np.full(25, {"percent": 90.0, "weak": 0.05}.get(event, 1.0))
         try:
             self.session.take(stamp, self.now, people, [trust] * len(people))
         except ClockJump:
             return
-        if people and event not in ("foreign", "percent"):
+        if people and event not in ("foreign", "percent", "weak"):
             self.shown = self.posture(), self.now
 
     def watch(self, n_frames: int) -> None:
@@ -212,7 +212,7 @@ def test_a_camera_that_died_stops_the_robot(silence: float) -> None:
         assert answer.safety.override == 0.0
 
 
-@pytest.mark.parametrize("event", ["foreign", "percent"])
+@pytest.mark.parametrize("event", ["foreign", "percent", "weak"])
 @pytest.mark.parametrize("seen_before", [False, True])
 def test_a_tracker_of_another_frame_or_confidence_stops_the_robot(
     seen_before: bool, event: str

@@ -107,6 +107,20 @@ def test_a_person_without_a_usable_point_is_not_taken_for_an_absent_one(
     assert frame.outliers == () and text in str(frame.implausible)
 
 
+@pytest.mark.parametrize("other", [[NAN] * 3, [INF] * 3, [0.0] * 3])
+def test_a_person_of_low_confidences_is_not_taken_for_an_absent_one(
+    other: list[float],
+) -> None:
+    points, confidences = person(), np.full(25, 0.04)
+    points[20:], confidences[5] = other, 0.09
+    frame = check_keypoints(points, confidences, floor_z=FLOOR)
+    assert not frame.seen.any() and frame.outliers == ()
+    assert "confidence of 0.1 or more: the greatest is 0.09" in str(frame.implausible)
+    confidences[7] = 0.1
+    frame = check_keypoints(points, confidences, floor_z=FLOOR)
+    assert frame.seen.sum() == 1 and frame.implausible is None
+
+
 def test_all_missing_is_a_frame_without_anybody() -> None:
     for points in (np.full((25, 3), NAN), np.zeros((25, 3)), np.full((25, 3), -1.0)):
         frame = check_keypoints(points, floor_z=FLOOR)
