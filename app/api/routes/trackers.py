@@ -9,6 +9,7 @@ from fastapi import APIRouter, Query, Response
 from starlette.concurrency import run_in_threadpool
 
 from app.api.description import CREATED
+from app.api.schemas.numbers import Time
 from app.api.schemas.trackers import (
     EstimatesPublic,
     FrameCreate,
@@ -79,7 +80,7 @@ async def get_tracker(
     tracker_id: str,
     services: ServicesDep,
     t: Annotated[
-        float | None,
+        Time | None,
         Query(
             allow_inf_nan=False,
             description="present on the tracker's clock [s]; used where it gives a greater "

@@ -180,6 +180,21 @@ def test_person_that_is_not_tracked_is_refused(
 
 
 @pytest.mark.parametrize(
+    ("t", "rule"),
+    [(1.7e308, "must be at most"), (-1e11, "must be at least"), ("nan", "finite")],
+)
+def test_present_beyond_any_clock_is_refused(
+    client: TestClient, tracker: str, t: float | str, rule: str
+) -> None:
+    fed(client, tracker, 2)
+    answer = client.get(tracker, params={"t": t})
+    assert answer.status_code == 422
+    assert answer.json()["field"] == "t" and rule in answer.json()["rule"]
+    latest = client.get(tracker, params={"t": 1e10}).json()["people"][0]
+    assert latest["cylinder"]["radius"] > 1e10
+
+
+@pytest.mark.parametrize(
     ("body", "field", "rule"),
     [
         (frame(0.5, *[points(FIRST[1][0])] * 65), "people", "at most 64"),
