@@ -30,6 +30,20 @@ def test_even_motion_is_followed_with_its_speed() -> None:
     np.testing.assert_allclose(v[0], [0.5, -0.3, 0.1], atol=0.12)
 
 
+@pytest.mark.parametrize(
+    ("rate_hz", "share", "late_ms"), [(5, 0.90, 4), (30, 0.76, 15), (120, 0.74, 19)]
+)
+def test_steady_speed_is_estimated_too_low_by_the_documented_share(
+    rate_hz: int, share: float, late_ms: float
+) -> None:
+    found, n = PointFilter(1, FilterSettings()), 3 * rate_hz
+    for k in range(n + 1):
+        found.update(k / rate_hz, np.array([[1.6 * k / rate_hz, 0.0, 0.0]]), np.ones(1))
+    p, v = found.at(n / rate_hz)
+    assert v[0, 0] / 1.6 == pytest.approx(share, abs=0.005)
+    assert 1e3 * (n / rate_hz - p[0, 0] / 1.6) == pytest.approx(late_ms, abs=0.5)
+
+
 def test_unseen_point_comes_to_rest_and_is_then_unknown() -> None:
     settings = FilterSettings(hold_s=2.0, memory_s=0.2)
     t = np.arange(60)[:, None, None] * DT
