@@ -9,15 +9,13 @@ import pytest
 from fastapi.testclient import TestClient
 
 from app.sim.perception.keypoints import K
+from tests.api.conftest import services_of
 from tests.api.routes.test_task_selection import URL, refused
 from tests.sim.tracked_person import CELL, RATE_HZ, seen, work
-from tests.support.waiting import wait_until
 
 TRACKERS = "/v1/trackers"
 FIRST, SECOND = work(1, 12.0), work(2, 12.0)
 APART = np.array([1.6, 0.0, 0.0])
-FRESH_S = 0.02
-"""Age up to which the people of a tracker have hardly moved on [s]."""
 
 
 @pytest.fixture
@@ -134,26 +132,22 @@ def test_frames_after_one_wild_stamp_are_taken(client: TestClient, tracker: str)
 
 
 def test_followed_people_can_be_named_in_a_decision(
-    client: TestClient, state: dict[str, Any]
+    client: TestClient, state: dict[str, Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def asked() -> tuple[list[Any], dict[str, Any]]:
-        identity = client.post(TRACKERS, json={"cell": CELL.name, "n_people": 2}).json()["id"]
-        known = fed(client, f"{TRACKERS}/{identity}", 20)["people"]
-        named = [{"tracker": identity, "person": i} for i in range(2)]
-        answer = client.post(URL, json={**state, "people": named}).json()
-        client.delete(f"{TRACKERS}/{identity}")
-        return known, answer
-
-    # The people of the tracker move on: a decision that had to wait is asked for again.
-    known, answer = wait_until(
-        asked, lambda found: max(one["age_s"] for one in found[1]["people"]) < FRESH_S
-    )
+    sessions = services_of(client).trackers
+    now = sessions.clock()
+    monkeypatch.setattr(sessions, "clock", lambda: now)  # people do not move on meanwhile
+    identity = client.post(TRACKERS, json={"cell": CELL.name, "n_people": 2}).json()["id"]
+    known = fed(client, f"{TRACKERS}/{identity}", 20)["people"]
+    named = [{"tracker": identity, "person": i} for i in range(2)]
+    answer = client.post(URL, json={**state, "people": named}).json()
+    client.delete(f"{TRACKERS}/{identity}")
     by_hand = [{"q": one["q"], "qd": one["qd"], "size": CELL.body.tolist()} for one in known]
     same = client.post(URL, json={**state, "people": by_hand}).json()
     assert [one["by"] for one in answer["people"]] == ["tracker"] * 2
     assert [one["speeds"] for one in answer["people"]] == ["estimated"] * 2
     assert [one["value"] for one in answer["candidates"]] == pytest.approx(
-        [one["value"] for one in same["candidates"]], abs=0.05
+        [one["value"] for one in same["candidates"]], abs=1e-6
     )
 
 
