@@ -59,7 +59,8 @@ class PickEnv(SingleEnv):
     | human_q | 18 | the person's joints: x, y - 1.25 [m], yaw + pi / 2 and 15 more [rad] |
     | human_qd | 18 | half their speeds [m/s, rad/s] |
     | tcp, tool_axis | 2 x 3 | [m], unit vector |
-    | goal_minus_tcp, tcp_velocity | 2 x 3 | twice the offset of the target [m], speed [m/s] |
+    | goal_minus_tcp | 3 | twice the offset of the target [m] |
+    | tcp_velocity | 3 | twice the velocity of the tcp [m/s] |
     | hands_and_elbows | 36 | hands and elbows from tcp, target, robot's elbow [m] |
     | hand_velocities | 6 | [m/s] |
     | goal_posture_minus_q, base | 2 x 5 | offset of the target's q [rad]; base motion |
@@ -74,7 +75,9 @@ class PickEnv(SingleEnv):
     | near_clearance | 1 | clearance [0.1 m], at most 1 |
     | second_... | 44 | pelvis, hands, elbows and clearances of a second person |
 
-    Values marked [0.5 m] are in units of 0.5 m and at most 3.
+    Values marked [0.5 m] are in units of 0.5 m and at most 3. Clearances are those of five
+    capsules, one per link from the upper arm to the tool, to the person above the hips; exact
+    ones of the whole robot and person decide on contacts and on the phase.
 
     The person nearest to the robot is observed, and of the others the one nearest to the
     target; a cylinder as a person standing in it, an empty cell as a person far away.

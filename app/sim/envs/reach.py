@@ -86,7 +86,8 @@ class ReachEnv(SingleEnv):
     | radius_ahead | 8 | change of the person's radius [0.2 m] |
 
     The nearest person is observed; a worker as the cylinder about the pelvis that contains the
-    body, an empty cell as a person far away. Clearances are exact and consider all people.
+    body, an empty cell as a person far away. Clearances consider all people, except
+    look_ahead_base: the observed person alone, as that cylinder.
 
     ``ReachSettings(observation="state")`` selects the raw state (4.30), 20 numbers:
 

@@ -134,7 +134,9 @@ class SortingEnv(SingleEnv):
     ``-0.05`` for an attempt, ``-0.3`` for an empty pick, ``-0.3`` for putting an object back
     where it was or where no place is free, ``-0.01`` for a failure, ``-0.01`` for sending an
     object from a tower to the clutter, ``-0.01 d / K`` for the ``d`` levels that differ from
-    the goal afterwards (a wrong colour or a wrong size counts half), ``+1`` for the goal.
+    the goal afterwards (a wrong colour or a wrong size counts half), ``+1`` for an attempt
+    that meets the goal. People act after the reward: a goal that they meet is a success
+    without this bonus.
     ``settings.weights`` holds the coefficients.
 
     ## Start

@@ -64,7 +64,7 @@ N_PICK = sum(size for _, size in PICK_SIZES)
     for name in ("second_pelvis", "second_hands_and_elbows", "second_clearance")
 )
 CLOSE_SCALE = 0.1
-"""Unit of the clearance that decides on a grasp [m]; it is clipped at one unit."""
+"""Unit of ``near_clearance`` [m], which is clipped at one unit."""
 MAX_PEOPLE = 4
 """Most people in a cell."""
 PRESENT_WITHIN = 4.0

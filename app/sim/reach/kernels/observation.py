@@ -7,7 +7,8 @@ left; there is no hidden history. ``LAYOUT`` gives the slice of each group.
 
 A policy observes the nearest person as a vertical cylinder: a pedestrian as it is, a worker as
 the cylinder about the pelvis that contains the body, and ``NO_PERSON`` in an empty cell.
-Clearances are exact and consider all people.
+Clearances are exact and consider all people, except ``look_ahead_base``, the clearance along
+the base motion: it is that of the observed person alone, as the cylinder.
 
 Source: (4.30). Deviates: features are added, because the raw state learned far more slowly (1 %
 against 90 % after 2.7 k updates in trials).
