@@ -10,6 +10,7 @@ from app.policies.configs.pick import PICK
 from app.policies.configs.presets import PRESETS
 from app.policies.configs.sorting import SORTING_PRESETS
 from app.policies.inference.task_selection import HYSTERESIS
+from app.policies.networks.outcome import MEMBERS, N_OUT, combine
 from app.sim.sorting.kernels.reward import distance_cost
 from app.sim.sorting.near_optimal_moves import MARGIN
 
@@ -68,6 +69,16 @@ def test_the_method_states_the_reward_of_picks() -> None:
     assert stated["$c_c$"][1].startswith(f"{reward.c_c:g}, growing to {reward.c_c_end:g} ")
     assert float(stated["$c_{step}$"][1]) == reward.c_step
     assert float(stated["$c_s$"][1]) == reward.c_s
+
+
+def test_the_method_states_the_interval_of_outcome_probabilities() -> None:
+    scores = np.random.default_rng(1).normal(size=(MEMBERS, 5, N_OUT)).astype(np.float32)
+    shares = np.exp(scores[..., :-1])
+    shares /= shares.sum(axis=-1, keepdims=True)
+    found = combine(scores, widen=1.0)
+    (stated,) = re.findall(r"interval is ([0-9.]+) standard deviations", section(METHOD, "3.6"))
+    half = float(stated) * shares.std(axis=0, ddof=1)
+    np.testing.assert_allclose(found.spread, half, rtol=1e-4)
 
 
 def test_fields_of_presets_that_pages_name_exist() -> None:
