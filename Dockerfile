@@ -18,8 +18,9 @@ WORKDIR /srv/tandem
 COPY Makefile requirements.lock requirements-setup.lock ./
 COPY tools/install.py tools/
 ARG TORCH_INDEX=https://download.pytorch.org/whl/cpu
-# Bytecode of all packages: a container cannot write it.
-RUN UV_COMPILE_BYTECODE=1 make .venv/runtime.stamp PYTHON=python${PYTHON} TORCH_INDEX=$TORCH_INDEX
+# Bytecode of all packages: a container cannot write it. uv (37 MB) has done its work.
+RUN UV_COMPILE_BYTECODE=1 make .venv/runtime.stamp PYTHON=python${PYTHON} TORCH_INDEX=$TORCH_INDEX \
+    && .venv/bin/python -m pip uninstall --quiet --yes uv
 
 FROM python:${PYTHON}-slim
 # Pinocchio is linked against GNU OpenMP, which slim images do not have.
