@@ -1,13 +1,14 @@
 """Install packages as ``pip install`` does, in a third of its time.
 
-    .venv/bin/python tools/install.py ARGUMENT ...
+    .venv/bin/python tools/install.py [OPTION ...] [-r FILE] [PACKAGE ...]
 
-The arguments are those of ``pip install`` that uv knows, too. uv installs; it does not read
-pip's configuration, so that the places and certificates of that are handed to it in its own
-environment variables. Where uv cannot be had, or fails, pip installs. pip installs uv itself
-first, the version of ``requirements-setup.lock``, whose hashes are checked.
+uv installs; it does not read pip's configuration, so that the places and certificates of that
+are handed to it in its own environment variables. Where uv cannot be had, or fails, pip
+installs. pip installs uv itself first, the version of ``requirements-setup.lock``, whose hashes
+are checked.
 """
 
+import argparse
 import ast
 import os
 import subprocess
@@ -34,17 +35,33 @@ VARIABLES = {
 
 def main(arguments: list[str]) -> int:
     """Install; return the exit status."""
+    given = parser().parse_args(arguments)
     if has_uv():
         uv = [sys.executable, "-m", "uv", "pip", "install", "--python", sys.executable]
         # As pip does, uv is to take the best match of all indexes, not of the first.
         best = ["--index-strategy", "unsafe-best-match"]
         env = places(configuration())
-        if any(one.partition("=")[0] in ("--index-url", "-i") for one in arguments):
+        if given.index_url is not None:
             env.pop("UV_DEFAULT_INDEX", None)  # uv would take this one, and not the argument's
         if subprocess.run([*uv, *best, *arguments], env=env).returncode == 0:
             return 0
         print("uv failed: pip installs instead", file=sys.stderr)
     return subprocess.run([*PIP, "install", "--progress-bar", "off", *arguments]).returncode
+
+
+def parser() -> argparse.ArgumentParser:
+    """Return the options, which pip and uv share."""
+    found = argparse.ArgumentParser(
+        description=__doc__,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        allow_abbrev=False,
+    )
+    for flag in ("--quiet", "--require-hashes", "--no-deps"):
+        found.add_argument(flag, action="store_true")
+    for option in ("--only-binary", "--index-url", "--target", "-r"):
+        found.add_argument(option)
+    found.add_argument("packages", nargs="*", metavar="PACKAGE")
+    return found
 
 
 def has_uv() -> bool:

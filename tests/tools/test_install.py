@@ -78,10 +78,10 @@ def test_index_of_the_command_counts_more_than_that_of_pip(tmp_path: Path) -> No
 
 
 def test_pip_installs_where_uv_cannot(wheels: Path, tmp_path: Path) -> None:
-    arguments = ["--root-user-action", "ignore", "--target", str(tmp_path / "here"), "probe"]
-    answer = install(wheels, *arguments)  # uv has no such option
-    assert "--root-user-action" in answer.stderr
-    assert "pip installs instead" in answer.stderr
+    places = {"PIP_FIND_LINKS": str(wheels), "PIP_NO_INDEX": "1"}
+    no_cache = {"UV_CACHE_DIR": str(SCRIPT / "cache")}  # below a file
+    answer = install_from({**places, **no_cache}, "--target", str(tmp_path / "here"), "probe")
+    assert "uv failed: pip installs instead" in answer.stderr
     assert installer_of(tmp_path / "here") == "pip"
 
 
