@@ -50,7 +50,10 @@ def main(arguments: list[str]) -> int:
 
 
 def parser() -> argparse.ArgumentParser:
-    """Return the options, which pip and uv share."""
+    """Return the options, which pip and uv share.
+
+    Not ``tools.arguments``: this file runs alone, before any package is there.
+    """
     found = argparse.ArgumentParser(
         description=__doc__,
         formatter_class=argparse.RawDescriptionHelpFormatter,

@@ -22,8 +22,9 @@ PATIENCE_MS = 180_000
 RUN_MS = 30_000
 """Time that a cell runs before its picture: the plots show the last 20 s."""
 MOVING = 0.3
-"""Least speed override of a picture: the layer slows the robot, and does not stop it."""
-MOST_LOOKS = 300
+"""Least speed override of a picture, so that it does not show a stopped robot."""
+LOOKS, LOOK_MS = 300, 200
+"""Most times to look for such a moment, and the time between them; the last one is taken."""
 STILL_MS = 8_000
 """Time for the scene to draw the paused cell."""
 
@@ -53,11 +54,11 @@ def take(page: Page, address: str, picture: Picture) -> None:
     for body in ({"tag": "resume"}, picture.begin):
         _command(page, address, body)
     page.wait_for_timeout(RUN_MS)
-    for _ in range(MOST_LOOKS):
+    for _ in range(LOOKS):
         world = page.request.get(f"{address}/v1/worlds/main").json()
         if world["safety"]["override"] >= MOVING:
             break
-        page.wait_for_timeout(200)
+        page.wait_for_timeout(LOOK_MS)
     _command(page, address, {"tag": "pause"})
     page.wait_for_timeout(STILL_MS)
     page.screenshot(path=IMAGES / picture.file)

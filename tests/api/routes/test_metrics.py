@@ -56,9 +56,8 @@ def test_decision_outside_the_training_range_is_counted(
 
 
 def test_decisions_outside_the_training_range_are_counted_from_zero_on() -> None:
-    registry = Metrics(
-        "1"
-    ).registry  # an increase to a first value is no increase for Prometheus
+    # Prometheus sees no increase where a series begins with 1.
+    registry = Metrics("1").registry
     for endpoint in ("/v1/motion", "/v1/plan", "/v1/sorting", "/v1/task-selection"):
         name, labels = "tandem_decisions_outside_training_total", {"endpoint": endpoint}
         assert registry.get_sample_value(name, labels) == 0.0
