@@ -20,7 +20,7 @@ from app.sim.robot.actions import ActionSettings
 from app.sim.robot.kernels import kinematics
 from app.sim.robot.kernels.joints import JointPath
 from app.sim.robot.trajectory_segment import TrajectorySegment
-from app.sim.scene.scene import arm_of, people_geometry_of, people_of
+from app.sim.scene.scene import arm_of, capsule_speeds_of, people_geometry_of, people_of
 
 GAIN = 3.0
 """Proportional gain from joint error to joint speed [1/s]."""
@@ -31,6 +31,8 @@ class HumanGeometry(NamedTuple):
 
     q: Vec
     """Joint positions of workers [m, rad], shape (W, 18)."""
+    qd: Vec
+    """Joint speeds of workers [m/s, rad/s], shape (W, 18)."""
     sizes: Vec
     """Body lengths of workers [m], shape (W, N_SIZE)."""
     cylinders: Vec
@@ -138,6 +140,7 @@ class LiveArm:
             columns=geometry.columns,
             cylinders=np.hstack([here.cylinders, top]),
             going=here.velocities,
+            speed=capsule_speeds_of(shared, geometry, here.q, here.qd),
         )
 
     def distances(self, people: PeopleInCell) -> dict[int, float]:

@@ -21,7 +21,9 @@ class SafetyInput(Body):
     """Assumptions of speed and separation monitoring; null keeps the value of the cell."""
 
     human_speed: Annotated[float, Field(ge=0.0, le=10.0)] | None = Field(
-        default=None, description="greatest speed of any point of a person, v_h [m/s]"
+        default=None,
+        description="assumed speed of any point of a person, v_h; a part of a person that is "
+        "observed faster counts at its observed speed [m/s]",
     )
     use_measured_velocity: bool | None = Field(
         default=None,
@@ -66,8 +68,8 @@ class Terms(Answer):
         description="v_h (T_r + T_s) + v_r T_r + B + C + Z_d + Z_r + protective distance [m]"
     )
     human_speed: float = Field(
-        description="v_h [m/s]; the measured velocity's component toward the link plus "
-        "`speed_change`, where velocities are measured"
+        description="v_h [m/s]: assumed, or observed where that is faster; with "
+        "`use_measured_velocity` the component toward the link plus `speed_change`"
     )
     robot_speed: float = Field(description="v_r, bound of that link's speed [m/s]")
     reaction_time: float = Field(description="T_r: period, reaction, delay and age [s]")

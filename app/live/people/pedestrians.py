@@ -151,7 +151,8 @@ class LivePedestrians:
     def geometry(self) -> HumanGeometry:
         """Collision geometry: cylinders only."""
         going = self.rows[:, [VX, VY, GROWTH]]
-        return HumanGeometry(np.zeros((0, 18)), np.zeros((0, N_SIZE)), self.cylinders, going)
+        no_joints = np.zeros((0, 18))
+        return HumanGeometry(no_joints, no_joints, np.zeros((0, N_SIZE)), self.cylinders, going)
 
     def restart(self) -> None:
         """Draw new starts for walking people; others keep their positions."""

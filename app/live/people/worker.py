@@ -66,6 +66,11 @@ class LiveWorker:
         return self._limbs.q
 
     @property
+    def qd(self) -> Vec:
+        """Joint speeds [m/s, rad/s], shape (18,)."""
+        return self._limbs.qd
+
+    @property
     def size(self) -> Vec:
         """Present body lengths [m], shape (12,)."""
         return self.body.size

@@ -61,6 +61,11 @@ class LiveWorkers:
         return np.array([one.q for one in self]).reshape(-1, 18)
 
     @property
+    def qd(self) -> Vec:
+        """Joint speeds [m/s, rad/s], shape (n, 18)."""
+        return np.array([one.qd for one in self]).reshape(-1, 18)
+
+    @property
     def sizes(self) -> Vec:
         """Body lengths [m], shape (n, N_SIZE)."""
         return np.array([one.size for one in self]).reshape(-1, N_SIZE)
@@ -68,7 +73,7 @@ class LiveWorkers:
     @property
     def geometry(self) -> HumanGeometry:
         """Collision geometry: capsules only."""
-        return HumanGeometry(self.q, self.sizes, NO_CYLINDERS, NO_CYLINDERS)
+        return HumanGeometry(self.q, self.qd, self.sizes, NO_CYLINDERS, NO_CYLINDERS)
 
     def only_first(self) -> LiveWorker:
         """Replace all people by the worker of the cell, and return it."""

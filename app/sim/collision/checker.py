@@ -34,6 +34,8 @@ class Shapes:
     going: Vec | None = None
     """Velocities of the cylinders: vx, vy and growth of the radius [m/s], shape (n, 3); NaN in
     rows of unknown velocity, None where all are unknown."""
+    speed: Vec | None = None
+    """Observed speed of each capsule [m/s], shape (m,); None where unknown."""
 
 
 def no_people() -> Shapes:

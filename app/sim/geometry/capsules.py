@@ -201,21 +201,40 @@ def pair_distances(
         out[k] = axes - a[RADIUS, i] - a[RADIUS, j]
 
 
+@kernel(inline="always")
+def _square_displacement(before: Vec, after: Vec, k: int) -> float:
+    """Return the square of the greater displacement of the two ends of column ``k`` [m^2]."""
+    x, y, z = (
+        after[X, k] - before[X, k],
+        after[Y, k] - before[Y, k],
+        after[Z, k] - before[Z, k],
+    )
+    ux = x + after[UX, k] - before[UX, k]
+    uy = y + after[UY, k] - before[UY, k]
+    uz = z + after[UZ, k] - before[UZ, k]
+    return float(max(x * x + y * y + z * z, ux * ux + uy * uy + uz * uz))
+
+
 @kernel(error_model="numpy", fastmath=FAST)
 def greatest_displacement(before: Vec, after: Vec) -> float:
     """Return the greatest displacement of any capsule end [m]; both sets of shape (9, n)."""
     longest = 0.0
     for k in range(before.shape[1]):
-        x, y, z = (
-            after[X, k] - before[X, k],
-            after[Y, k] - before[Y, k],
-            after[Z, k] - before[Z, k],
-        )
-        ux = x + after[UX, k] - before[UX, k]
-        uy = y + after[UY, k] - before[UY, k]
-        uz = z + after[UZ, k] - before[UZ, k]
-        longest = max(longest, x * x + y * y + z * z, ux * ux + uy * uy + uz * uz)
+        longest = max(longest, _square_displacement(before, after, k))
     return math.sqrt(longest)
+
+
+@kernel(error_model="numpy", fastmath=FAST)
+def displacements(before: Vec, after: Vec, out: Vec) -> None:
+    """Write the greater displacement of the two ends of each capsule [m].
+
+    Args:
+        before: Capsules, shape (9, n).
+        after: The same moved, shape (9, n).
+        out: Filled, shape (n,).
+    """
+    for k in range(before.shape[1]):
+        out[k] = math.sqrt(_square_displacement(before, after, k))
 
 
 @kernel(inline="always")

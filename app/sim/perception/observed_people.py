@@ -31,7 +31,7 @@ from app.sim.perception.keypoints import FARTHEST_M
 from app.sim.perception.person_estimator import PersonEstimate
 from app.sim.robot.kernels import arm as arm_kernel
 from app.sim.robot.kernels.arm import Arm
-from app.sim.scene.scene import people_geometry_of
+from app.sim.scene.scene import capsule_speeds_of, people_geometry_of
 
 FASTEST = 50.0
 """Largest speed of joints, cylinder axis or radius [m/s, rad/s]."""
@@ -334,6 +334,7 @@ def people_shapes(shared: People, people: Sequence[Person]) -> Shapes:
         people: Checked people, any number; those with joint angles first, then cylinders.
     """
     geometry = _placed(shared, people)
+    workers = [person for person in people if person.cylinder is None]
     cylinders = [person for person in people if person.cylinder is not None]
     tops = [max(shared.top_z, person.top or shared.top_z) for person in cylinders]
     going = [
@@ -344,6 +345,12 @@ def people_shapes(shared: People, people: Sequence[Person]) -> Shapes:
         columns=geometry.columns,
         cylinders=np.column_stack([geometry.cylinders, tops]),
         going=np.reshape(going, (-1, 3)),
+        speed=capsule_speeds_of(
+            shared,
+            geometry,
+            np.reshape([one.q for one in workers], (-1, 18)),
+            np.reshape([one.qd for one in workers], (-1, 18)),
+        ),
     )
 
 

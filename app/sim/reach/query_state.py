@@ -35,7 +35,13 @@ from app.sim.reach.kernels.observation_workspace import new_observation_workspac
 from app.sim.reach.kernels.query_state import load_state
 from app.sim.robot.measured_state import Joints
 from app.sim.scenario.kernels.episode import new_episode_state
-from app.sim.scene.scene import HumanKind, new_people_state, people_of, with_people
+from app.sim.scene.scene import (
+    HumanKind,
+    capsule_speeds_of,
+    new_people_state,
+    people_of,
+    with_people,
+)
 
 _ROW = np.zeros(1, dtype=np.int64)
 
@@ -95,15 +101,16 @@ class QueryState:
     @property
     def shapes(self) -> Shapes:
         """The people as shapes, bodies first."""
-        geometry = self._work.geometry
+        geometry, people = self._work.geometry, self.state.people
         return Shapes(
             columns=geometry.columns.copy(),
             cylinders=np.concatenate([geometry.cylinders, self._tops], axis=1),
             going=np.where(
                 self._measured[:, None],
-                self.state.people.walkers.rows[0][:, [VX, VY, GROWTH]],
+                people.walkers.rows[0][:, [VX, VY, GROWTH]],
                 np.nan,
             ),
+            speed=capsule_speeds_of(self.world.people, geometry, people.q[0], people.qd[0]),
         )
 
     def load(self, robot: Joints, people: Sequence[Person], time_left_s: float) -> None:

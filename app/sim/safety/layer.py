@@ -66,7 +66,7 @@ class SafetySettings:
     """
 
     human_speed: float = 1.6
-    """Greatest speed of any point of a person, v_h [m/s]."""
+    """Speed of any point of a person, v_h, unless it is observed faster [m/s]."""
     use_measured_velocity: bool = False
     """Whether a cylinder of known velocity is extrapolated with it, instead of with v_h."""
     speed_change: float = 0.1
@@ -227,19 +227,21 @@ class SafetyLayer:
     def _load_people(self, people: Shapes) -> None:
         """Allocate work space for the people and load the velocities of cylinders."""
         shape = (people.columns.shape[1], len(people.cylinders))
+        if people.speed is not None:
+            require_finite("people", people.speed)
         going = people.going if self.settings.use_measured_velocity else None
         known = going is not None
         if (shape, known) != (self._shape, self._known):
             self._shape, self._known, self._call = shape, known, None
             self._space = watch_kernel.new_ssm_workspace(self.arm, *shape)
             self._rule = separation_rule(self.settings, *shape, known)
+        self._space.observed_speed[:] = _observed_speeds(people, known)
         if going is not None:
             unknown = np.asarray(np.isnan(going).any(axis=1))
             seen = np.where(unknown[:, None], 0.0, going)
             require_finite("people", seen)
             self._space.velocity[:] = seen
-            fastest = np.hypot(seen[:, 0], seen[:, 1]) + np.abs(seen[:, 2])
-            self._space.known_speed[shape[0] :] = fastest
+            self._space.known_speed[shape[0] :] = _greatest_speeds(seen)
             settings = self.settings
             change = np.where(unknown, settings.human_speed, settings.speed_change)
             self._rule.speed[shape[0] :] = change
@@ -343,7 +345,7 @@ class SafetyLayer:
     def _human_speed(
         self, column: int, people: Shapes, separation: float, seconds: float
     ) -> float:
-        """Return v_h of a part of the people: assumed, or by its observed velocity [m/s].
+        """Return v_h of a part of the people: assumed, or as observed [m/s].
 
         Args:
             column: Part of the people.
@@ -352,9 +354,29 @@ class SafetyLayer:
         """
         k = column - self._shape[0]
         if k < 0 or not self._known or people.going is None or np.isnan(people.going[k]).any():
-            return self.settings.human_speed
+            observed = float(self._space.observed_speed[column])
+            return max(self.settings.human_speed, observed)
         robot, (x, y, r, _) = self._space.columns[watch_kernel.NOW], people.cylinders[k]
         vx, vy, growth = people.going[k]
         grown = r + max(0.0, growth) * seconds
         there = swept_clearance(robot, x, y, vx * seconds, vy * seconds, grown)
         return max(0.0, separation - float(there)) / seconds + self.settings.speed_change
+
+
+def _observed_speeds(people: Shapes, known: bool) -> Vec:
+    """Return the observed speed of each part, 0 where unknown [m/s], shape (m + n,).
+
+    Args:
+        known: Whether cylinders of known velocity are extrapolated, so that it counts already.
+    """
+    m, n = people.columns.shape[1], len(people.cylinders)
+    of_capsules = np.zeros(m) if people.speed is None else people.speed
+    if known or people.going is None:
+        return np.concatenate((of_capsules, np.zeros(n)))
+    return np.concatenate((of_capsules, np.nan_to_num(_greatest_speeds(people.going))))
+
+
+def _greatest_speeds(going: Vec) -> Vec:
+    """Return the greatest speed of any point of cylinders by their velocities [m/s]."""
+    speeds: Vec = np.hypot(going[:, 0], going[:, 1]) + np.abs(going[:, 2])
+    return speeds

@@ -25,7 +25,7 @@ from app.sim.geometry.capsules import new_columns
 from app.sim.human import model as human
 from app.sim.human.kernels import kinematics as body
 from app.sim.people.human_motion_config import NO_TRACKS, HumanMotionConfig, with_human_motion
-from app.sim.people.kernels import people
+from app.sim.people.kernels import people, speeds
 from app.sim.people.kernels.people import MAX_PEOPLE, People, PeopleState
 from app.sim.people.pedestrian import PedestrianSettings, pedestrian_rules, pedestrian_state
 from app.sim.primitives.kernels import script
@@ -250,3 +250,22 @@ def people_geometry_of(
     people.place_workers(shared, as_kernel_array(human_q), geometry)
     geometry.cylinders[:] = cylinders
     return geometry
+
+
+def capsule_speeds_of(
+    shared: People, placed: people.PeopleGeometry, human_q: Vec, human_qd: Vec
+) -> Vec:
+    """Return the speed of each capsule of placed workers [m/s], shape (n,).
+
+    Args:
+        shared: From :func:`people_of`.
+        placed: The workers, placed at ``human_q``.
+        human_q: Their joint positions [m, rad], shape (W, 18).
+        human_qd: Their joint speeds [m/s, rad/s], shape (W, 18).
+    """
+    columns, out = placed.columns, np.empty(placed.columns.shape[1])
+    moved = people.new_people_geometry(shared._replace(columns=columns), len(human_q), 0)
+    moved.size[:] = placed.size
+    q, qd = as_kernel_array(human_q), as_kernel_array(human_qd)
+    speeds.capsule_speeds(shared, q, qd, columns, moved, out)
+    return out

@@ -121,6 +121,18 @@ def test_layer_stops_the_robot_before_a_person_and_says_why(world: LivePickWorld
     assert until(world, "picking").safety.override == 1.0
 
 
+def test_parts_that_move_faster_than_assumed_count_at_their_speed(world: LivePickWorld) -> None:
+    """T_r of the robot at rest is 0.15 s; people turn at up to 2.5 rad/s."""
+    world.apply(commands.SetCandidates(ids=()))
+    world.apply(commands.SetSafety(on=True, human_speed=0.2))
+    still = run(world, 40).safety
+    assert still.person_distance == pytest.approx(0.2 * 0.15)
+    world.apply(commands.MovePerson(pelvis=(0.0, 2.4, 1.0)))
+    turning = run(world, 3).safety
+    assert 0.4 * 0.15 < turning.person_distance < 2.5 * 0.5 * 0.15
+    assert run(world, 60).safety.person_distance == pytest.approx(0.2 * 0.15)
+
+
 def test_layer_starts_with_the_settings_of_the_cell_and_takes_others(
     world: LivePickWorld,
 ) -> None:

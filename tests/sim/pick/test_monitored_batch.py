@@ -8,6 +8,7 @@ import pytest
 from app.sim.cells.cell import load_cell
 from app.sim.collision.checker import Shapes, capsule_shapes
 from app.sim.human import model as human
+from app.sim.people.human_motion_config import HumanMotionConfig
 from app.sim.pick.batch import WHOLE_PICK, PickBatch
 from app.sim.pick.kernels.grasp import GraspRules
 from app.sim.pick.monitored_batch import AMONG_HANDS, MonitoredPickBatch
@@ -37,13 +38,21 @@ def straight(batch: PickBatch) -> np.ndarray:
 
 
 def people_of(batch: PickBatch, e: int) -> Shapes:
-    """Return the capsules of the workers of an environment from their joints and sizes."""
-    people, sized = batch.state.people, []
-    for q, size in zip(people.q[e], people.size[e], strict=True):
-        ends = human.capsules(q, size, CELL.floor_z)
-        sized.append((ends, human.capsule_radii(size)))
-    ends, radii = (np.concatenate(part) for part in zip(*sized, strict=True))
-    return capsule_shapes(ends, radii)
+    """Return the capsules of the workers of an environment from their joints and sizes.
+
+    Their speeds are central differences over 2 microseconds.
+    """
+    people, sized, step = batch.state.people, [], 1e-6
+    for q, qd, size in zip(people.q[e], people.qd[e], people.size[e], strict=True):
+        before, ends, after = (
+            human.capsules(q + at * qd, size, CELL.floor_z) for at in (-step, 0.0, step)
+        )
+        speeds = np.linalg.norm(after - before, axis=2).max(axis=1) / (2.0 * step)
+        sized.append((ends, human.capsule_radii(size), speeds))
+    ends, radii, speeds = (np.concatenate(part) for part in zip(*sized, strict=True))
+    shapes = capsule_shapes(ends, radii)
+    unused = shapes.columns.shape[1] - len(speeds)
+    return replace(shapes, speed=np.append(speeds, np.zeros(unused)))
 
 
 def to_the_end(batch: MonitoredPickBatch) -> MonitoredEpisodes:
@@ -80,9 +89,10 @@ def test_capsules_of_workers_are_stored_whole(guarded):
 
 
 def test_each_period_is_what_the_layer_decides():
-    batch = monitored(8)
+    quick = replace(WHOLE_PICK, work=HumanMotionConfig(pace=2.0))
+    batch = MonitoredPickBatch(CELL, 8, 3, quick, AMONG_HANDS, CONTINUES)
     batch.reset()
-    layer, slowed = SafetyLayer(batch.arm, AMONG_HANDS), 0
+    layer, slowed, faster = SafetyLayer(batch.arm, AMONG_HANDS), 0, 0
     for _ in range(60):
         q, qd = batch.state.q.copy(), batch.state.qd.copy()
         people = people_of(batch, 7)
@@ -91,9 +101,11 @@ def test_each_period_is_what_the_layer_decides():
         if batch.state.outcome[e] != RUNNING:
             break
         done = layer.decide(q[e], qd[e], batch._work.c, batch._work.d, people)
-        np.testing.assert_array_equal(batch.state.q[e], done.q)
+        np.testing.assert_allclose(batch.state.q[e], done.q, atol=1e-9)
         slowed += done.override < 1.0
-    assert slowed > 5
+        assert people.speed is not None
+        faster += people.speed.max() > AMONG_HANDS.human_speed
+    assert slowed > 5 and faster > 5
 
 
 def test_the_moving_robot_touches_no_person_and_takes_longer():

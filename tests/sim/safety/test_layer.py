@@ -155,6 +155,31 @@ def test_who_is_not_known_to_go_on_is_taken_to_be_as_fast_as_assumed(settings):
     assert layer.terms(decision, NONE, people)[1].human_speed == 1.6
 
 
+@pytest.mark.parametrize(
+    ("people", "speed"),
+    [
+        (replace(walker(0.5), going=np.array([[1.2, -1.6, 0.5]])), 2.5),
+        (replace(walker(0.5), going=np.array([[0.3, 0.4, -0.1]])), 1.6),
+        (replace(ahead(0.5), speed=np.array([2.5])), 2.5),
+        (replace(ahead(0.5), speed=np.array([1.5])), 1.6),
+    ],
+)
+def test_who_is_observed_faster_than_assumed_counts_at_that_speed(people, speed):
+    """By hand, at rest: the distance less that speed times (0.1 s + 0.05 s) may be kept."""
+    for more, admitted in ((-1e-6, True), (1e-6, False)):
+        protected = apart(people) - speed * 0.15 + more
+        layer = SafetyLayer(ARM, replace(SafetySettings(), protective_distance=protected))
+        decision = layer.decide(REST, NONE, NONE, NONE, people)
+        assert (decision.override == 1.0) is admitted
+    assert layer.terms(decision, NONE, people)[1].human_speed == pytest.approx(speed)
+
+
+def test_observed_speeds_of_capsules_must_be_numbers():
+    with pytest.raises(SimulationError):
+        fast = replace(ahead(0.5), speed=np.array([np.nan]))
+        SafetyLayer(ARM, SafetySettings()).decide(REST, NONE, NONE, NONE, fast)
+
+
 def test_of_several_people_each_is_taken_as_what_is_known_of_it():
     near, far = walker(0.4), walker(1.0)
     people = replace(

@@ -17,9 +17,9 @@ from app.sim.people.kernels.people import (
     People,
     PeopleGeometry,
     people_clearance,
-    people_speed_bound,
     place_workers,
 )
+from app.sim.people.kernels.speeds import people_speed_bound
 from app.sim.robot.kernels.arm import (
     Arm,
     RobotPose,

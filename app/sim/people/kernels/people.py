@@ -16,7 +16,6 @@ from app.sim.geometry.capsules import (
     capsule_clearances,
     copy_rows,
     copy_values,
-    greatest_displacement,
     least,
 )
 from app.sim.geometry.cylinder import cylinder_clearance
@@ -218,27 +217,6 @@ def people_clearance(people: People, robot: Vec, geometry: PeopleGeometry) -> fl
         d, _ = cylinder_clearance(robot, 0, x, y, r, people.top_z)
         best = min(best, d)
     return best
-
-
-@kernel()
-def people_speed_bound(before: Vec, after: Vec, start: Vec, end: Vec, dt: float) -> float:
-    """Return a bound on the speed of any point of the people in a period [m/s].
-
-    Workers: chords of the capsules' ends plus 5 % for the arc, sufficient for rotations up to
-    one radian per period. Pedestrians: displacement plus growth of the radius.
-
-    Args:
-        before: The workers' capsules at the start, shape (9, n).
-        after: Their capsules at the end, shape (9, n).
-        start: x, y and radius of the pedestrians at the start [m], shape (C, 3).
-        end: The same at the end [m], shape (C, 3).
-        dt: Period [s].
-    """
-    longest = 1.05 * greatest_displacement(before, after)
-    for k in range(start.shape[0]):
-        moved = math.hypot(end[k, 0] - start[k, 0], end[k, 1] - start[k, 1])
-        longest = max(longest, moved + abs(end[k, 2] - start[k, 2]))
-    return longest / dt
 
 
 @kernel(inline="always")

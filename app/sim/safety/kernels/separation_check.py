@@ -43,8 +43,8 @@ class SeparationRule(NamedTuple):
     """Assumptions of speed and separation monitoring."""
 
     speed: Vec
-    """Assumed speed of each capsule and cylinder in any direction, beyond its known velocity
-    [m/s], shape (m + n,)."""
+    """Least assumed speed of each capsule and cylinder in any direction, beyond its known
+    velocity [m/s], shape (m + n,)."""
     latency: float
     """Age of people relative to the robot's state, with the reaction time [s]."""
     margin: float
@@ -96,6 +96,9 @@ class SsmWorkspace(NamedTuple):
     """Known vx, vy and growth of cylinders [m/s], zeros where unknown, shape (n, 3)."""
     known_speed: Vec
     """Speed of any point of each part by that velocity [m/s], shape (m + n,)."""
+    observed_speed: Vec
+    """Observed speed of each part, 0 if unknown or part of its known velocity [m/s],
+    shape (m + n,)."""
     x: Vec
     """Time of each node since the start of its segment [s], shape (N_NODES,)."""
     right: NDArray[np.int64]
@@ -132,6 +135,7 @@ def new_ssm_workspace(arm: Arm, n_columns: int, n_cylinders: int) -> SsmWorkspac
         gap=np.empty((N_NODES, n_parts)),
         velocity=np.zeros((n_cylinders, 3)),
         known_speed=np.zeros(n_parts),
+        observed_speed=np.zeros(n_parts),
         x=np.zeros(N_NODES),
         right=np.zeros(N_NODES, dtype=np.int64),
         none=np.zeros(6),
@@ -177,6 +181,20 @@ def place_node(
 
 
 @kernel(error_model="numpy", inline="always")
+def person_reach(rule: SeparationRule, j: int, age: float, space: SsmWorkspace) -> float:
+    """Return the distance that part ``j`` of the people may have covered, plus D [m].
+
+    A part observed faster than assumed counts at its observed speed.
+
+    Args:
+        rule: Assumptions.
+        age: Time since people were observed [s].
+        space: Work space with the observed speeds.
+    """
+    return float(max(rule.speed[j], space.observed_speed[j]) * age + rule.margin)
+
+
+@kernel(error_model="numpy", inline="always")
 def violates_separation(
     rule: SeparationRule, age: float, t: float, node: int, space: SsmWorkspace
 ) -> bool:
@@ -189,7 +207,7 @@ def violates_separation(
     """
     gap = space.gap[node]
     for j in range(gap.shape[0]):
-        reach = rule.speed[j] * age + rule.margin
+        reach = person_reach(rule, j, age, space)
         if rule.contact_speed[j] <= 0.0 and not gap[j] >= reach:
             cause = space.cause
             cause[CAUSE_TIME], cause[CAUSE_PART], cause[CAUSE_SHORTFALL] = t, j, reach - gap[j]
@@ -254,11 +272,11 @@ def _interval_clear(
     for j in range(before.shape[0]):
         both = w + space.known_speed[j] * span
         least = 0.5 * (before[j] + after[j] - both)
-        reach = rule.speed[j] * age + rule.margin
+        reach = person_reach(rule, j, age, space)
         if not (least > reach or path_speed * fastest <= rule.contact_speed[j]):
             cause = space.cause
             cause[CAUSE_TIME], cause[CAUSE_PART], cause[CAUSE_SHORTFALL] = t, j, reach - least
-            return False, both + rule.speed[j] * span
+            return False, both + max(rule.speed[j], space.observed_speed[j]) * span
     return True, w
 
 

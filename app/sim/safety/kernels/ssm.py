@@ -6,12 +6,13 @@ every time ``t`` of that path until the robot rests, every person as last observ
 
     reach(t) = v_h (T + t) + D
 
-is clear of the robot. Otherwise the stop from the current state is executed. The latency ``T``
-is the age of the people relative to the robot's state, including the controller's reaction: age
-of the data, tracker delay and reaction time. ``D = C + Z_d + Z_r`` plus the protective
-distance. A cylinder with a known velocity may be extrapolated instead: it counts along its
-whole path at that velocity since its observation, as if present everywhere on it, and ``v_h``
-is only the assumed excess over the observed speed (``separation_check.py``).
+is clear of the robot. Otherwise the stop from the current state is executed. ``v_h`` is an
+assumption; a part of a person that is observed faster counts at its observed speed. The latency
+``T`` is the age of the people relative to the robot's state, including the controller's
+reaction: age of the data, tracker delay and reaction time. ``D = C + Z_d + Z_r`` plus the
+protective distance. A cylinder with a known velocity may be extrapolated instead: it counts
+along its whole path at that velocity since its observation, as if present everywhere on it, and
+``v_h`` is only the assumed excess over the observed speed (``separation_check.py``).
 
 ``T_r`` of the standard is the latency and the control period; ``T_s`` is the stop at the end of
 the path; ``v_r T_r + B`` are not bounded by a speed but computed from the poses themselves.
@@ -50,6 +51,10 @@ of 0: a part may be reached while no capsule's axis is faster than its limit any
 approaches an obstacle no faster than its axis moves. The whole robot counts as fast as its
 fastest axis; a person's own speed is not counted. Step 2 holds unchanged.
 
+**People faster than assumed.** Observed speeds only make ``reach(t)`` longer, so all of this
+holds for people who keep to ``v_h``. Beside others the robot stops earlier and does not start,
+but nothing is guaranteed: a person may become even faster after the observation.
+
 Between poses the check is conservative, see ``separation_check.py``.
 
 Source: ISO/TS 15066:2016, 5.5.4 and 5.5.5 (docs/method.md 2.7).
@@ -79,6 +84,7 @@ from app.sim.safety.kernels.separation_check import (
     SeparationRule,
     SsmWorkspace,
     path_bounds,
+    person_reach,
     place_node,
     segment_clear,
     violates_separation,
@@ -103,7 +109,7 @@ def _trivially_separated(
     """
     now = space.gap[NOW]
     for j in range(now.shape[0]):
-        reach = rule.speed[j] * age + space.known_speed[j] * later + rule.margin
+        reach = person_reach(rule, j, age, space) + space.known_speed[j] * later
         if not now[j] - distance > reach:
             return False
     return True

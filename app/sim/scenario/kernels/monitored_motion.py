@@ -31,7 +31,13 @@ from app.sim.people.kernels.pedestrian import (
     remember,
     remember_as_now,
 )
-from app.sim.people.kernels.people import People, place_people, store_clearances
+from app.sim.people.kernels.people import (
+    People,
+    PeopleGeometry,
+    place_people,
+    store_clearances,
+)
+from app.sim.people.kernels.speeds import capsule_speeds
 from app.sim.robot.kernels.actions import ActionRule, Coefficients, advance
 from app.sim.robot.kernels.arm import Arm, copy_capsules, place_robot
 from app.sim.robot.kernels.joints import JointPath, JointState
@@ -40,7 +46,6 @@ from app.sim.safety.kernels.adversarial_trials import MOVING, first_contact, tou
 from app.sim.safety.kernels.separation_check import (
     NOW,
     PeopleShapes,
-    SsmWorkspace,
     place_node,
 )
 from app.sim.safety.kernels.ssm import decide
@@ -153,30 +158,51 @@ def _people_after(
 
 
 @kernel(inline="always")
-def _pass_velocities(state: EpisodeState, e: int, space: SsmWorkspace) -> None:
-    """Pass the measured velocities of the pedestrians of environment ``e`` to the layer."""
-    rows, m = state.people.walkers.rows, space.known_speed.shape[0] - space.velocity.shape[0]
+def _pass_speeds(
+    people: People,
+    state: EpisodeState,
+    e: int,
+    monitor: MonitoredState,
+    geometry: PeopleGeometry,
+) -> None:
+    """Pass the observed speeds of the people of environment ``e`` to the layer.
+
+    Pedestrians with measured velocities are extrapolated, the others count at their speeds.
+    """
+    who, space = state.people, monitor.trial.ssm
+    m = monitor.trial.columns0.shape[1]
+    copy_rows(who.size[e], geometry.size)
+    speeds = space.observed_speed[:m]
+    capsule_speeds(people, who.q[e], who.qd[e], monitor.trial.columns0, geometry, speeds)
     for k in range(space.velocity.shape[0]):
-        row, going = rows[e, k], space.velocity[k]
-        going[0], going[1], going[2] = row[VX], row[VY], row[GROWTH]
-        space.known_speed[m + k] = math.hypot(row[VX], row[VY]) + abs(row[GROWTH])
+        row, going = who.walkers.rows[e, k], space.velocity[k]
+        speed = math.hypot(row[VX], row[VY]) + abs(row[GROWTH])
+        if monitor.measured:
+            going[0], going[1], going[2] = row[VX], row[VY], row[GROWTH]
+            space.known_speed[m + k] = speed
+        else:
+            space.observed_speed[m + k] = speed
 
 
 @kernel(inline="always")
 def _execute(
-    arm: Arm, state: EpisodeState, e: int, monitor: MonitoredState, work: StepWorkspace
+    arm: Arm,
+    people: People,
+    state: EpisodeState,
+    e: int,
+    monitor: MonitoredState,
+    work: StepWorkspace,
 ) -> None:
     """Apply the safety layer to the segment in ``work``; ``trial.ssm`` has the motion."""
     trial, account = monitor.trial, monitor.account[e]
     space, override = trial.ssm, 1.0
     for j in range(6):
         trial.q[j], trial.qd[j] = state.q[e, j], state.qd[e, j]
-    if monitor.measured:
-        _pass_velocities(state, e, space)
     if monitor.active:
-        people = PeopleShapes(trial.columns0, trial.cylinders0)
+        _pass_speeds(people, state, e, monitor, work.geometry)
+        shapes = PeopleShapes(trial.columns0, trial.cylinders0)
         path = JointPath(trial.q, trial.qd, work.c, work.d)
-        override = decide(arm, monitor.safety, 0.0, people, path, space)
+        override = decide(arm, monitor.safety, 0.0, shapes, path, space)
     else:
         end = space.end
         space.deceleration[0] = 0.0
@@ -284,7 +310,7 @@ def move_monitored(
         Whether there was a contact that ends the episode.
     """
     _people_before(people, state, e, monitor.trial)
-    _execute(arm, state, e, monitor, work)
+    _execute(arm, people, state, e, monitor, work)
     _people_after(arm, people, state, e, monitor, work)
     touched = _touch(arm, monitor, e)
     _arrive(arm, people, state, e, monitor, work)

@@ -133,6 +133,23 @@ def test_who_is_seen_to_walk_past_does_not_hold_the_robot_where_velocities_are_m
     assert toward["override"] < 1.0
 
 
+def test_a_person_observed_faster_than_assumed_counts_at_the_observed_speed(
+    client: TestClient,
+) -> None:
+    """1.25 m away: a walker at 3 m/s, and a body that turns as fast, slow the robot."""
+    place = {**WALKER, "x": 0.0, "y": 1.6, "vx": 0.0}
+    walker = asked(client, people=[{**place, "vy": -3.0}])["safety"]["terms"]
+    assert walker["human_speed"] == pytest.approx(3.0)
+    assert (
+        asked(client, people=[{**place, "vy": -1.5}])["safety"]["terms"]["human_speed"] == 1.6
+    )
+    body = {"q": [0.0, 1.6, -1.57] + [0.0] * 15, "qd": [0.0, -3.0] + [0.0] * 16}
+    terms = asked(client, people=[body])["safety"]["terms"]
+    assert terms["human_speed"] == pytest.approx(3.0)
+    still = {**body, "qd": [0.0] * 18}
+    assert asked(client, people=[still])["safety"]["terms"]["human_speed"] == 1.6
+
+
 def test_overlapping_person_is_a_stop_with_monitoring_and_a_problem_without(
     client: TestClient,
 ) -> None:

@@ -162,6 +162,25 @@ def test_an_admitted_stop_stays_admissible_as_people_run():
     assert checked > 40
 
 
+def test_a_part_observed_faster_than_assumed_counts_at_its_speed():
+    """Decisions by observed speeds are those of rules that assume these speeds."""
+    rng, space = np.random.default_rng(11), watch.new_ssm_workspace(ARM, 8, 0)
+    other, changed = watch.new_ssm_workspace(ARM, 8, 0), 0
+    slow = watch.SeparationRule(np.full(8, 0.4), 0.05, 0.02, np.zeros(8))
+    for q, qd, c, d, people in motions(300, 12):
+        observed, path = rng.uniform(0.0, 2.0, 8), JointPath(q, qd, c, d)
+        space.observed_speed[:] = 0.0
+        unobserved = ssm.decide(ARM, slow, 0.0, shapes(people), path, space)
+        space.observed_speed[:] = observed
+        found = ssm.decide(ARM, slow, 0.0, shapes(people), path, space)
+        fast = slow._replace(speed=np.maximum(0.4, observed))
+        assert found == ssm.decide(ARM, fast, 0.0, shapes(people), path, other)
+        np.testing.assert_array_equal(space.cause, other.cause)
+        assert found <= unobserved
+        changed += found < unobserved
+    assert changed > 20
+
+
 def test_a_path_s_bounds_hold_for_points_of_every_link():
     space = watch.new_ssm_workspace(ARM, 8, 0)
     for q, qd, c, d, people in motions(100, 5):
