@@ -35,12 +35,14 @@ class Settings(BaseSettings):
     ray: str | None = Field(
         None,
         pattern=r"^\S+$",
+        examples=["auto", "10.0.0.5:6379"],
         description="Ray cluster that runs the jobs; this machine if unset.",
     )
     max_jobs: int = Field(1, ge=1, le=1000, description="Jobs that run at once.")
     worker_url: str | None = Field(
         None,
         pattern=r"^https?://[^/?#]+(/[A-Za-z0-9._~-]+)*$",
+        examples=["http://10.0.0.5:8000", "https://lab.example.org/tandem"],
         description="Address of this server for workers on other machines.",
     )
     token: SecretStr | None = Field(
@@ -56,6 +58,7 @@ class Settings(BaseSettings):
     root_path: str = Field(
         "",
         pattern=r"^(/[A-Za-z0-9._~-]+)*$",
+        examples=["/tandem", "/lab/tandem"],
         description="Path that a reverse proxy removes from requests, such as `/tandem`.",
     )
 
@@ -112,9 +115,14 @@ def load_settings(**overrides: object) -> Settings:
         return Settings(**{k: v for k, v in overrides.items() if v is not None})  # type: ignore[arg-type]
     except ValidationError as error:
         first = error.errors()[0]
-        name = PREFIX + "_".join(str(part) for part in first["loc"]).upper()
-        shown = "***" if name.endswith("TOKEN") else first["input"]
-        raise InvalidInput(name, shown, f"is refused: {first['msg']}") from None
+        field = "_".join(str(part) for part in first["loc"])
+        shown, rule = first["input"], f"is refused: {first['msg']}"
+        if first["type"] == "string_pattern_mismatch":
+            examples = Settings.model_fields[field].examples or ()
+            rule = f"must be of the form {' or '.join(map(str, examples))}"
+        if field.endswith("token"):
+            shown = "***"
+        raise InvalidInput(PREFIX + field.upper(), shown, rule) from None
 
 
 def check_access(settings: Settings) -> None:

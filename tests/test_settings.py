@@ -65,6 +65,25 @@ def test_bad_variable_is_refused_by_name(
             load_settings()
 
 
+@pytest.mark.parametrize(
+    ("name", "example"),
+    [
+        ("RAY", "10.0.0.5:6379"),
+        ("WORKER_URL", "http://10.0.0.5:8000"),
+        ("ROOT_PATH", "/tandem"),
+    ],
+)
+def test_form_of_a_variable_is_shown_by_an_example_that_is_taken(
+    monkeypatch: pytest.MonkeyPatch, name: str, example: str
+) -> None:
+    monkeypatch.setenv(f"TANDEM_{name}", "a b")
+    with pytest.raises(InvalidInput, match=f"TANDEM_{name} = 'a b' must be of the form") as one:
+        load_settings()
+    assert example in str(one.value)
+    monkeypatch.setenv(f"TANDEM_{name}", example)
+    assert getattr(load_settings(), name.lower()) == example
+
+
 def test_value_of_a_misspelt_secret_is_not_shown(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("TANDEM_TOKN", "a-token-of-this-server")
     with pytest.raises(InvalidInput, match="TANDEM_TOKN") as refused:
