@@ -169,13 +169,13 @@ def _pass_speeds(
 
     Pedestrians with measured velocities are extrapolated, the others count at their speeds.
     """
-    who, space = state.people, monitor.trial.ssm
+    rows, space = state.people, monitor.trial.ssm
     m = monitor.trial.columns0.shape[1]
-    copy_rows(who.size[e], geometry.size)
+    copy_rows(rows.size[e], geometry.size)
     speeds = space.observed_speed[:m]
-    capsule_speeds(people, who.q[e], who.qd[e], monitor.trial.columns0, geometry, speeds)
+    capsule_speeds(people, rows.q[e], rows.qd[e], monitor.trial.columns0, geometry, speeds)
     for k in range(space.velocity.shape[0]):
-        row, going = who.walkers.rows[e, k], space.velocity[k]
+        row, going = rows.walkers.rows[e, k], space.velocity[k]
         speed = math.hypot(row[VX], row[VY]) + abs(row[GROWTH])
         if monitor.measured:
             going[0], going[1], going[2] = row[VX], row[VY], row[GROWTH]
