@@ -35,13 +35,7 @@ from app.sim.reach.kernels.observation_workspace import new_observation_workspac
 from app.sim.reach.kernels.query_state import load_state
 from app.sim.robot.measured_state import Joints
 from app.sim.scenario.kernels.episode import new_episode_state
-from app.sim.scene.scene import (
-    HumanKind,
-    capsule_speeds_of,
-    new_people_state,
-    people_of,
-    with_people,
-)
+from app.sim.scene.scene import HumanKind, new_people_state, people_of, with_people
 
 _ROW = np.zeros(1, dtype=np.int64)
 
@@ -74,13 +68,14 @@ class QueryState:
         self._tops = np.full((n_cylinders, 1), self.top_z)
         self.distances = np.zeros(n_bodies + n_cylinders)
         """Distance of the robot to each person [m], bodies first, shape (n_people,)."""
+        self._speeds = np.zeros(self._work.geometry.columns.shape[1])
         self._call: Callable[..., None] | None = None
         self._buffers: dict[int, tuple[Vec, NDArray[np.float32]]] = {}
         self._load = direct(load_state, self._shared)
 
     @property
     def _shared(self) -> tuple[Any, ...]:
-        return self.world, self.state, self._work, self.distances
+        return self.world, self.state, self._work, self.distances, self._speeds
 
     @property
     def clear(self) -> Vec:
@@ -101,16 +96,16 @@ class QueryState:
     @property
     def shapes(self) -> Shapes:
         """The people as shapes, bodies first."""
-        geometry, people = self._work.geometry, self.state.people
+        geometry = self._work.geometry
         return Shapes(
             columns=geometry.columns.copy(),
             cylinders=np.concatenate([geometry.cylinders, self._tops], axis=1),
             going=np.where(
                 self._measured[:, None],
-                people.walkers.rows[0][:, [VX, VY, GROWTH]],
+                self.state.people.walkers.rows[0][:, [VX, VY, GROWTH]],
                 np.nan,
             ),
-            speed=capsule_speeds_of(self.world.people, geometry, people.q[0], people.qd[0]),
+            speed=self._speeds.copy(),
         )
 
     def load(self, robot: Joints, people: Sequence[Person], time_left_s: float) -> None:

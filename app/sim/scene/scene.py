@@ -263,7 +263,9 @@ def capsule_speeds_of(
         human_q: Their joint positions [m, rad], shape (W, 18).
         human_qd: Their joint speeds [m/s, rad/s], shape (W, 18).
     """
-    columns, out = placed.columns, np.empty(placed.columns.shape[1])
+    columns, out = placed.columns, np.zeros(placed.columns.shape[1])
+    if len(human_q) == 0:
+        return out
     moved = people.new_people_geometry(shared._replace(columns=columns), len(human_q), 0)
     moved.size[:] = placed.size
     q, qd = as_kernel_array(human_q), as_kernel_array(human_qd)

@@ -1,4 +1,4 @@
-"""A state that somebody tells is seen as in training."""
+"""A state in a request is observed as in training."""
 
 import numpy as np
 import pytest
@@ -20,6 +20,7 @@ from app.sim.perception.observed_people import person_from_cylinder
 from app.sim.reach.batch import ReachBatch, ReachSettings
 from app.sim.reach.query_state import QueryState
 from app.sim.robot.measured_state import Joints
+from app.sim.scene.scene import capsule_speeds_of, people_geometry_of
 from tests.sim.driven_batches import drive
 
 CELL = load_cell("shared-workspace")
@@ -39,6 +40,23 @@ def people_of(batch: ReachBatch, e: int) -> list[Person]:
         past = np.stack([row[PAST_RADIUS:PAST_SPEED], row[PAST_SPEED:]], axis=1)[1:]
         walkers.append(person_from_cylinder(*row[[X, Y, VX, VY, R, GROWTH]], past=past))
     return bodies + walkers
+
+
+def test_shapes_have_the_speeds_of_capsules() -> None:
+    batch = driven(("worker", "worker", "walker"), "forecast")
+    query, rows = QueryState(CELL, 2, 1, "forecast"), batch.state.people
+    shared, fastest = query.world.people, 0.0
+    for e in range(5):
+        state = batch.state
+        robot = Joints(state.q[e], state.qd[e], np.zeros(6))
+        query.load(robot, people_of(batch, e), state.time_left[e])
+        placed = people_geometry_of(shared, rows.q[e], np.zeros((0, 3)))
+        shapes = query.shapes
+        np.testing.assert_array_equal(shapes.columns, placed.columns)
+        speeds = capsule_speeds_of(shared, placed, rows.q[e], rows.qd[e])
+        np.testing.assert_array_equal(shapes.speed, speeds)
+        fastest = max(fastest, speeds.max())
+    assert fastest > 0.1
 
 
 @pytest.mark.parametrize("view", ["features", "state", "forecast"])
