@@ -227,15 +227,13 @@ class SafetyLayer:
     def _load_people(self, people: Shapes) -> None:
         """Allocate work space for the people and load the velocities of cylinders."""
         shape = (people.columns.shape[1], len(people.cylinders))
-        if people.speed is not None:
-            require_finite("people", people.speed)
         going = people.going if self.settings.use_measured_velocity else None
         known = going is not None
         if (shape, known) != (self._shape, self._known):
             self._shape, self._known, self._call = shape, known, None
             self._space = watch_kernel.new_ssm_workspace(self.arm, *shape)
             self._rule = separation_rule(self.settings, *shape, known)
-        self._space.observed_speed[:] = _observed_speeds(people, known)
+        self._load_speeds(people, known)
         if going is not None:
             unknown = np.asarray(np.isnan(going).any(axis=1))
             seen = np.where(unknown[:, None], 0.0, going)
@@ -245,6 +243,21 @@ class SafetyLayer:
             settings = self.settings
             change = np.where(unknown, settings.human_speed, settings.speed_change)
             self._rule.speed[shape[0] :] = change
+
+    def _load_speeds(self, people: Shapes, known: bool) -> None:
+        """Load the observed speed of each part, 0 where unknown.
+
+        Args:
+            known: Whether cylinders of known velocity are extrapolated with it.
+        """
+        m, observed = self._shape[0], self._space.observed_speed
+        if m:
+            observed[:m] = 0.0 if people.speed is None else people.speed
+            require_finite("people", observed[:m])
+        if known or people.going is None:
+            observed[m:] = 0.0
+        else:
+            np.fmax(_greatest_speeds(people.going), 0.0, out=observed[m:])  # NaN: unknown
 
     def _decision(self, chosen: float, qd: Vec, people: Shapes, age: float) -> SafetyDecision:
         """Return the decision in the work space, with its cause."""
@@ -361,19 +374,6 @@ class SafetyLayer:
         grown = r + max(0.0, growth) * seconds
         there = swept_clearance(robot, x, y, vx * seconds, vy * seconds, grown)
         return max(0.0, separation - float(there)) / seconds + self.settings.speed_change
-
-
-def _observed_speeds(people: Shapes, known: bool) -> Vec:
-    """Return the observed speed of each part, 0 where unknown [m/s], shape (m + n,).
-
-    Args:
-        known: Whether cylinders of known velocity are extrapolated, so that it counts already.
-    """
-    m, n = people.columns.shape[1], len(people.cylinders)
-    of_capsules = np.zeros(m) if people.speed is None else people.speed
-    if known or people.going is None:
-        return np.concatenate((of_capsules, np.zeros(n)))
-    return np.concatenate((of_capsules, np.nan_to_num(_greatest_speeds(people.going))))
 
 
 def _greatest_speeds(going: Vec) -> Vec:
