@@ -34,11 +34,11 @@ export function Safety({ world }) {
       <span class="hint" tabindex="0" aria-describedby="safety-help">ISO 10218-2
         <span class="tip tip-left" role="tooltip" id="safety-help">The robot must be able to stop
           before a person ${safety.use_measured_velocity ? "at the measured velocity plus " : "moving at "}${
-          safety.human_speed.toFixed(1)} m/s${safety.use_measured_velocity ? "" : ", or faster if seen so,"}
-          can reach it. The layer checks the path ahead; S<sub>p</sub> is the bound of the standard, so near
-          the limit the two differ slightly, and a robot that moves away may be faster. S<sub>p</sub> is
-          the sum of the distances that person and robot cover until the robot has stopped, and of the
-          margins. Not a certified safety function.</span>
+          safety.human_speed.toFixed(1)} m/s${safety.use_measured_velocity ? "" : ", or faster if seen so,"} can
+          reach it. The layer checks the path ahead; S<sub>p</sub> is the bound of the standard, so near the
+          limit the two differ slightly, and a robot that moves away may be faster. S<sub>p</sub> is the sum of
+          the distances that person and robot cover until the robot has stopped, and of the margins. Not a
+          certified safety function.</span>
       </span>
     </header>
     <div class="safety">
