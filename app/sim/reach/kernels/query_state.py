@@ -20,7 +20,7 @@ def load_state(
     distances: Vec,
     speeds: Vec,
 ) -> None:
-    """Place robot and people of environment 0 and write its clearances and people's speeds.
+    """Place robot and people of environment 0; write clearances and speeds of people.
 
     Args:
         state: Environments; ``clear`` is filled.

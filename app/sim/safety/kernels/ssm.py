@@ -52,7 +52,7 @@ approaches an obstacle no faster than its axis moves. The whole robot counts as 
 fastest axis; a person's own speed is not counted. Step 2 holds unchanged.
 
 **People faster than assumed.** Observed speeds only make ``reach(t)`` longer, so all of this
-holds for people who keep to ``v_h``. Beside others the robot stops earlier and does not start,
+holds for people who keep to ``v_h``. Beside others the robot stops earlier and starts later,
 but nothing is guaranteed: a person may become even faster after the observation.
 
 Between poses the check is conservative, see ``separation_check.py``.
