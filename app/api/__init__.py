@@ -19,7 +19,8 @@ responses         Outermost ASGI middleware: completes every response
 security          Access control: one ASGI middleware around every route, mount and socket
 service_state     Metrics that are read from the service at a scrape
 services          Parts of the service that routes use; ``app.main`` creates them
-sockets           Limits of WebSocket messages, and refusal of a socket with a reason
+sockets           Size of WebSocket messages, and refusal of a socket with a reason; idle time
+                  and number of motion sockets: ``motion/load.py``
 texts             Detection of JSON that no route accepts
 tracker_sessions  Sessions of trackers: the estimators of people, kept between frames
 validation        Conversion of pydantic's validation errors to field, value, rule and

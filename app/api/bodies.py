@@ -62,7 +62,8 @@ class BodyMiddleware:
         max_bytes = self.max_bytes if largest is None else largest
         refused = _refused_head(scope, headers, takes_file, max_bytes)
         if refused is None and _has_body(headers) and not takes_file and not _is_form(headers):
-            receive, body = await _whole(receive, max_bytes)
+            body, messages = await read_whole(receive, max_bytes)
+            receive = repeating(messages, receive)
             refused = _refused_json(body, path, max_bytes)
         else:
             receive = _counted(receive, max_bytes)
@@ -115,22 +116,28 @@ def _exceeds(length: str, most: int) -> bool:
     return len(digits) > len(str(most)) or int(digits or "0") > most
 
 
-async def _whole(receive: Receive, max_bytes: int) -> tuple[Receive, bytes]:
-    """Read a body, at most one byte over the limit; return it and a replay of its messages."""
-    messages: list[Message] = []
-    body = b""
-    while len(body) <= max_bytes:
+async def read_whole(receive: Receive, max_bytes: int) -> tuple[bytes, list[Message]]:
+    """Read a body until it ends or exceeds the limit; return it and its messages.
+
+    The last message is no ``http.request`` where the client has left.
+    """
+    body, messages, more = b"", list[Message](), True
+    while more:
         message = await receive()
         messages.append(message)
         body += message.get("body", b"")
-        if not message.get("more_body", False):  # complete, or the client has left
-            break
-    messages.reverse()
+        more = message.get("more_body", False) and len(body) <= max_bytes
+    return body, messages
+
+
+def repeating(messages: list[Message], receive: Receive) -> Receive:
+    """Return a ``receive`` that repeats messages first."""
+    left = messages[::-1]
 
     async def receive_again() -> Message:
-        return messages.pop() if messages else await receive()
+        return left.pop() if left else await receive()
 
-    return receive_again, body
+    return receive_again
 
 
 def _refused_json(body: bytes, path: str, max_bytes: int) -> ProblemResponse | None:

@@ -12,9 +12,9 @@ from typing import NamedTuple, get_type_hints
 from fastapi.routing import APIRoute
 from pydantic import BaseModel, ValidationError
 from pydantic_core import to_json
-from starlette.types import ASGIApp, Message, Receive, Scope, Send
+from starlette.types import ASGIApp, Receive, Scope, Send
 
-from app.api.bodies import MAX_BODY_BYTES, is_json
+from app.api.bodies import MAX_BODY_BYTES, is_json, read_whole, repeating
 from app.api.schemas.numbers import Data
 from app.api.security import headers_of, path_of
 from app.api.texts import fault_in_json
@@ -56,10 +56,11 @@ class DirectRouteMiddleware:
         if found is None or not _is_ordinary(scope):
             await self.app(scope, receive, send)
             return
-        messages: list[Message] = []
-        content = await _answer(found, scope, receive, messages)
+        body, messages = await read_whole(receive, MAX_BODY_BYTES)
+        left = messages[-1]["type"] != "http.request"
+        content = None if left else await _answer(found, scope, body)
         if content is None:
-            await self.app(scope, _again(messages, receive), send)
+            await self.app(scope, repeating(messages, receive), send)
             return
         scope["route"] = found.route
         length = b"content-length", str(len(content)).encode()
@@ -83,24 +84,8 @@ def _is_ordinary(scope: Scope) -> bool:
     )
 
 
-async def _answer(
-    found: _Direct, scope: Scope, receive: Receive, messages: list[Message]
-) -> bytes | None:
-    """Return the answer to a request; None where the framework is to answer.
-
-    Args:
-        found: The route.
-        receive: Receives its messages.
-        messages: Filled with the messages of the body.
-    """
-    body, more = b"", True
-    while more:
-        message = await receive()
-        messages.append(message)
-        if message["type"] != "http.request":
-            return None
-        body += message.get("body", b"")
-        more = message.get("more_body", False) and len(body) <= MAX_BODY_BYTES
+async def _answer(found: _Direct, scope: Scope, body: bytes) -> bytes | None:
+    """Return the answer to a request; None where the framework is to answer."""
     if len(body) > MAX_BODY_BYTES or fault_in_json(body) is not None:
         return None
     try:
@@ -109,13 +94,3 @@ async def _answer(
     except (ValidationError, ServiceError):
         return None
     return to_json(answer, inf_nan_mode="null")
-
-
-def _again(messages: list[Message], receive: Receive) -> Receive:
-    """Return a ``receive`` that repeats messages first."""
-    left = messages[::-1]
-
-    async def receive_again() -> Message:
-        return left.pop() if left else await receive()
-
-    return receive_again

@@ -50,7 +50,7 @@ Build = Callable[[Mapping[str, Any], bytes], P]
 
 
 class CheckpointNames:
-    """What is known of stored checkpoints in memory; safe to use from any thread.
+    """Aliases, damage and use of the stored checkpoints, kept in memory; thread-safe.
 
     Args:
         store: The database; it needs no tables until a method is called.

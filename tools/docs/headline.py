@@ -108,7 +108,8 @@ def lines(results: Path) -> list[list[str]] | None:
             "contact with a moving link",
             f"{safety['inside']['n']:,}",
             percent(safety["inside"]["moving_rate"], 3),
-            f"without SSM: {share(safety['no-ssm']['moving_rate'])}",
+            f"without SSM: {share(safety['no-ssm']['moving_rate'])} "
+            f"(n {safety['no-ssm']['n']:,})",
         ],
     ]
 

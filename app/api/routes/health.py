@@ -1,6 +1,6 @@
 """Liveness and readiness, for monitors.
 
-Both routes need no token; without it they answer the status only.
+Neither route needs the token; without it they answer the status only.
 """
 
 from datetime import UTC, datetime, timedelta
@@ -24,7 +24,7 @@ Hundreds of its periods of 20 to 50 ms, which a busy machine does not delay it b
 
 
 class HealthPublic(Answer):
-    """The service can decide."""
+    """The process answers requests."""
 
     status: Literal["ok"] = "ok"
     worlds: list[str] | None = Field(
@@ -33,7 +33,7 @@ class HealthPublic(Answer):
 
 
 class ReadinessPublic(Answer):
-    """The service has warmed up."""
+    """The service can decide."""
 
     status: Literal["ready", "degraded"]
     damaged: list[str] | None = Field(
@@ -49,29 +49,30 @@ class ReadinessPublic(Answer):
     )
 
 
-@router.get(HEALTH, summary="200 when the service can decide", response_model_exclude_none=True)
+@router.get(HEALTH, summary="200 while the process answers", response_model_exclude_none=True)
 async def health(request: Request, services: ServicesDep) -> HealthPublic:
+    """Answer 200 while the process answers, also before it can decide.
+
+    With the token, it names the live worlds.
+    """
+    return HealthPublic(worlds=list(services.worlds) if request.state.trusted else None)
+
+
+@router.get(READY, summary="200 when the service can decide", response_model_exclude_none=True)
+async def ready(request: Request, services: ServicesDep) -> ReadinessPublic:
     """Answer 200 when the service can decide, a 503 problem otherwise.
 
-    With the token, it names the live worlds, and the problem contains the reason.
+    It cannot decide before checkpoints are loaded, kernels compiled and the live world has
+    started, nor while the server stops. With the token, the problem contains the present
+    activity. ``degraded`` names damaged checkpoints (all others can be used), gives the reason
+    if the queue of jobs waits, and names stalled live worlds. Decisions and jobs do not depend
+    on these: the answer stays 200.
     """
-    if _is_trusted(request, services):
-        return HealthPublic(worlds=list(services.worlds))
-    return HealthPublic()
-
-
-@router.get(
-    READY, summary="503 while the kernels are compiled", response_model_exclude_none=True
-)
-async def ready(request: Request, services: ServicesDep) -> ReadinessPublic:
-    """Answer 200 once the kernels are compiled, a 503 problem until then.
-
-    With the token, the problem contains the present activity. ``degraded`` names damaged
-    checkpoints (all others can be used), gives the reason if the queue of jobs waits, and names
-    stalled live worlds. Decisions and jobs do not depend on these: the answer stays 200.
-    """
-    if not _is_trusted(request, services):
+    if not request.state.trusted:
+        if not services.readiness.ready:
+            raise NotReady("the service is up and not ready")
         return ReadinessPublic(status="ready")
+    services.readiness.require()
     damaged, waiting = services.checkpoints.damaged, services.supervisor.waiting
     stalled = _stalled(services)
     return ReadinessPublic(
@@ -87,16 +88,3 @@ def _stalled(services: Services) -> dict[str, datetime]:
     now = datetime.now(UTC)
     ages = {name: one.handle.since_snapshot_s() for name, one in services.worlds.items()}
     return {name: now - timedelta(seconds=age) for name, age in ages.items() if age > STALLED_S}
-
-
-def _is_trusted(request: Request, services: Services) -> bool:
-    """Return whether the caller may see details.
-
-    Raises:
-        NotReady: The service cannot decide; a trusted caller gets the reason.
-    """
-    trusted = bool(request.state.trusted)
-    if not trusted and not services.readiness.ready:
-        raise NotReady("the service is up and not ready")
-    services.readiness.require()
-    return trusted

@@ -58,7 +58,11 @@ router = APIRouter(prefix="/v1/jobs/{job_id}", tags=["jobs"])
 
 @router.post("/cancel", status_code=202, summary="Cancel a job", responses=ENDED)
 def cancel_job(job: JobDep, services: ServicesDep) -> JobPublic:
-    """Cancel a queued job at once; a running one stops after its next checkpoint."""
+    """Cancel a queued job at once, or stop a running one.
+
+    A running training stores a last checkpoint after its present step; an evaluation, sweep or
+    report stops without one.
+    """
     cancelled = jobs.request_cancel(services.store, job.id)
     services.supervisor.wake()
     return shown(cancelled, services)
@@ -70,8 +74,8 @@ def resume_job(
 ) -> JobPublic:
     """Queue the same job again; it continues from its newest state, at ``resume_step``.
 
-    Cancelled and failed jobs can be resumed, those that a budget ended, with a larger one, and
-    reports without the results of some evaluations, which are run again.
+    A job can be resumed if it was cancelled, failed, or was ended by a budget, which must then
+    be larger. A report that lacks the results of some evaluations runs these again.
     """
     changes = {} if body is None else body.model_dump(exclude_unset=True)
     require_budgeted(job, changes)
@@ -93,7 +97,10 @@ def retry_job(
     response: Response,
     idempotency_key: IdempotencyKey = None,
 ) -> JobPublic:
-    """Queue a new job with the same spec, which starts at step 0; the first one stays."""
+    """Queue a new job with the same spec, name, priority and budgets, which starts at step 0.
+
+    The first job stays as it is; its notes are not copied.
+    """
     job_actions.require_repeatable(job, "retry")
     labels = {"name": job.name, "priority": job.priority}
     body = validated(spec_type(job.kind), {**job.spec, **labels, **budgets(job)})
@@ -114,7 +121,10 @@ def clone_job(
     changes: Annotated[dict[str, Any], CHANGES],
     idempotency_key: IdempotencyKey = None,
 ) -> JobPublic:
-    """Queue a new job with the spec of this one and the given changes."""
+    """Queue a new job with the spec and budgets of this one and the given changes.
+
+    Name, notes and priority are those of the changes, or the defaults.
+    """
     body = validated(spec_type(job.kind), merge({**job.spec, **budgets(job)}, changes))
     new = replace(checked(body, services), parent=job.id)
     submitted = {"clone": job.id, "changes": changes}

@@ -23,24 +23,25 @@ UNIT = f"{', '.join(UNITS)}, or metres per unit"
 
 def read_options(
     unit: Annotated[
-        str | None, Query(description=f"unit of the lengths: {UNIT}; found if missing")
+        str | None, Query(description=f"unit of the lengths: {UNIT}; detected if omitted")
     ] = None,
     root_unit: Annotated[
         str | None, Query(description=f"unit of the root's path, if another: {UNIT}")
     ] = None,
     up: Annotated[
         str | None,
-        Query(description=f"axis that points up: {', '.join(UP_AXES)}; found if missing"),
+        Query(description=f"axis that points up: {', '.join(UP_AXES)}; detected if omitted"),
     ] = None,
     names: Annotated[
         list[str] | None,
         Query(
             alias="map",
-            description="meaning of a joint or column, theirs=ours; may be repeated",
+            description="a joint or column, as name in the file=our name, such as "
+            "LeftForeArm2=elbow_l; may be repeated",
         ),
     ] = None,
 ) -> ReadOptions:
-    """Return how the file of a request is read."""
+    """Return the options by which the file of a request is read."""
     return ReadOptions(unit=unit, root_unit=root_unit, up=up, names=name_map(names or []))
 
 

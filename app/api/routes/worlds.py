@@ -49,7 +49,7 @@ router = APIRouter(prefix="/v1/worlds", tags=["worlds"])
 
 
 async def live_world(world_id: str, services: ServicesDep) -> LiveWorld:
-    """Return the world that the path names; before a stream begins its answer."""
+    """Return the world that the path names; an unknown one is refused before a stream."""
     return services.world(world_id)
 
 
@@ -74,7 +74,10 @@ async def list_worlds(services: ServicesDep) -> WorldList:
 
 @router.get("/{world_id}", summary="One live world, with the state a decision needs")
 async def get_world(world: WorldDep) -> WorldState:
-    """Return the last snapshot; its ``state`` can be posted to /v1/task-selection as it is."""
+    """Return the last snapshot.
+
+    Its ``state`` can be posted to /v1/task-selection as it is; null without candidates.
+    """
     return state_of(world.handle.snapshot())
 
 

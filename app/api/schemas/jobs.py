@@ -1,4 +1,4 @@
-"""Jobs as they are shown."""
+"""Answers and bodies of the job routes."""
 
 from datetime import datetime
 from typing import Annotated, Any, Literal, Self
@@ -6,6 +6,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field
 
 from app.api.schemas.numbers import Answer, Body, Finite
+from app.store.completion import MAX_KILLS
 from app.store.cursors import MAX_INTEGER
 from app.store.records import JobRecord, MetricRow, SpentBudget
 
@@ -65,7 +66,9 @@ class JobPublic(Answer):
     idempotency_key: str | None
     result: dict[str, Any] | None
     last_event: int = Field(description="id of its newest event")
-    kills: int = Field(description="number of attempts killed with the server; it fails at 30")
+    kills: int = Field(
+        description=f"number of attempts killed with the server; the job fails at {MAX_KILLS}"
+    )
     waiting: str | None = Field(
         description="reason for which its worker waits, such as `disk full`; null if it runs"
     )

@@ -8,6 +8,7 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Time = Annotated[float, Field(ge=-1e10, le=1e10)]
+"""Time on a clock of the caller [s], from any origin."""
 Vector3 = Annotated[list[Finite], Field(min_length=3, max_length=3)]
 Vector6 = Annotated[list[Finite], Field(min_length=6, max_length=6)]
 Vector18 = Annotated[list[Finite], Field(min_length=18, max_length=18)]
@@ -20,7 +21,7 @@ def _listed(values: Iterable[float | None]) -> list[float | None]:
 
 
 Listed = Annotated[list[float], BeforeValidator(_listed)]
-"""Numbers of an array."""
+"""Numbers of an array, all finite."""
 Counts = Annotated[list[int], BeforeValidator(_listed)]
 """Whole numbers of an array."""
 Data = dict[str, Any]

@@ -8,11 +8,11 @@ class HealthOperations(Transport):
     """Operations with the tag health."""
 
     def health(self) -> HealthPublic:
-        """200 when the service can decide."""
+        """200 while the process answers."""
         return self._parsed(HealthPublic, "GET", "/healthz")
 
     def ready(self) -> ReadinessPublic:
-        """503 while the kernels are compiled."""
+        """200 when the service can decide."""
         return self._parsed(ReadinessPublic, "GET", "/readyz")
 
     def scrape(self) -> str:

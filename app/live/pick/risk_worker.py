@@ -42,7 +42,7 @@ class RiskQuery:
     def answer(self) -> RiskMap:
         """Return the map over ``GRID``."""
         person = self.people[0]
-        moved = MovedPerson(index=0, q=GRID.postures(person, np.zeros(0))[0])
+        moved = MovedPerson(index=0, q=GRID.postures(person)[0])
         return self.policy.risk_map(
             self.q, self.qd, self.people, self.offered, moved, terms=self.terms
         )

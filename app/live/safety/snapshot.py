@@ -22,7 +22,7 @@ class SafetySnapshot(ReadModel):
     separation: float | None
     """separation distance [m]"""
     required: float | None
-    """protective separation distance S_p of that link, the sum of the three terms [m]"""
+    """S_p of that link with the protective distance: the sum of the three terms [m]"""
     person_distance: float | None
     """human contribution S_h = v_h (T_r + T_s) [m]"""
     robot_distance: float | None
@@ -30,7 +30,7 @@ class SafetySnapshot(ReadModel):
     margin: float
     """C + Z_d + Z_r and the protective distance [m]"""
     protective_distance: float
-    """part of the margin: least distance to people while the robot moves [m]"""
+    """part of the margin: distance added to S_p [m]"""
     use_measured_velocity: bool
     """whether S_p uses the measured velocities of people"""
     human_speed: float

@@ -8,8 +8,11 @@ import numpy as np
 from app.sim.core.arrays import Vec
 from app.state_dict import State
 
+TOLERANCE = 0.02
+"""Excess over the range that is not reported [m, rad or per second]."""
 
-class Ranges:
+
+class TrainingRange:
     """Minimum and maximum of every state variable in training."""
 
     def __init__(self) -> None:

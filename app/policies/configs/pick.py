@@ -138,7 +138,7 @@ class PickEpisode(FieldGroup):
 
     @property
     def sees_time(self) -> bool:
-        """Whether a time-out is an end of the task, and no truncation."""
+        """Whether a timeout is an end of the task, and no truncation."""
         return self.observation != "state" or self.timeout == "terminates"
 
     @property

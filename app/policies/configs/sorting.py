@@ -183,7 +183,7 @@ def _printed(name: str, cell: str, n_t: int, kind: str) -> SortingPreset:
 
     The defaults: an update for every step, the target network copied every 500 of them, the
     first update after 1,000 steps, Glorot-uniform weights, gradients up to a norm of 10,
-    time-outs as ends of the task.
+    timeouts as ends of the task.
     Not printed and chosen here: localisation failures in 5 % of the picks, and a reward in
     which parking and failures cost as much as a move. N_t is the least number of steps; the
     training goes on as long again.

@@ -14,8 +14,12 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from app.errors import InvalidInput
-from app.policies.checkpoints.trained_values import PersonValues, TrainedValues, as_given
 from app.policies.inference.controllers import person_weights
+from app.policies.inference.reach_training_range import (
+    PersonValues,
+    ReachTrainingRange,
+    as_given,
+)
 from app.policies.inference.rollout import (
     CANDIDATES,
     POLICY,
@@ -87,7 +91,7 @@ class MotionDecider:
         self._rule = actor.action.rule()
         self._advance: Callable[..., bool] | None = None
         self._limits = StateLimits(self.arm, limits_jerk=actor.action.degree == 3)
-        self._trained = TrainedValues(actor.trained_range)
+        self._trained = ReachTrainingRange(actor.trained_range)
         self._states: dict[tuple[int, int], QueryState] = {}
         self._improvements: dict[QueryState, RolloutImprovement] = {}
         self._layer = SafetyLayer(self.arm, SafetySettings())

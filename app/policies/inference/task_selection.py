@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 from app.errors import InvalidInput
 from app.policies.checkpoints.checkpoint import Checkpoint
 from app.policies.inference.moved_person import scenes_of
+from app.policies.inference.pick_training_range import PickTrainingRange
 from app.policies.inference.trained_policy import TrainedPolicy
-from app.policies.inference.trained_ranges import TrainedRanges
 from app.policies.inference.value_networks import ValueNetworks, pick_preset_of
 from app.policies.networks.outcome import OutcomePrediction, estimates_of
 from app.policies.networks.pick import CLEARANCE
@@ -148,7 +148,7 @@ class TaskChooser(TrainedPolicy):
         n_obs = self._networks.n_obs
         self._observer = CandidateObserver(self._cell, n_obs=n_obs, grasp=self.grasp)
         self._limits = StateLimits(self._arm, limits_jerk=False)
-        self._ranges = TrainedRanges(checkpoint)
+        self._ranges = PickTrainingRange(checkpoint)
 
     def decide(
         self,

@@ -1,6 +1,7 @@
 """Neural networks.
 
-actor_critic  The networks of TD3: actors, and critics with layer normalisation
+actor_critic  The networks of TD3: actors with a residual action and its fading, critics with
+              layer normalisation and the least of them
 candidate_values
               Actions, values and predicted outcomes of a policy for picks
 ddpg          Networks of DDPG as Stable-Baselines 2 makes them, for the recipes of the thesis

@@ -9,7 +9,7 @@ import torch
 from app.policies.algorithms.exploration import Exploration
 from app.policies.algorithms.td3 import BatchTD3, Networks, critics_of
 from app.policies.algorithms.vecenv import BatchVecEnv
-from app.policies.checkpoints.training_range import Ranges
+from app.policies.checkpoints.training_range import TrainingRange
 from app.policies.configs.pick import PickPreset
 from app.policies.configs.reach import ReachPreset
 from app.policies.training.run import CheckpointParts, TrainingRun
@@ -49,7 +49,7 @@ class TrainingMonitor:
     """The environments."""
     actor: torch.nn.Module
     """The actor of checkpoints."""
-    ranges: Ranges
+    ranges: TrainingRange
     """Training range of the states."""
     visited_states: Callable[[], Mapping[str, Vec]]
     """Returns the present states of all environments."""
@@ -82,7 +82,7 @@ def start_td3(
     }
     if model.ema_actor is not None:
         targets["actor_learned"] = model.actor.mu
-    ranges = Ranges()
+    ranges = TrainingRange()
     parts = CheckpointParts(
         policy={"actor": model.evaluated_actor, "critic": critics_of(model.critic)},
         targets=targets,

@@ -26,7 +26,7 @@ class SortingTask:
     """Sorting tasks of a cell.
 
     Args:
-        timeouts_end: Whether a time-out ends a task, and does not truncate its episode.
+        timeouts_end: Whether a timeout ends a task, and does not truncate its episode.
     """
 
     render_fps = 4

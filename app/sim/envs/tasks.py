@@ -100,7 +100,7 @@ class ArmTask:
     """A batch of robots with its spaces, for training.
 
     Args:
-        sees_time: Whether the time left is observed. If so, a time-out terminates an episode,
+        sees_time: Whether the time left is observed. If so, a timeout terminates an episode,
             otherwise it truncates it.
     """
 

@@ -1,4 +1,4 @@
-"""Import of recorded human motion.
+"""Import of recorded human motion: BVH, OpenSim and CSV files.
 
 artifacts           Detection of motion-capture artefacts by speed, and the clean runs between
                     them

@@ -22,7 +22,7 @@ Frames = NDArray[np.signedinteger]
 
 
 def without_repeats(bvh: Bvh) -> tuple[Bvh, str]:
-    """Return a file at its real rate, and a note; empty if no frames repeat.
+    """Return a recording without repeated frames, and a note; as it is, and "", if none repeat.
 
     Raises:
         BadRecording: The real rate is outside the range of motion capture.
@@ -43,7 +43,7 @@ def without_repeats(bvh: Bvh) -> tuple[Bvh, str]:
 
 
 def _whole_step(changes: Frames, n: int) -> tuple[float, Frames] | None:
-    """Return the interval of new frames and the new frames, if it is a whole number.
+    """Return the interval between new frames and their numbers; None unless it is whole.
 
     Motionless people repeat frames too, so the interval of changes may be a multiple.
 
@@ -60,7 +60,10 @@ def _whole_step(changes: Frames, n: int) -> tuple[float, Frames] | None:
 
 
 def _fractional_step(changes: Frames) -> tuple[float, Frames] | None:
-    """Return the same for a fractional interval, by a line through the changes."""
+    """Return the interval between new frames and their numbers, by a line through them.
+
+    None where they are not evenly spaced, or hardly any repeat.
+    """
     count = np.arange(len(changes))
     step, start = np.polyfit(count, changes, 1)
     if step < MIN_STEP or np.ptp(changes - start - step * count) > 1.1:

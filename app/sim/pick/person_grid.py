@@ -32,11 +32,13 @@ class PersonGrid:
         """Number of positions along y and x."""
         return len(self.y), len(self.x)
 
-    def postures(self, person: Person, size: Vec) -> tuple[Vec, NDArray[np.bool_]]:
+    def postures(
+        self, person: Person, size: Vec | None = None
+    ) -> tuple[Vec, NDArray[np.bool_]]:
         """Return the posture at each position, and whether it is reached.
 
         Args:
-            size: The person's body dimensions [m], shape (12,).
+            size: The person's body dimensions [m], shape (12,); needed where a hand is moved.
 
         Returns:
             Joint positions [m, rad], shape (ny nx, 18), and flags, shape (ny nx,).
@@ -48,6 +50,8 @@ class PersonGrid:
             if person.cylinder is not None:
                 q[:, 2] = np.arctan2(-y, -x)
             return q, reached
+        if size is None:
+            raise ValueError("size must be given where a hand is moved")
         for i, point in enumerate(np.column_stack([x, y, np.full(len(x), self.z)])):
             found = human.reach(self.hand, point, person.q, size)
             q[i], reached[i] = found.q, found.reached

@@ -7,5 +7,6 @@ measured_state      Validation of a measured robot state slightly or far outside
 trajectory_segment  The robot's motion in one control period
 ur10                The UR10 on Pinocchio: the model from which the compiled kernels take their
                     lengths
-kernels/            Compiled kinematics, action bounds and speed override
+kernels/            Compiled kinematics, joint limits (their values are data of the cell),
+                    action bounds and speed override
 """

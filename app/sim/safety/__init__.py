@@ -6,7 +6,7 @@ contact_limits      Speed limits of contact by body part (power and force limiti
 decision            Decision of the safety layer for one period, and the terms of the separation
                     distance
 layer               Speed and separation monitoring, and power and force limiting, for any
-                    policy or planner
+                    policy or planner; the terms S_h, S_r and B for displays
 separation_zone     The protective separation distance around the whole robot, as a zone on the
                     floor
 kernels/            Compiled separation monitoring

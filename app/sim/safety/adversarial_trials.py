@@ -17,7 +17,6 @@ from app.sim.people.human_motion_config import REACHING
 from app.sim.people.kernels.people import new_people_geometry
 from app.sim.robot.actions import ActionSettings
 from app.sim.safety.kernels import adversarial_trials as safety_trial
-from app.sim.safety.kernels import separation_check as watch
 from app.sim.safety.kernels.adversarial_people import Trial, new_trial_work
 from app.sim.safety.kernels.adversarial_trials import (
     ALLOWED,
@@ -32,6 +31,7 @@ from app.sim.safety.kernels.adversarial_trials import (
     STOPPED,
     WORST_PEOPLE,
 )
+from app.sim.safety.kernels.separation_check import new_ssm_workspace
 from app.sim.safety.layer import SafetySettings, separation_rule
 from app.sim.scene.scene import HumanKind, arm_of, new_people_state, people_of, with_people
 
@@ -142,7 +142,10 @@ def run_trial(
     geometry = new_people_geometry(people, len(cell.workers), len(cell.cylinders))
     n_late = ceil(settings.true_delay / arm.dt - 1e-9)
     shape = (people.columns.shape[1], len(cell.cylinders))
-    spaces = (watch.new_ssm_workspace(arm, *shape), watch.new_ssm_workspace(arm, *shape))
+    spaces = (
+        new_ssm_workspace(arm, *shape),
+        new_ssm_workspace(arm, *shape),
+    )
     work = new_trial_work(arm, people, state, geometry, spaces, n_late)
     rows = np.zeros((n_episodes, N_RESULT))
     trial = Trial(

@@ -40,7 +40,7 @@ class SafetyDecision:
     separation: float | None
     """Their observed distance [m]."""
     required: float | None
-    """S_p of the standard for that link at its current speed [m]."""
+    """S_p for that link at its current speed, with the protective distance [m]."""
     lacking: float
     """Missing distance on the refused path [m]."""
     stop_time: float
@@ -90,7 +90,7 @@ class SeparationTerms:
     robot_uncertainty: float
     """Z_r [m]."""
     protective_distance: float
-    """Least distance to people, added to the standard's terms [m]."""
+    """Distance added to the standard's terms [m]."""
 
     @property
     def required(self) -> float:

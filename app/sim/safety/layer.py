@@ -35,8 +35,7 @@ from app.sim.robot.measured_state import admitting
 from app.sim.robot.ur10 import LINK_NAMES
 from app.sim.safety import contact_limits
 from app.sim.safety.decision import SafetyDecision, SeparationTerms
-from app.sim.safety.kernels import separation_check as watch_kernel
-from app.sim.safety.kernels import ssm
+from app.sim.safety.kernels import separation_check, ssm
 from app.sim.safety.kernels.separation_check import PeopleShapes
 from app.sim.scene.scene import require_finite
 
@@ -157,7 +156,7 @@ def contact_speeds(settings: SafetySettings, n_columns: int, n_cylinders: int) -
 
 def separation_rule(
     settings: SafetySettings, n_columns: int, n_cylinders: int, known: bool
-) -> watch_kernel.SeparationRule:
+) -> separation_check.SeparationRule:
     """Return the settings for the kernels.
 
     Args:
@@ -167,7 +166,7 @@ def separation_rule(
     speed = np.full(n_columns + n_cylinders, settings.human_speed)
     if known:
         speed[n_columns:] = settings.speed_change
-    return watch_kernel.SeparationRule(
+    return separation_check.SeparationRule(
         speed=speed,
         latency=settings.latency,
         margin=settings.margin,
@@ -231,7 +230,7 @@ class SafetyLayer:
         known = going is not None
         if (shape, known) != (self._shape, self._known):
             self._shape, self._known, self._call = shape, known, None
-            self._space = watch_kernel.new_ssm_workspace(self.arm, *shape)
+            self._space = separation_check.new_ssm_workspace(self.arm, *shape)
             self._rule = separation_rule(self.settings, *shape, known)
         self._load_speeds(people, known)
         if going is not None:
@@ -264,7 +263,7 @@ class SafetyLayer:
         space, arm = self._space, self.arm
         t_stop = override.stop_time(qd, arm.limits.qdd_max)
         person = part = link = separation = required = None
-        column = int(space.cause[watch_kernel.CAUSE_PART])
+        column = int(space.cause[separation_check.CAUSE_PART])
         if chosen < 1.0 and column >= 0:
             terms = self._terms_of(column, qd, people, t_stop, age)
             link, separation, required = terms.link, terms.separation, terms.required
@@ -282,7 +281,7 @@ class SafetyLayer:
             link=link,
             separation=separation,
             required=required,
-            lacking=max(0.0, float(space.cause[watch_kernel.CAUSE_SHORTFALL]))
+            lacking=max(0.0, float(space.cause[separation_check.CAUSE_SHORTFALL]))
             if chosen < 1.0
             else 0.0,
             stop_time=t_stop,
@@ -303,10 +302,10 @@ class SafetyLayer:
             people: People of that decision.
             age: Their age beyond the tracker's delay [s].
         """
-        gap = self._space.gap[watch_kernel.NOW]
+        gap = self._space.gap[separation_check.NOW]
         if not gap.size:
             return None
-        column = int(self._space.cause[watch_kernel.CAUSE_PART])
+        column = int(self._space.cause[separation_check.CAUSE_PART])
         if decision.person is None:
             column = int(np.argmin(gap))
         elif column < self._shape[0]:
@@ -347,10 +346,13 @@ class SafetyLayer:
 
     def _nearest(self, column: int, people: Shapes) -> tuple[float, int]:
         """Return the observed distance of a part of the people [m], and the nearest capsule."""
-        robot, out = self._space.columns[watch_kernel.NOW], np.empty(self.arm.columns.shape[1])
+        robot, out = (
+            self._space.columns[separation_check.NOW],
+            np.empty(self.arm.columns.shape[1]),
+        )
         if column < people.columns.shape[1]:
             distances(as_kernel_array(people.columns), column, robot, out)
-            return float(self._space.gap[watch_kernel.NOW, column]), int(least(out)[1])
+            return float(self._space.gap[separation_check.NOW, column]), int(least(out)[1])
         x, y, r, top = people.cylinders[column - people.columns.shape[1]]
         separation, nearest = cylinder_clearance(robot, 0, x, y, r, top)
         return float(separation), int(nearest)
@@ -369,7 +371,7 @@ class SafetyLayer:
         if k < 0 or not self._known or people.going is None or np.isnan(people.going[k]).any():
             observed = float(self._space.observed_speed[column])
             return max(self.settings.human_speed, observed)
-        robot, (x, y, r, _) = self._space.columns[watch_kernel.NOW], people.cylinders[k]
+        robot, (x, y, r, _) = self._space.columns[separation_check.NOW], people.cylinders[k]
         vx, vy, growth = people.going[k]
         grown = r + max(0.0, growth) * seconds
         there = swept_clearance(robot, x, y, vx * seconds, vy * seconds, grown)

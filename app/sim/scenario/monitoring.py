@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 from app.sim.core.arrays import Vec, as_kernel_array
 from app.sim.core.jit import FAR
 from app.sim.people.kernels.people import new_people_geometry
-from app.sim.safety.kernels import separation_check as watch
 from app.sim.safety.kernels.adversarial_people import new_trial_work
 from app.sim.safety.kernels.adversarial_trials import MOVING
+from app.sim.safety.kernels.separation_check import new_ssm_workspace
 from app.sim.safety.layer import SafetySettings, separation_rule
 from app.sim.scenario.batch import EnvBatch
 from app.sim.scenario.kernels.episode import SUCCESS, EpisodeState
@@ -127,7 +127,10 @@ def new_monitored_state(
             people,
             new_people_state(batch.cell, people, 1),
             new_people_geometry(people, n_workers, n_cylinders),
-            (watch.new_ssm_workspace(arm, *shape), watch.new_ssm_workspace(arm, *shape)),
+            (
+                new_ssm_workspace(arm, *shape),
+                new_ssm_workspace(arm, *shape),
+            ),
             0,
         ),
         override=np.ones(n_envs),

@@ -14,5 +14,5 @@ progress_monitor    Loop and stall monitor of a sorting policy: when the exact p
                     over
 sorting_values      Interface of a learned policy for sorting: its values of all moves
 state               State of the sorting task as integers, and its moves
-kernels/            Compiled sorting episodes and planner
+kernels/            Compiled sorting episodes (moves, failures, observation) and planner
 """

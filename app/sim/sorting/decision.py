@@ -167,7 +167,7 @@ def attempts_by_action(
 
 
 def is_slow_decision(shape: SortingShape) -> bool:
-    """Return whether a decision may take more than a moment."""
+    """Return whether a decision may need more than ``MAX_AT_ONCE`` states of the planner."""
     return most_states(shape.n_cells, shape.n_colours) > MAX_AT_ONCE
 
 

@@ -9,7 +9,7 @@ import { useAnswer } from "./formfields.js";
 
 export const MAX_JOBS = 20;
 const RATES = new Set(["success", "collision", "timeout"]);
-const QUANTITIES = { success: "success [%]", collision: "collision [%]", timeout: "time-out [%]",
+const QUANTITIES = { success: "success [%]", collision: "collision [%]", timeout: "timeout [%]",
   reward: "mean reward of an episode", cpu_s: "CPU time [s]", time_left_s: "time left [s]",
   updates_per_s: "updates per s", steps_per_s: "steps per s" };
 const NAMED = 3; // fields that the name of a group lists

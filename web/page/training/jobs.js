@@ -24,7 +24,7 @@ const TONES = { queued: "quiet", running: "accent", cancelling: "warn", succeede
 const OUTCOMES = [
   { key: "success", label: "success", colour: "good" },
   { key: "collision", label: "collision", colour: "bad" },
-  { key: "timeout", label: "time-out", colour: "warn" },
+  { key: "timeout", label: "timeout", colour: "warn" },
 ];
 const KINDS = { evaluate: "evaluation", sweep: "sweep" };
 const UNITS = { evaluate: "rows", sweep: "trials", report: "evaluations" };
@@ -204,7 +204,7 @@ function JobDetail({ job, presets, onChanged, onOpen, onClone, onAct, acting }) 
       <${Legend} lines=${OUTCOMES} row=${row} show=${(v) => rate(v, row?.episodes)} />
       <${CurvePlot} rows=${rows} lines=${OUTCOMES} height=${168} unit="%" range=${[0, 1]}
         sync=${job.id} onHover=${setAt}
-        label=${`Success, collision and time-out rate over environment steps, ${
+        label=${`Success, collision and timeout rate over environment steps, ${
           format.count(rows.length, "point")}`} />
       <${Legend} lines=${REWARD} row=${row} show=${(v) => format.number(v)} />
       <${CurvePlot} rows=${rows} lines=${REWARD} height=${112} sync=${job.id} onHover=${setAt}

@@ -13,7 +13,7 @@ const MEASURES = [
   ["moving_rate", "contact with a moving link", "%"],
   ["contact_at_rest", "contact at standstill", "%"],
   ["without_moving_contact", "without contact of the moving robot", "%"],
-  ["timeout", "time-out", "%"],
+  ["timeout", "timeout", "%"],
   ["never_stopped", "never stopped by the safety layer", "%"],
   ["never_at_standstill", "never at standstill", "%"],
   ["touched_at_rest", "robot at rest touched", "%"],

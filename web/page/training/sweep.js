@@ -7,7 +7,7 @@ import { useAnswer } from "./formfields.js";
 import { isActive } from "./jobactions.js";
 import { JobFrame } from "./jobframe.js";
 
-const LABELS = { success: "success", collision: "collision", timeout: "time-out" };
+const LABELS = { success: "success", collision: "collision", timeout: "timeout" };
 
 export function SweepDetail({ job, presets, ...rest }) {
   // Asked for again whenever the list of jobs was.

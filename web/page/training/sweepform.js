@@ -15,7 +15,7 @@ const COUNTS = [
 const QUANTITY = { name: "objective.quantity", title: "Objective", default: "success",
   choices: ["success", "collision", "timeout"],
   labels: { success: "most success", collision: "least collision",
-    timeout: "least time-out" } };
+    timeout: "least timeout" } };
 const EPISODES = { name: "objective.episodes", title: "Episodes", default: "",
   help: "Of each evaluation; empty for its own number" };
 const PRUNE = { name: "prune", title: "Pruning", default: "true", choices: ["true", "false"],

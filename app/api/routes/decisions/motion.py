@@ -48,7 +48,11 @@ async def stream(
     which: Annotated[Which, Query(alias="answer")] = "newest",
     deadline_ms: Annotated[float, Query(gt=0.0, le=1e4, allow_inf_nan=False)] = 20.0,
 ) -> None:
-    """Answer requests, one per message, until the socket closes or the server stops."""
+    """Answer requests until the socket closes or the server stops.
+
+    Each message is a request. With ``answer=newest`` only the newest one that waits is
+    answered, with ``answer=each`` every one; an answer beyond the deadline says so.
+    """
     if (reason := services.motion_load.refusal()) is not None:
         logger.warning("a motion socket was refused: %s", reason)
         await refuse(client, reason)

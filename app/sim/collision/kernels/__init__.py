@@ -1,5 +1,5 @@
 """Compiled collision checks.
 
-contact  Contact test of one control period, compiled: early by a millimetre at most, never late
+contact  Contact test of one control period, compiled: finds every contact, to 1 ms
 free     Collision check of planners: clearance at a configuration and along a motion
 """

@@ -1,10 +1,12 @@
-"""Contact test of one control period, compiled: early by a millimetre at most, never late.
+"""Contact test of one control period, compiled: finds every contact, to 1 ms.
 
 At a pose with clearance ``d`` nothing touches before ``d / v`` seconds, with ``v`` a bound on
 the speed of approach of any two points. So an interval with clearances ``a`` and ``b`` at its
 ends is free where ``a + b > v (its length)``; otherwise it is halved, down to intervals of
-``FINEST_STEP``, where contact is reported. The end of the period mostly suffices. Within a
-period the robot follows its polynomial, workers move linearly in joint space, walkers linearly.
+``FINEST_STEP``, at the end of which contact is reported. So no contact is missed, its time is
+late by at most ``FINEST_STEP``, and bodies that pass at less than ``v FINEST_STEP / 2`` may
+count as touching. The end of the period mostly suffices. Within a period the robot follows its
+polynomial, workers move linearly in joint space, cylinders linearly.
 """
 
 from typing import NamedTuple
@@ -47,7 +49,7 @@ class PeriodMotion(NamedTuple):
     human_q1: Vec
     """The workers' joints at the end [m, rad], shape (W, 18)."""
     cylinders1: Vec
-    """The walkers' x, y, radius at the end [m], shape (C, 3)."""
+    """x, y and radius of the cylinders at the end [m], shape (C, 3)."""
 
 
 @kernel(inline="always")

@@ -19,9 +19,12 @@ from app.sim.scenario.kernels.person_observation import (
 )
 
 COARSE_LINK = np.array([2, 3, 4, 5, 6], dtype=np.int64)
+"""Link of each coarse capsule: the robot from the upper arm to the tool, simplified for
+features. Contacts use the capsules of ``robot/data/ur10_capsules.json``."""
 COARSE_P0 = np.array(
     [[0.0, -0.045, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]]
 )
+"""First end of each segment in the link's frame [m]."""
 COARSE_SPAN = np.array(
     [
         [0.0, 0.0, 0.612],
@@ -31,9 +34,11 @@ COARSE_SPAN = np.array(
         [0.0, 0.17, 0.0],
     ]
 )
+"""Second end minus first end in that frame [m]."""
 COARSE_RADIUS = np.array([0.09, 0.075, 0.066, 0.066, 0.045])
+"""Radius of each [m]."""
 COARSE_FIRST = (0, 1, 2, 4, 5)
-"""First coarse capsule of each of the four link groups, and their number."""
+"""First coarse capsule of each of the four groups of links; last, the number of capsules."""
 N_COARSE = 5
 AT_GOAL, ALONG_BASE, STILL = 0, N_COARSE, 2 * N_COARSE
 """First lane of three robot configurations that are evaluated together: at the goal, along the

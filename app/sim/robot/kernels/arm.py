@@ -166,32 +166,47 @@ def cell_clearance(arm: Arm, robot: Vec) -> tuple[float, int, int]:
     return best, link, near
 
 
+@kernel(error_model="numpy")
+def path_bounds(arm: Arm, path: JointPath, s_end: float) -> tuple[float, float]:
+    """Return bounds on the first and second derivative along a path of any robot point.
+
+    The second is ``sum |q''_j| l_j + (sum |q'_j|) (sum |q'_j| l_j)`` for levers ``l_j`` that do
+    not grow along the chain.
+
+    Args:
+        s_end: End of the path [s].
+
+    Returns:
+        ``|dp/ds|`` [m/s] and ``|d2p/ds2|`` [m/s^2], for s in [0, s_end].
+    """
+    _, qd, c, d = path
+    angular, swing, push = 0.0, 0.0, 0.0
+    for j in range(6):
+        bend = 3.0 * d[j] * s_end
+        fastest = max(abs(qd[j]), abs(qd[j] + (2.0 * c[j] + bend) * s_end))
+        if abs(c[j]) < abs(bend):  # the speed may turn on the path, at -c / (3 d)
+            fastest = max(fastest, abs(qd[j] - c[j] * c[j] / (3.0 * d[j])))
+        angular += fastest
+        swing += fastest * arm.lever[j]
+        push += max(abs(2.0 * c[j]), abs(2.0 * (c[j] + bend))) * arm.lever[j]
+    return swing, push + angular * swing
+
+
 @kernel(inline="always")
 def robot_speed_bound(arm: Arm, path: JointPath, before: Vec, after: Vec) -> float:
     """Return a bound on the speed of any point of the robot in a period [m/s].
 
     A point's mean velocity over the period is its chord over ``dt``, and its velocity never
-    differs from the mean by more than ``a dt / 2``, with ``a`` a bound on its acceleration:
-    ``sum |qdd_j| l_j + (sum |qd_j|) (sum |qd_j| l_j)`` for levers ``l_j`` that do not grow
-    along the chain. The ends of a capsule bound the points between them.
+    differs from the mean by more than ``a dt / 2``, with ``a`` a bound on its acceleration. The
+    ends of a capsule bound the points between them.
 
     Args:
         before: The robot's capsules at the start, shape (9, n).
         after: Its capsules at the end, shape (9, n).
     """
-    _, qd0, c, d = path
-    angular, swing, push = 0.0, 0.0, 0.0
-    for j in range(6):
-        bend = 3.0 * d[j] * arm.dt
-        end = qd0[j] + (2.0 * c[j] + bend) * arm.dt
-        fastest = max(abs(qd0[j]), abs(end))
-        if abs(c[j]) < abs(bend):  # the speed may turn inside the period, at -c / (3 d)
-            fastest = max(fastest, abs(qd0[j] - c[j] * c[j] * arm.dt / bend))
-        angular += fastest
-        swing += fastest * arm.lever[j]
-        push += max(abs(2.0 * c[j]), abs(2.0 * (c[j] + bend))) * arm.lever[j]
+    speed, acceleration = path_bounds(arm, path, arm.dt)
     chord = greatest_displacement(before, after)
-    return min(swing, chord / arm.dt + 0.5 * arm.dt * (push + angular * swing))
+    return min(speed, chord / arm.dt + 0.5 * arm.dt * acceleration)
 
 
 @kernel()

@@ -22,7 +22,7 @@ from app.sim.geometry.capsules import UX, UY, UZ, X, Y, Z, copy_rows, distances,
 from app.sim.people.kernels.motion import start_people
 from app.sim.people.kernels.people import People
 from app.sim.robot.kernels.actions import Coefficients, advance
-from app.sim.robot.kernels.arm import CONTROLLED, Arm
+from app.sim.robot.kernels.arm import CONTROLLED, Arm, path_bounds
 from app.sim.robot.kernels.joints import JointPath, JointState
 from app.sim.robot.kernels.override import motion_at, path_parameter
 from app.sim.safety.kernels.adversarial_people import (
@@ -38,7 +38,6 @@ from app.sim.safety.kernels.separation_check import (
     NOW,
     PeopleShapes,
     SsmWorkspace,
-    path_bounds,
     place_node,
 )
 from app.sim.safety.kernels.ssm import decide

@@ -43,8 +43,8 @@ class SeparationRule(NamedTuple):
     """Assumptions of speed and separation monitoring."""
 
     speed: Vec
-    """Least assumed speed of each capsule and cylinder in any direction, beyond its known
-    velocity [m/s], shape (m + n,)."""
+    """Assumed speed of each capsule and cylinder in any direction; for a part with a known
+    velocity, the greatest change of that velocity [m/s], shape (m + n,)."""
     latency: float
     """Age of people relative to the robot's state, with the reaction time [s]."""
     margin: float
@@ -215,29 +215,6 @@ def violates_separation(
     return False
 
 
-@kernel(error_model="numpy")
-def path_bounds(arm: Arm, path: JointPath, s_end: float) -> tuple[float, float]:
-    """Return bounds on the first and second derivative along a path of any robot point.
-
-    Args:
-        s_end: End of the path [s].
-
-    Returns:
-        ``|dp/ds|`` [m/s] and ``|d2p/ds2|`` [m/s^2], for s in [0, s_end].
-    """
-    _, qd, c, d = path
-    angular, swing, push = 0.0, 0.0, 0.0
-    for j in range(6):
-        bend = 3.0 * d[j] * s_end
-        fastest = max(abs(qd[j]), abs(qd[j] + (2.0 * c[j] + bend) * s_end))
-        if abs(c[j]) < abs(bend):
-            fastest = max(fastest, abs(qd[j] - c[j] * c[j] / (3.0 * d[j])))
-        angular += fastest
-        swing += fastest * arm.lever[j]
-        push += max(abs(2.0 * c[j]), abs(2.0 * (c[j] + bend))) * arm.lever[j]
-    return swing, push + angular * swing
-
-
 @kernel(error_model="numpy", inline="always")
 def _interval_clear(
     rule: SeparationRule,
@@ -247,7 +224,9 @@ def _interval_clear(
     b: int,
     space: SsmWorkspace,
 ) -> tuple[bool, float]:
-    """Return whether the robot keeps contact speed limits between two nodes.
+    """Return whether no part of the people reaches the robot between two nodes.
+
+    Parts that may be touched at the robot's speed (power and force limiting) do not count.
 
     Args:
         rule: Assumptions.
@@ -256,7 +235,8 @@ def _interval_clear(
         b: Node at the end; placed.
 
     Returns:
-        Whether it is clear, and a bound on the displacement of robot and people in it [m].
+        Whether it is clear, and a bound on the robot's displacement in it, with that of the
+        part which is too near where it is not clear [m].
     """
     xa, xb = space.x[a], space.x[b]
     sa, path_speed = path_parameter(segment.deceleration, xa)
@@ -289,7 +269,9 @@ def segment_clear(
     segment: PathSegment,
     space: SsmWorkspace,
 ) -> bool:
-    """Return whether the robot keeps contact speed limits on one segment of a path.
+    """Return whether no part of the people reaches the robot on one segment of a path.
+
+    Parts that may be touched at the robot's speed (power and force limiting) do not count.
 
     Args:
         rule: Assumptions.

@@ -61,7 +61,7 @@ Source: ISO/TS 15066:2016, 5.5.4 and 5.5.5 (docs/method.md 2.7).
 """
 
 from app.sim.core.jit import kernel
-from app.sim.robot.kernels.arm import Arm
+from app.sim.robot.kernels.arm import Arm, path_bounds
 from app.sim.robot.kernels.joints import JointPath
 from app.sim.robot.kernels.override import (
     TOLERANCE,
@@ -83,7 +83,6 @@ from app.sim.safety.kernels.separation_check import (
     PeopleShapes,
     SeparationRule,
     SsmWorkspace,
-    path_bounds,
     person_reach,
     place_node,
     segment_clear,

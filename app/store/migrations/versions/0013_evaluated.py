@@ -1,4 +1,4 @@
-"""The checkpoint that an evaluation is of, whatever its alias names later."""
+"""Column ``jobs.checkpoint``: the evaluated checkpoint, whatever its alias later names."""
 
 import sqlalchemy as sa
 from alembic import op

@@ -5,11 +5,17 @@ import pytest
 
 from app.sim.cells.cell import load_cell
 from app.sim.geometry.capsules import capsules_soa
+from app.sim.robot.kernels import arm as arm_kernel
 from app.sim.robot.kernels import override
 from app.sim.robot.kernels.joints import JointPath
-from app.sim.safety.kernels import separation_check as watch
 from app.sim.safety.kernels import ssm
-from app.sim.safety.kernels.separation_check import PeopleShapes
+from app.sim.safety.kernels.separation_check import (
+    NOW,
+    PeopleShapes,
+    SeparationRule,
+    new_ssm_workspace,
+    place_node,
+)
 from app.sim.scene.scene import arm_of
 
 ARM = arm_of(load_cell("pick-and-place"))
@@ -46,8 +52,8 @@ def motions(n, seed):
 
 
 def clearances_at(q, people, space):
-    watch.place_node(ARM, shapes(people), q, watch.NOW, 0.0, space)
-    return space.gap[watch.NOW].copy()
+    place_node(ARM, shapes(people), q, NOW, 0.0, space)
+    return space.gap[NOW].copy()
 
 
 def path_of(q, qd, c, d, rate, times):
@@ -69,8 +75,8 @@ def path_of(q, qd, c, d, rate, times):
 
 
 def test_people_cannot_come_near_on_an_admitted_path():
-    space, admitted = watch.new_ssm_workspace(ARM, 8, 0), 0
-    rule = watch.SeparationRule(np.full(8, 0.5), 0.02, 0.05, np.zeros(8))
+    space, admitted = new_ssm_workspace(ARM, 8, 0), 0
+    rule = SeparationRule(np.full(8, 0.5), 0.02, 0.05, np.zeros(8))
     for k, (q, qd, c, d, people) in enumerate(motions(400, 1)):
         rate = (1.0, 0.9)[k % 2]
         clearances_at(q, people, space)
@@ -86,9 +92,13 @@ def test_people_cannot_come_near_on_an_admitted_path():
 
 def test_people_of_known_velocity_are_not_met_on_an_admitted_path():
     """Cylinders with known velocities: anywhere on their path, and a little faster."""
-    rng, space, admitted = np.random.default_rng(9), watch.new_ssm_workspace(ARM, 0, 2), 0
+    rng, space, admitted = (
+        np.random.default_rng(9),
+        new_ssm_workspace(ARM, 0, 2),
+        0,
+    )
     rule, no_capsules = (
-        watch.SeparationRule(np.full(2, 0.1), 0.02, 0.05, np.zeros(2)),
+        SeparationRule(np.full(2, 0.1), 0.02, 0.05, np.zeros(2)),
         no_columns(),
     )
     for k, (q, qd, c, d, _) in enumerate(motions(400, 10)):
@@ -97,7 +107,7 @@ def test_people_of_known_velocity_are_not_met_on_an_admitted_path():
         space.velocity[:] = rng.uniform([-1.0, -1.0, -0.3], [1.0, 1.0, 0.3], (2, 3))
         going, growth = space.velocity[:, :2], np.maximum(0.0, space.velocity[:, 2])
         space.known_speed[:] = np.hypot(*going.T) + np.abs(space.velocity[:, 2])
-        watch.place_node(ARM, PeopleShapes(no_capsules, cylinders), q, watch.NOW, 0.02, space)
+        place_node(ARM, PeopleShapes(no_capsules, cylinders), q, NOW, 0.02, space)
         if not ssm.admissible(
             ARM,
             rule,
@@ -114,17 +124,22 @@ def test_people_of_known_velocity_are_not_met_on_an_admitted_path():
                 there = cylinders.copy()
                 there[:, :2] += since * going
                 there[:, 2] += since * growth
-                other = watch.new_ssm_workspace(ARM, 0, 2)
-                watch.place_node(
-                    ARM, PeopleShapes(no_capsules, there), pose, watch.NOW, 0.0, other
+                other = new_ssm_workspace(ARM, 0, 2)
+                place_node(
+                    ARM,
+                    PeopleShapes(no_capsules, there),
+                    pose,
+                    NOW,
+                    0.0,
+                    other,
                 )
-                assert other.gap[watch.NOW].min() > 0.05 + 0.1 * (0.02 + t) - 1e-9
+                assert other.gap[NOW].min() > 0.05 + 0.1 * (0.02 + t) - 1e-9
     assert 40 < admitted < 360
 
 
 def test_a_path_is_refused_only_where_people_come_within_the_resolution():
-    space, refused = watch.new_ssm_workspace(ARM, 8, 0), 0
-    rule = watch.SeparationRule(np.full(8, 0.5), 0.02, 0.05, np.zeros(8))
+    space, refused = new_ssm_workspace(ARM, 8, 0), 0
+    rule = SeparationRule(np.full(8, 0.5), 0.02, 0.05, np.zeros(8))
     for q, qd, c, d, people in motions(300, 2):
         clearances_at(q, people, space)
         stop_inside = (np.abs(q) < 0.8 * np.abs(ARM.limits.q_max) + 0.2).all()
@@ -141,8 +156,8 @@ def test_a_path_is_refused_only_where_people_come_within_the_resolution():
 
 def test_an_admitted_stop_stays_admissible_as_people_run():
     """Step 2 of the proof: a period after any admitted path the stop obeys the rule."""
-    rng, space = np.random.default_rng(3), watch.new_ssm_workspace(ARM, 8, 0)
-    rule, checked = watch.SeparationRule(np.full(8, 0.5), 0.02, 0.05, np.zeros(8)), 0
+    rng, space = np.random.default_rng(3), new_ssm_workspace(ARM, 8, 0)
+    rule, checked = SeparationRule(np.full(8, 0.5), 0.02, 0.05, np.zeros(8)), 0
     for q, qd, c, d, people in motions(400, 4):
         rate = ssm.decide(ARM, rule, 0.0, shapes(people), JointPath(q, qd, c, d), space)
         if rate == 0.0:
@@ -164,9 +179,9 @@ def test_an_admitted_stop_stays_admissible_as_people_run():
 
 def test_a_part_observed_faster_than_assumed_counts_at_its_speed():
     """Decisions by observed speeds are those of rules that assume these speeds."""
-    rng, space = np.random.default_rng(11), watch.new_ssm_workspace(ARM, 8, 0)
-    other, changed = watch.new_ssm_workspace(ARM, 8, 0), 0
-    slow = watch.SeparationRule(np.full(8, 0.4), 0.05, 0.02, np.zeros(8))
+    rng, space = np.random.default_rng(11), new_ssm_workspace(ARM, 8, 0)
+    other, changed = new_ssm_workspace(ARM, 8, 0), 0
+    slow = SeparationRule(np.full(8, 0.4), 0.05, 0.02, np.zeros(8))
     for q, qd, c, d, people in motions(300, 12):
         observed, path = rng.uniform(0.0, 2.0, 8), JointPath(q, qd, c, d)
         space.observed_speed[:] = 0.0
@@ -182,14 +197,14 @@ def test_a_part_observed_faster_than_assumed_counts_at_its_speed():
 
 
 def test_a_path_s_bounds_hold_for_points_of_every_link():
-    space = watch.new_ssm_workspace(ARM, 8, 0)
+    space = new_ssm_workspace(ARM, 8, 0)
     for q, qd, c, d, people in motions(100, 5):
         d = np.full(6, 3.0)
-        first, second = watch.path_bounds(ARM, JointPath(q, qd, c, d), ARM.dt)
+        first, second = arm_kernel.path_bounds(ARM, JointPath(q, qd, c, d), ARM.dt)
         ends, x, h = [], np.linspace(0.0, ARM.dt, 21), ARM.dt / 20
         for s in x:
             clearances_at(q + s * (qd + s * (c + s * d)), people, space)
-            ends.append(space.columns[watch.NOW, :3].copy())
+            ends.append(space.columns[NOW, :3].copy())
         speed = np.linalg.norm(np.diff(ends, axis=0), axis=1) / h
         bend = np.linalg.norm(np.diff(ends, n=2, axis=0), axis=1) / h**2
         assert speed.max() <= first * (1.0 + 1e-9)
@@ -197,8 +212,8 @@ def test_a_path_s_bounds_hold_for_points_of_every_link():
 
 
 def test_the_executed_motion_keeps_speed_acceleration_and_continuity():
-    space = watch.new_ssm_workspace(ARM, 8, 0)
-    rule, seen = watch.SeparationRule(np.full(8, 0.4), 0.0, 0.02, np.zeros(8)), set()
+    space = new_ssm_workspace(ARM, 8, 0)
+    rule, seen = SeparationRule(np.full(8, 0.4), 0.0, 0.02, np.zeros(8)), set()
     for q, qd, c, d, people in motions(400, 6):
         rate = ssm.decide(ARM, rule, 0.0, shapes(people), JointPath(q, qd, c, d), space)
         seen.add("stop" if rate == 0.0 else "full" if rate == 1.0 else "scaled")
@@ -219,9 +234,9 @@ def test_the_executed_motion_keeps_speed_acceleration_and_continuity():
 
 
 def test_joint_limits_hold_for_any_command_and_any_people():
-    rng, space = np.random.default_rng(8), watch.new_ssm_workspace(ARM, 8, 0)
+    rng, space = np.random.default_rng(8), new_ssm_workspace(ARM, 8, 0)
     rule, closest, rates = (
-        watch.SeparationRule(np.full(8, 0.4), 0.0, 0.02, np.zeros(8)),
+        SeparationRule(np.full(8, 0.4), 0.0, 0.02, np.zeros(8)),
         np.inf,
         [],
     )

@@ -179,7 +179,11 @@ def _separation(world: ReachCell, t: float, work: RolloutWorkspace) -> float:
 def apply_ssm_constraint(
     world: ReachCell, state: EpisodeState, e: int, work: RolloutWorkspace
 ) -> None:
-    """Fill ``work.ssm_distance`` and ``work.q_goal`` for a decision; people are predicted."""
+    """Set the distance required of candidates, and the goal configuration, for a decision.
+
+    ``work.ssm_distance`` is 0 if people are nearer than required already: the layer alone acts
+    then. ``work.q_goal`` is found by inverse kinematics from home. People must be predicted.
+    """
     arm, observation, robot, goal = (
         world.arm,
         work.observation,

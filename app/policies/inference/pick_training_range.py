@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from app.policies.checkpoints.checkpoint import Checkpoint
+from app.policies.checkpoints.training_range import TOLERANCE
 from app.policies.inference.value_networks import pick_preset_of
 from app.policies.networks.pick import STATE_SIZES
 from app.sim.core.arrays import Vec
@@ -15,11 +16,8 @@ from app.sim.human.person import Person
 from app.sim.robot import ur10 as robot
 
 
-class TrainedRanges:
+class PickTrainingRange:
     """Training range of a checkpoint, to flag inputs outside it."""
-
-    SLACK = 0.02
-    """Tolerance of the training range [m, rad or per second]."""
 
     def __init__(self, checkpoint: Checkpoint) -> None:
         ranges = checkpoint.manifest["trained_range"]
@@ -41,7 +39,7 @@ class TrainedRanges:
         bounds = self._low if low else self._high
         if key not in bounds or len(bounds[key]) != n:
             return np.full(n, -np.inf if low else np.inf)
-        return bounds[key] - self.SLACK if low else bounds[key] + self.SLACK
+        return bounds[key] - TOLERANCE if low else bounds[key] + TOLERANCE
 
     def of_robot(self, q: Vec, qd: Vec) -> tuple[OutOfRangeValue, ...]:
         """Return the joint positions and speeds of the robot outside the range.

@@ -8,13 +8,12 @@ from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
+from app.policies.checkpoints.training_range import TOLERANCE
 from app.sim.core.arrays import Vec
 from app.sim.core.kernels.bounds import are_inside
 from app.sim.core.out_of_range import OutOfRangeValue
 from app.sim.human.person import Person
 
-SLACK = 0.02
-"""Tolerance of the training range [m, rad or per second]."""
 HUMAN = ("x", "y", "vx", "vy", "r", "growth")
 """Observed variables of a person."""
 ROBOT = (
@@ -29,7 +28,7 @@ PersonValues = tuple[int | None, Vec]
 """Index of a person, bodies first, or None, and the observed cylinder, shape (6,)."""
 
 
-class TrainedValues:
+class ReachTrainingRange:
     """Minimum and maximum values of training; infinite if unknown.
 
     Args:
@@ -45,7 +44,7 @@ class TrainedValues:
                 known = slice(first, first + len(entry["low"]))
                 self._low[known], self._high[known] = entry["low"], entry["high"]
             first += size
-        self._least, self._most = self._low - SLACK, self._high + SLACK
+        self._least, self._most = self._low - TOLERANCE, self._high + TOLERANCE
 
     def outside(
         self, state: Vec, seen: Iterable[PersonValues], order: Sequence[int]
