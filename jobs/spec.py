@@ -21,6 +21,7 @@ from app.policies.evaluation.registry import (
     check_motions,
     default_checkpoint,
     most_episodes,
+    require_use,
 )
 from app.policies.report.page import evaluations
 from app.store.records import JobRecord, NewJob
@@ -46,6 +47,9 @@ MAX_STEPS = 1_000_000_000
 MAX_TIME_S = 366 * 86_400.0
 """Greatest time budget [s]."""
 
+ONE_LINE = r"^[^\x00-\x1f\x7f-\x9f\u2028\u2029\u202a-\u202e\u2066-\u2069]*$"
+"""Text without control characters, line separators and changes of the direction of writing."""
+
 Seed = Annotated[int, Field(ge=0, le=MAX_SEED)]
 Name = Annotated[str, Field(min_length=1, max_length=64)]
 
@@ -59,7 +63,7 @@ class _Strict(BaseModel):
 class JobLabels(_Strict):
     """What people write on a job; it changes nothing of what the job computes."""
 
-    name: Annotated[str, Field(pattern=r"^[^\x00-\x1f]*$", max_length=80)] | None = Field(
+    name: Annotated[str, Field(pattern=ONE_LINE, max_length=80)] | None = Field(
         None, description="a name for people, one line"
     )
     notes: Annotated[str, Field(max_length=4000)] | None = Field(
@@ -165,7 +169,7 @@ class EvaluateSpec(_Spec):
 
         Raises:
             InvalidInput: An unknown protocol, too many episodes, or recordings that the
-                protocol does not take.
+                protocol does not take; a checkpoint where it has no policy.
         """
         if self.protocol not in PROTOCOLS:
             raise InvalidInput("protocol", self.protocol, "is no protocol", tuple(PROTOCOLS))
@@ -176,6 +180,7 @@ class EvaluateSpec(_Spec):
             if name in self.recordings[:place]:
                 raise InvalidInput(f"recordings[{place}]", name, "must be named once")
         check_motions(self.protocol, self.recordings, "recordings")
+        require_use(self.protocol, self.checkpoint)
         checkpoint = self.checkpoint or default_checkpoint(self.protocol)
         spec = {**self._body(), "checkpoint": checkpoint}
         return NewJob(kind=self.kind, spec=spec, seed=self.seed, **self.labels())
@@ -200,6 +205,9 @@ class Range(_Strict):
         if self.choices is not None:
             if self.low is not None or self.high is not None:
                 raise InvalidInput(f"{field}.choices", self.choices, "stands without low, high")
+            for place, one in enumerate(self.choices):
+                if one in self.choices[:place]:
+                    raise InvalidInput(f"{field}.choices[{place}]", one, "must be given once")
             return {f"choices[{place}]": one for place, one in enumerate(self.choices)}
         if self.low is None or self.high is None:
             name = "low" if self.low is None else "high"

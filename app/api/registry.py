@@ -192,12 +192,15 @@ class PolicyRegistry(Generic[P]):
 
     def _loaded(self, reference: str | None) -> P | None:
         """Return a policy by SHA-256 or alias if it is in memory, without disk access."""
-        sha256 = self._names.aliases.get(reference or self._default, reference)
+        sha256 = self._names.aliases.get(self._or_default(reference), reference)
         with self._lock:
             policy = self._policies.get(sha256 or "")
             if policy is not None:
                 self._policies.move_to_end(policy.checkpoint)
             return policy
+
+    def _or_default(self, reference: str | None) -> str:
+        return self._default if reference is None else reference
 
     def forget(self, removed: Iterable[str]) -> None:
         """Drop the policies of deleted checkpoints, by SHA-256."""
@@ -228,7 +231,7 @@ class PolicyRegistry(Generic[P]):
         policy = self._loaded(reference)
         if policy is not None:
             return policy
-        record, tensors = self._names.read(reference or self._default)
+        record, tensors = self._names.read(self._or_default(reference))
         policy = self._build(record.manifest, tensors)
         with self._lock:
             self._policies[record.sha256] = policy

@@ -54,10 +54,9 @@ def evaluate(
     protocols.check_motions(protocol, [str(path) for path in files], "FILE", example)
     with every_fault_printed("", as_json=as_json):
         motions = clean_runs(files, read_options(unit, root_unit, up, names))
-    tested = None
-    if protocol not in protocols.WITHOUT_CHECKPOINT:
-        reference = checkpoint or protocols.default_checkpoint(protocol)
-        tested = find_checkpoint(reference, settings)
+    protocols.require_use(protocol, checkpoint)
+    reference = checkpoint or protocols.default_checkpoint(protocol)
+    tested = None if reference is None else find_checkpoint(reference, settings)
     torch.set_num_threads(1)
     result = protocols.evaluate(protocol, tested, episodes=episodes, seed=seed, motions=motions)
     result = {**result, "machine": describe()}

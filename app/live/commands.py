@@ -24,7 +24,7 @@ MAX_PEOPLE = LIMITS["people"]
 FIRST = 0
 """Id of the first person, the default of person commands."""
 
-Name = Annotated[str, Field(max_length=64)]
+Name = Annotated[str, Field(min_length=1, max_length=64)]
 Coordinate = Annotated[float, Field(ge=-FARTHEST_M, le=FARTHEST_M)]
 Point = Annotated[tuple[Coordinate, Coordinate, Coordinate], Field(strict=False)]
 Percentile = Annotated[float, Field(ge=PERCENTILES[0], le=PERCENTILES[1])]

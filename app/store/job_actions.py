@@ -13,6 +13,7 @@ from app.store.jobs import NOTHING, read_job
 from app.store.records import COMPOSITE_KINDS, JobRecord, References
 from app.store.references import require_stored
 
+BUDGETS = ("step_budget", "time_budget_s")
 REPEATABLE = ("cancelled", "failed")
 """States from which a job is resumed or retried."""
 
@@ -113,13 +114,21 @@ def require_repeatable(job: JobRecord, action: str) -> None:
 def change_labels(store: Store, job_id: str, changes: Mapping[str, Any]) -> JobRecord:
     """Change name, notes, priority or budgets of a job.
 
-    A priority counts while the job is queued, a budget until it has ended.
+    A priority counts while the job is queued, a budget until it has
+    succeeded.
 
     Raises:
         NotFound: There is no such job.
+        WrongState: A budget is changed of a job that has succeeded.
+        InvalidInput: A budget is spent already.
     """
     with store.writing() as connection:
-        read_job(connection, job_id, for_update=True)
+        job = read_job(connection, job_id, for_update=True)
+        budgets = {name: changes[name] for name in BUDGETS if name in changes}
+        if budgets and job.state == "succeeded":
+            rule = f"must not be succeeded to change a budget of job {job.number}: resume it"
+            raise WrongState("state", job.state, rule)
+        _require_left(job, budgets, {"step_budget": job.step, "time_budget_s": job.run_s})
         if changes:
             connection.execute(sa.update(jobs).where(jobs.c.id == job_id).values(**changes))
         return read_job(connection, job_id)

@@ -61,7 +61,7 @@ class Reports(Composer):
                 composed_jobs.end(store, job.id, "succeeded", result=result, ended_by=lacking)
 
 
-def _evaluation(spec: ReportSpec, protocol: str, checkpoint: str) -> AnySpec:
+def _evaluation(spec: ReportSpec, protocol: str, checkpoint: str | None) -> AnySpec:
     episodes = spec.episodes and min(spec.episodes, most_episodes(protocol))
     body = {"kind": "evaluate", "protocol": protocol, "checkpoint": checkpoint}
     return parse_spec({**body, "episodes": episodes, "seed": spec.seed})

@@ -2,7 +2,7 @@
 
 import pytest
 
-from app.errors import InvalidInput
+from app.errors import InvalidInput, WrongState
 from app.store import job_actions, jobs
 from app.store.engine import Store
 from jobs.spec import parse_spec
@@ -57,13 +57,17 @@ def test_job_ends_with_its_time_of_all_attempts(store: Store, supervisor: Superv
     job_actions.resume_job(store, job_id, {"time_budget_s": job.run_s + 0.2})
     again = wait_until_final(store, job_id)
     assert again.ended_by == "time budget" and again.run_s >= job.run_s + 0.2
+    with pytest.raises(WrongState, match="must not be succeeded to change a budget"):
+        job_actions.change_labels(store, job_id, {"step_budget": 90})
 
 
 def test_budget_of_a_running_job_is_changed(store: Store, supervisor: Supervisor) -> None:
     job_id = queue(store, steps=100, hold_at=[33])
     supervisor.wake()
-    wait_for(store, job_id, lambda job: job.step == 30)
-    job_actions.change_labels(store, job_id, {"time_budget_s": 0.1})
+    job = wait_for(store, job_id, lambda job: job.step == 30)
+    with pytest.raises(InvalidInput, match="step_budget = 30 must be above the 30 steps"):
+        job_actions.change_labels(store, job_id, {"step_budget": 30})
+    job_actions.change_labels(store, job_id, {"time_budget_s": job.run_s + 0.1})
     job = wait_until_final(store, job_id)
     assert (job.state, job.ended_by) == ("succeeded", "time budget")
 

@@ -10,6 +10,7 @@ from app.policies.configs.presets import PRESETS
 from jobs.spec import MAX_SEED, EvaluateSpec, TrainSpec, parse_spec
 
 EVALUATE = {"kind": "evaluate", "protocol": "pick-single", "episodes": 10, "seed": 11}
+WITHOUT_POLICY = EVALUATE | {"protocol": "safety-ssm"}
 NARROW = {"networks": {"width": 64}}
 TRAIN = {"kind": "train", "preset": "pick-td3", "seed": 1, "overrides": NARROW}
 RECORDED = {"kind": "evaluate", "protocol": "pick-mocap", "recordings": ["wave", "walk"]}
@@ -80,6 +81,11 @@ def test_unknown_kind_is_refused(kind: object) -> None:
             "overrides.learning.gamma",
             "must be finite",
         ),
+        (
+            EVALUATE | {"protocol": "safety-ssm", "checkpoint": "pick"},
+            "checkpoint",
+            "must not be",
+        ),
         (EVALUATE | {"protocol": "pick-all"}, "protocol", "is no protocol; choices: pick-"),
         (EVALUATE | {"episodes": 10**9}, "episodes", "must lie in"),
         (RECORDED | {"recordings": []}, "recordings", "at least one .* for pick-mocap"),
@@ -115,3 +121,16 @@ def test_episodes_of_a_pair_are_fewer_than_those_of_a_whole_protocol() -> None:
     with pytest.raises(InvalidInput, match=r"\[1, 10000\]"):
         parse_spec(body).new_job()
     parse_spec({**body, "protocol": "pick-single"}).new_job()
+
+
+def test_evaluation_without_policy_has_no_checkpoint() -> None:
+    assert (
+        parse_spec(EVALUATE | {"protocol": "safety-ssm"}).new_job().spec["checkpoint"] is None
+    )
+
+
+@pytest.mark.parametrize("letter", ["\n", "\x7f", "\x85", "\u2028", "\u202e", "\u2066"])
+def test_name_is_one_line_in_one_direction(letter: str) -> None:
+    with pytest.raises(ValidationError, match="name"):
+        parse_spec(TRAIN | {"name": f"a{letter}b"})
+    assert parse_spec(TRAIN | {"name": "größer 大 😀"}).new_job().name == "größer 大 😀"

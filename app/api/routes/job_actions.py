@@ -103,7 +103,8 @@ def retry_job(
     """
     job_actions.require_repeatable(job, "retry")
     labels = {"name": job.name, "priority": job.priority}
-    body = validated(spec_type(job.kind), {**job.spec, **labels, **budgets(job)})
+    same = {} if job.checkpoint is None else {"checkpoint": job.checkpoint}
+    body = validated(spec_type(job.kind), {**job.spec, **same, **labels, **budgets(job)})
     new = replace(checked(body, services), parent=job.id)
     return queued(new, services, response, idempotency_key, {"retry": job.id})
 
@@ -131,15 +132,13 @@ def clone_job(
     return queued(new, services, response, idempotency_key, submitted)
 
 
-@router.patch(
-    "", summary="Change name, notes, priority or budgets of a job", responses={507: {}}
-)
+@router.patch("", summary="Change name, notes, priority or budgets of a job", responses=ENDED)
 def update_job(
     job: JobDep, services: ServicesDep, body: Annotated[JobChanges, LABELS]
 ) -> JobPublic:
     """Change the given members; null removes name, notes or a budget.
 
-    A priority counts while the job is queued, a budget until the job has ended.
+    A priority counts while the job is queued, a budget until the job has succeeded.
     """
     changes = body.given()
     require_budgeted(job, changes)

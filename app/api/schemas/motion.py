@@ -91,7 +91,10 @@ class MotionRequest(Body):
         "tracker's observation is added",
     )
     checkpoint: str | None = Field(
-        None, max_length=64, description="SHA-256 or alias; the shipped policy if null"
+        None,
+        min_length=1,
+        max_length=64,
+        description="SHA-256 or alias; the shipped policy if null",
     )
 
     def to_domain(

@@ -78,6 +78,7 @@ class PlanRequest(SortingFields):
     )
     checkpoint: str | None = Field(
         None,
+        min_length=1,
         max_length=64,
         description="SHA-256 or alias of a pick policy; the shipped policy if null",
     )
@@ -93,6 +94,7 @@ class PlanRequest(SortingFields):
         Raises:
             InvalidInput: An impossible state, with the field.
         """
+        self._check_previous(names)
         state = self.state_of(names, fail)
         return PlanQuery(
             q=self.robot.joints(self.robot.q),
@@ -109,6 +111,16 @@ class PlanRequest(SortingFields):
             objective=self.objective,
             margin=self.margin,
         )
+
+    def _check_previous(self, names: SortingNames) -> None:
+        if self.previous in names.stations or (
+            self.previous is None and self.phase == "approach"
+        ):
+            return
+        rule = (
+            "must be a station" if self.previous else f"must be given in the phase {self.phase}"
+        )
+        raise InvalidInput("previous", self.previous, rule, names.stations)
 
     def _held(self, held: str, names: SortingNames, state: SortingState) -> int:
         """Return the position at which the held object counts."""

@@ -42,7 +42,7 @@ class ProtocolPublic(Answer):
             name=name,
             title=(inspect.getdoc(PROTOCOLS[name]) or name).partition("\n")[0].replace("`", ""),
             purpose=task_measured(name) if has_policy else None,
-            checkpoint=default_checkpoint(name) if has_policy else None,
+            checkpoint=default_checkpoint(name),
             max_episodes=most_episodes(name),
             recordings=recordings,
         )

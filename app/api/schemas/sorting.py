@@ -171,6 +171,7 @@ class SortingRequest(SortingFields):
     decider: By = Field("policy", description="a policy, or the exact planner")
     checkpoint: str | None = Field(
         None,
+        min_length=1,
         max_length=64,
         description="SHA-256 or alias of a sorting policy; if null the cell's shipped one, or "
         "the exact planner",

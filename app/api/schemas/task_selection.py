@@ -59,7 +59,11 @@ class TaskSelectionRequest(Body):
         min_length=1, max_length=MAX_CANDIDATES, description="the candidate tasks"
     )
     previous: str | None = Field(
-        None, max_length=128, description="last chosen id, for hysteresis; null: none"
+        None,
+        min_length=1,
+        max_length=128,
+        description="last chosen id, for hysteresis; one that is no longer offered counts only "
+        "in the phase `approach`, as none; null: none",
     )
     phase: Literal["approach", "descend", "lift"] = Field(
         "approach",
@@ -78,16 +82,20 @@ class TaskSelectionRequest(Body):
         "thesis, or the probability of `success`, or minimises the expected `time` per success",
     )
     checkpoint: str | None = Field(
-        None, max_length=64, description="SHA-256 or alias; the shipped policy if null"
+        None,
+        min_length=1,
+        max_length=64,
+        description="SHA-256 or alias; the shipped policy if null",
     )
 
     def to_domain(self) -> tuple[Vec, Vec, tuple[Candidate, ...]]:
         """Return q, qd and candidates as arrays; ``known_people`` converts the people.
 
         Raises:
-            InvalidInput: An id occurs twice.
+            InvalidInput: An id occurs twice, or the target of a pick in progress is missing.
         """
         self._check_ids_are_unique()
+        self._check_pick_is_offered()
         return (
             self.robot.joints(self.robot.q),
             self.robot.joints(self.robot.qd),
@@ -100,6 +108,12 @@ class TaskSelectionRequest(Body):
         return PickProgress(
             phase=("approach", "descend", "lift").index(self.phase), closing_s=self.closing_s
         )
+
+    def _check_pick_is_offered(self) -> None:
+        ids = [one.id for one in self.candidates]
+        if self.phase != "approach" and self.previous not in ids:
+            rule = f"must be the id of a candidate in the phase {self.phase}"
+            raise InvalidInput("previous", self.previous, rule, ids)
 
     def _check_ids_are_unique(self) -> None:
         if len({one.id for one in self.candidates}) == len(self.candidates):

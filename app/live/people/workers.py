@@ -127,9 +127,13 @@ class LiveWorkers:
         """Move dragged people and continue changes of size; return whether anything changed."""
         moved = False
         for one in self:
-            if one.move(dt) if one.mode == "manual" else one.advance_size(dt):
-                one.freeze()
-                moved = True
+            if one.mode == "manual":
+                changed = one.move(dt)
+                if changed:
+                    one.freeze()
+            else:
+                changed = one.advance_size(dt)
+            moved = moved or changed
         return moved
 
 

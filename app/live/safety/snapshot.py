@@ -48,5 +48,5 @@ class SafetySnapshot(ReadModel):
     stopped_s: float
     """part of it with the override at 0 [s]"""
     zone: Internal
-    """outline on the floor of the positions nearer than S_p [m], shape (n, 2); for a standing
-    person where velocities are measured"""
+    """outline on the floor of the positions nearer than S_p [m], shape (n, 2): of people at the
+    assumed speed; of a standing person where velocities are measured"""

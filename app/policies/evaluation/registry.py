@@ -121,9 +121,10 @@ def evaluate(
         raise InvalidInput("seed", seed, "must lie in [0, 2^31)")
     if checkpoint is None and name not in WITHOUT_CHECKPOINT:
         raise InvalidInput("checkpoint", None, f"must name a checkpoint for {name}")
+    require_use(name, None if checkpoint is None else checkpoint.sha256)
     check_motions(name, [motion.name for motion in motions])
     tested = {}
-    if checkpoint is not None and name not in WITHOUT_CHECKPOINT:
+    if checkpoint is not None:
         preset = checkpoint.manifest["preset"].get("name")
         check_task(name, checkpoint.manifest, preset or checkpoint.sha256[:12])
         tested = {"checkpoint": checkpoint.sha256}
@@ -140,8 +141,22 @@ def evaluate(
     }
 
 
-def default_checkpoint(name: str) -> str:
-    """Return the alias of a protocol's default checkpoint."""
+def require_use(name: str, checkpoint: str | None) -> None:
+    """Check that a protocol uses a given checkpoint.
+
+    Raises:
+        InvalidInput: It has no policy.
+    """
+    if checkpoint is not None and name in WITHOUT_CHECKPOINT:
+        raise InvalidInput(
+            "checkpoint", checkpoint, f"must not be given to {name}, without policy"
+        )
+
+
+def default_checkpoint(name: str) -> str | None:
+    """Return the alias of a protocol's default checkpoint; None without a policy."""
+    if name in WITHOUT_CHECKPOINT:
+        return None
     return {SORTING: "sorting-e0", REACHING: "reach", CHOOSING: "pick"}[task_measured(name)]
 
 
@@ -165,7 +180,7 @@ def task_measured(name: str) -> str:
 
 
 def check_task(name: str, manifest: Mapping[str, Any], found: str) -> None:
-    """Check that a checkpoint is of the scenario of a protocol; any is where it uses none.
+    """Check that a checkpoint is of the scenario of a protocol.
 
     Args:
         name: A protocol.
@@ -176,7 +191,7 @@ def check_task(name: str, manifest: Mapping[str, Any], found: str) -> None:
         InvalidInput: It is of another scenario; the choices are the protocols of its own.
     """
     wanted, actual = task_measured(name), purpose_of(manifest)
-    if wanted != actual and name not in WITHOUT_CHECKPOINT:
+    if wanted != actual:
         fitting = set(PROTOCOLS) - WITHOUT_CHECKPOINT
         known = sorted(one for one in fitting if task_measured(one) == actual)
         raise InvalidInput(

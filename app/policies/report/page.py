@@ -49,8 +49,11 @@ def files_of(text: str) -> set[str]:
     return {_parts(place)[0] for kind, place in found if kind in _OF_RESULT}
 
 
-def evaluations() -> dict[str, tuple[str, str]]:
-    """Return the result files that evaluations write, with protocol and checkpoint of each."""
+def evaluations() -> dict[str, tuple[str, str | None]]:
+    """Return the result files that evaluations write, with protocol and checkpoint of each.
+
+    The checkpoint is None where the protocol has no policy.
+    """
     found = {}
     for file in sorted(files_of(TEXT)):
         protocol = next((file[:-3] for end in TASKS if file.endswith(end)), file)

@@ -32,10 +32,18 @@ class Shapes:
     cylinders: Vec
     """Upright cylinders on the floor: x, y, radius, top [m], shape (n, 4)."""
     going: Vec | None = None
-    """Velocities of the cylinders: vx, vy and growth of the radius [m/s], shape (n, 3); NaN in
-    rows of unknown velocity, None where all are unknown."""
+    """Velocities with which the cylinders may be extrapolated: vx, vy and growth of the radius
+    [m/s], shape (n, 3); NaN in rows without one, None where none has one."""
     speed: Vec | None = None
     """Observed speed of each capsule [m/s], shape (m,); None where unknown."""
+    cylinder_speed: Vec | None = None
+    """Observed speed of each cylinder [m/s], shape (n,); None: that of ``going``."""
+
+
+def greatest_speeds(going: Vec) -> Vec:
+    """Return the greatest speed of any point of cylinders by their velocities [m/s]."""
+    speeds: Vec = np.hypot(going[:, 0], going[:, 1]) + np.abs(going[:, 2])
+    return speeds
 
 
 def no_people() -> Shapes:

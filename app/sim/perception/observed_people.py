@@ -341,10 +341,12 @@ def people_shapes(shared: People, people: Sequence[Person]) -> Shapes:
         (*person.qd[:2], person.growth) if person.measured else (math.nan,) * 3
         for person in cylinders
     ]
+    observed = [math.hypot(*one.qd[:2]) + abs(one.growth) for one in cylinders]
     return Shapes(
         columns=geometry.columns,
         cylinders=np.column_stack([geometry.cylinders, tops]),
         going=np.reshape(going, (-1, 3)),
+        cylinder_speed=np.array(observed),
         speed=capsule_speeds_of(
             shared,
             geometry,

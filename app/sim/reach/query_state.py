@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.sim.cells.cell import Cell
-from app.sim.collision.checker import Shapes
+from app.sim.collision.checker import Shapes, greatest_speeds
 from app.sim.core.arrays import Vec
 from app.sim.core.jit import direct
 from app.sim.human.person import Person
@@ -97,15 +97,13 @@ class QueryState:
     def shapes(self) -> Shapes:
         """The people as shapes, bodies first."""
         geometry = self._work.geometry
+        going = self.state.people.walkers.rows[0][:, [VX, VY, GROWTH]]
         return Shapes(
             columns=geometry.columns.copy(),
             cylinders=np.concatenate([geometry.cylinders, self._tops], axis=1),
-            going=np.where(
-                self._measured[:, None],
-                self.state.people.walkers.rows[0][:, [VX, VY, GROWTH]],
-                np.nan,
-            ),
+            going=np.where(self._measured[:, None], going, np.nan),
             speed=self._speeds.copy(),
+            cylinder_speed=greatest_speeds(going),
         )
 
     def load(self, robot: Joints, people: Sequence[Person], time_left_s: float) -> None:

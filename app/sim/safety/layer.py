@@ -22,7 +22,7 @@ import numpy as np
 
 from app.errors import InvalidInput
 from app.sim.cells.cell import Cell
-from app.sim.collision.checker import Shapes
+from app.sim.collision.checker import Shapes, greatest_speeds
 from app.sim.core.arrays import Vec, as_kernel_array
 from app.sim.core.jit import direct
 from app.sim.geometry.capsules import distances, least
@@ -238,13 +238,13 @@ class SafetyLayer:
             seen = np.where(unknown[:, None], 0.0, going)
             require_finite("people", seen)
             self._space.velocity[:] = seen
-            self._space.known_speed[shape[0] :] = _greatest_speeds(seen)
+            self._space.known_speed[shape[0] :] = greatest_speeds(seen)
             settings = self.settings
             change = np.where(unknown, settings.human_speed, settings.speed_change)
             self._rule.speed[shape[0] :] = change
 
     def _load_speeds(self, people: Shapes, known: bool) -> None:
-        """Load the observed speed of each part, 0 where unknown.
+        """Load the observed speed of each part, 0 where unknown or extrapolated.
 
         Args:
             known: Whether cylinders of known velocity are extrapolated with it.
@@ -253,10 +253,13 @@ class SafetyLayer:
         if m:
             observed[:m] = 0.0 if people.speed is None else people.speed
             require_finite("people", observed[:m])
-        if known or people.going is None:
-            observed[m:] = 0.0
-        else:
-            np.fmax(_greatest_speeds(people.going), 0.0, out=observed[m:])  # NaN: unknown
+        going, speed = people.going, people.cylinder_speed
+        if speed is None:
+            speed = np.zeros(1) if going is None else greatest_speeds(going)
+        np.fmax(speed, 0.0, out=observed[m:])  # NaN: unknown
+        require_finite("people", observed[m:])
+        if known and going is not None:
+            observed[m:][~np.isnan(going).any(axis=1)] = 0.0
 
     def _decision(self, chosen: float, qd: Vec, people: Shapes, age: float) -> SafetyDecision:
         """Return the decision in the work space, with its cause."""
@@ -293,8 +296,9 @@ class SafetyLayer:
     ) -> tuple[int, SeparationTerms] | None:
         """Return the person to which S_p refers, and its terms, right after :meth:`decide`.
 
-        The person is the cause of the override, else the nearest one; the terms are those of
-        the part nearest to the robot. None without people.
+        The person is the cause of the override, else the one with the least reserve; the terms
+        are those of that person's part with the least reserve: its distance minus what it may
+        move until the robot rests. None without people.
 
         Args:
             decision: Last decision.
@@ -306,11 +310,13 @@ class SafetyLayer:
         if not gap.size:
             return None
         column = int(self._space.cause[separation_check.CAUSE_PART])
+        time = self.arm.dt + self.settings.latency + age + decision.stop_time
+        reserve = gap - np.maximum(self._rule.speed, self._space.observed_speed) * time
         if decision.person is None:
-            column = int(np.argmin(gap))
+            column = int(np.argmin(reserve))
         elif column < self._shape[0]:
             first = column - column % body.N_CAPSULES
-            column = first + int(np.argmin(gap[first : first + body.N_CAPSULES]))
+            column = first + int(np.argmin(reserve[first : first + body.N_CAPSULES]))
         terms = self._terms_of(column, qd, people, decision.stop_time, age)
         return self._person_of(column)[0], terms
 
@@ -376,9 +382,3 @@ class SafetyLayer:
         grown = r + max(0.0, growth) * seconds
         there = swept_clearance(robot, x, y, vx * seconds, vy * seconds, grown)
         return max(0.0, separation - float(there)) / seconds + self.settings.speed_change
-
-
-def _greatest_speeds(going: Vec) -> Vec:
-    """Return the greatest speed of any point of cylinders by their velocities [m/s]."""
-    speeds: Vec = np.hypot(going[:, 0], going[:, 1]) + np.abs(going[:, 2])
-    return speeds

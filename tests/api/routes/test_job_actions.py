@@ -156,6 +156,19 @@ def test_evaluation_has_no_budget(client: TestClient) -> None:
     assert (answer.status_code, answer.json()["field"]) == (422, "time_budget_s")
 
 
+def test_evaluation_is_retried_with_the_checkpoint_that_its_alias_named(
+    client: TestClient,
+) -> None:
+    sha256 = client.get("/v1/checkpoints/pick").json()["sha256"]
+    client.put("/v1/aliases/mine", json={"checkpoint": sha256}).raise_for_status()
+    body = {"kind": "evaluate", "protocol": "pick-single", "episodes": 2, "priority": -100}
+    job = cancelled(client, client.post("/v1/jobs", json=body | {"checkpoint": "mine"}).json())
+    client.delete("/v1/aliases/mine").raise_for_status()
+    again = client.post(f"/v1/jobs/{job['id']}/retry").json()
+    assert again["checkpoint"] == job["checkpoint"] == sha256
+    cancelled(client, again)
+
+
 def test_actions_on_an_unknown_job_are_not_found(client: TestClient) -> None:
     for action in ("cancel", "resume", "retry", "clone"):
         assert client.post(f"/v1/jobs/nothing/{action}", json={}).status_code == 404

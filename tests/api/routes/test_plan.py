@@ -120,3 +120,13 @@ def test_held_object_below_another_is_refused(client: TestClient) -> None:
 
 def test_policy_that_sorts_is_refused(client: TestClient) -> None:
     assert refused(client, 409, checkpoint="sorting-e0")["status"] == 409
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [{"previous": "nowhere"}, {"phase": "lift"}, {"previous": "nowhere", "phase": "descend"}],
+    ids=str,
+)
+def test_previous_is_a_station(client: TestClient, changes: dict[str, Any]) -> None:
+    found = refused(client, **changes)
+    assert found["field"] == "previous" and "red" in found["choices"]

@@ -212,4 +212,20 @@ def test_progress_objective_and_probabilities_go_over_the_wire(
         assert 0.0 <= one["low"] <= one["mean"] <= one["high"] <= 1.0
     assert refused(client, {**state, "objective": "luck"})["field"] == "objective"
     assert refused(client, {**state, "phase": "hover"})["field"] == "phase"
+    assert refused(client, {**state, "checkpoint": ""})["field"] == "checkpoint"
     assert refused(client, {**state, "closing_s": -1.0})["field"] == "closing_s"
+
+
+@pytest.mark.parametrize("phase", ["descend", "lift"])
+@pytest.mark.parametrize("previous", [None, "nobody's"])
+def test_pick_in_progress_is_one_of_the_candidates(
+    client: TestClient, state: dict[str, Any], phase: str, previous: str | None
+) -> None:
+    ids = [one["id"] for one in state["candidates"]]
+    found = refused(client, {**state, "phase": phase, "previous": previous})
+    assert (found["field"], found["value"], found["choices"]) == (
+        "previous",
+        repr(previous),
+        ids,
+    )
+    assert client.post(URL, json={**state, "previous": previous}).status_code == 200

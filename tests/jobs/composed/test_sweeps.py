@@ -311,6 +311,10 @@ def test_sweep_is_no_work_for_a_worker_and_outlives_its_server(store: Store) -> 
             "ranges.networks.width.choices[1]",
         ),
         (
+            {"ranges": {"networks.width": {"choices": [64, 128, 64]}}},
+            "ranges.networks.width.choices[2]",
+        ),
+        (
             {"ranges": {"networks.width": {"choices": [64, 65], "low": 1}}},
             "ranges.networks.width.choices",
         ),

@@ -42,12 +42,17 @@ def test_motions_are_refused_where_none_are_taken(name):
 @pytest.mark.parametrize("name", ["pick-single", "pick-choice", "safety-ssm"])
 def test_rows_are_reported_in_order_and_are_those_of_the_result(name):
     reported = []
-    result = evaluate(
-        name, pretrained.load("pick"), episodes=4, on_row=lambda *what: reported.append(what)
-    )
+    policy = None if name == "safety-ssm" else pretrained.load("pick")
+    result = evaluate(name, policy, episodes=4, on_row=lambda *what: reported.append(what))
     n = len(result["results"])
     assert [(done, total) for done, total, _ in reported] == [(k + 1, n) for k in range(n)]
     assert [row for _, _, row in reported] == result["results"]
+
+
+def test_a_protocol_without_policy_takes_no_checkpoint():
+    with pytest.raises(InvalidInput, match="must not be given to safety-ssm") as caught:
+        evaluate("safety-ssm", pretrained.load("pick"), episodes=1)
+    assert caught.value.field == "checkpoint"
 
 
 @pytest.mark.parametrize("name", sorted(OF_SORTING))

@@ -160,6 +160,7 @@ def test_who_is_not_known_to_go_on_is_taken_to_be_as_fast_as_assumed(settings):
     [
         (replace(walker(0.5), going=np.array([[1.2, -1.6, 0.5]])), 2.5),
         (replace(walker(0.5), going=np.array([[0.3, 0.4, -0.1]])), 1.6),
+        (replace(walker(0.5), going=None, cylinder_speed=np.array([2.5])), 2.5),
         (replace(ahead(0.5), speed=np.array([2.5])), 2.5),
         (replace(ahead(0.5), speed=np.array([1.5])), 1.6),
     ],
@@ -172,6 +173,16 @@ def test_who_is_observed_faster_than_assumed_counts_at_that_speed(people, speed)
         decision = layer.decide(REST, NONE, NONE, NONE, people)
         assert (decision.override == 1.0) is admitted
     assert layer.terms(decision, NONE, people)[1].human_speed == pytest.approx(speed)
+
+
+@pytest.mark.parametrize(("observed", "speed"), [(2.5, 2.5), (1.0, 1.6)])
+def test_who_cannot_be_extrapolated_counts_at_the_observed_speed(observed, speed):
+    people = replace(
+        walker(0.3), going=np.full((1, 3), np.nan), cylinder_speed=np.array([observed])
+    )
+    layer = SafetyLayer(ARM, WALKS)
+    decision = layer.decide(REST, NONE, NONE, NONE, people)
+    assert layer.terms(decision, NONE, people)[1].human_speed == speed
 
 
 def test_observed_speeds_of_capsules_must_be_numbers():
@@ -374,6 +385,22 @@ def test_terms_name_the_nearest_part_of_the_person_and_not_the_first_that_is_too
     _, terms = layer.terms(decision, PAN, people)
     assert terms.separation == pytest.approx(layer._space.gap[0].min())
     assert terms.separation < 0.1
+
+
+def test_terms_are_those_of_the_fast_hand_and_not_of_the_nearer_body_at_rest():
+    tip, offset, _ = tool()
+    centers = tip + np.linspace(0.65, 0.8, body.N_CAPSULES)[:, None] * offset
+    ends = np.repeat(centers[:, None], 2, axis=1)
+    people = capsule_shapes(ends, np.full(body.N_CAPSULES, 0.05))
+    speed = np.zeros(people.columns.shape[1])
+    speed[body.N_CAPSULES - 1] = 4.0
+    layer = SafetyLayer(ARM, SafetySettings())
+    for protective_distance, override in ((0.3, 0.0), (0.0, 1.0)):
+        layer = SafetyLayer(ARM, SafetySettings(protective_distance=protective_distance))
+        decision = layer.decide(REST, NONE, NONE, NONE, replace(people, speed=speed))
+        _, terms = layer.terms(decision, NONE, people)
+        assert decision.override == override
+        assert (terms.human_speed, terms.required > terms.separation) == (4.0, override == 0.0)
 
 
 def test_scaled_motion_written_out_in_time_is_the_motion():

@@ -7,7 +7,7 @@ from app.sim.core.jit import kernel
 from app.sim.geometry.capsules import displacements, greatest_displacement
 from app.sim.people.kernels.people import People, PeopleGeometry, place_workers
 
-SPEED_STEP = 1e-3
+SPEED_STEP = 1e-5
 """Step of the difference quotient of speeds of capsules [s]."""
 
 

@@ -26,19 +26,32 @@ from app.sim.pick.kernels.observation_layout import (
     AT_GOAL_AHEAD,
     BASE_START,
     CLOSE_SCALE,
+    CLOSING,
+    COS_Q,
     DISTANCE_SCALE,
     FARTHEST,
+    HUMAN_Q,
+    HUMAN_QD,
     MOTION,
     N_FEATURES,
     N_PICK,
     N_WITH_BODY,
     N_WITH_PHASE,
+    NEAR_CLEARANCE,
     NEAREST,
     PELVIS_Y,
+    PHASE,
+    QD,
     SCALARS,
     SECOND_CLEARANCE,
+    SIN_Q,
     STILL_AHEAD,
+    TCP,
+    TCP_VELOCITY,
     TIME_SCALE,
+    TO_GOAL,
+    TOOL_AXIS,
+    Q,
 )
 from app.sim.pick.kernels.observation_workspace import (
     ALONG_BASE,
@@ -134,15 +147,15 @@ def _scaled(d: float) -> float:
 def _write_joints(arm: Arm, state: PickQuery, out: Obs) -> None:
     q, qd, human_q = state.q, state.qd, state.human_q[0]
     for j in range(CONTROLLED):
-        out[j] = q[j] / math.pi
-        out[5 + j] = qd[j] / arm.limits.qd_max[j]
-        out[10 + j] = math.sin(q[j])
-        out[15 + j] = math.cos(q[j])
+        out[Q + j] = q[j] / math.pi
+        out[QD + j] = qd[j] / arm.limits.qd_max[j]
+        out[SIN_Q + j] = math.sin(q[j])
+        out[COS_Q + j] = math.cos(q[j])
     for j in range(18):
-        out[20 + j] = human_q[j]
-        out[38 + j] = 0.5 * state.human_qd[0, j]
-    out[21] = human_q[1] - PELVIS_Y
-    out[22] = (human_q[2] + 1.5 * math.pi) % (2.0 * math.pi) - math.pi
+        out[HUMAN_Q + j] = human_q[j]
+        out[HUMAN_QD + j] = 0.5 * state.human_qd[0, j]
+    out[HUMAN_Q + 1] = human_q[1] - PELVIS_Y
+    out[HUMAN_Q + 2] = (human_q[2] + 1.5 * math.pi) % (2.0 * math.pi) - math.pi
     if out.shape[0] == N_WITH_BODY:
         for i in range(body.N_SIZE):
             out[N_FEATURES + i] = state.size[0, i]
@@ -156,9 +169,9 @@ def _write_tool(qd: Vec, robot: RobotPose, out: Obs) -> None:
         speed = 0.0
         for j in range(6):
             speed += jacobian[i, j] * qd[j]
-        out[56 + i] = tcp[i]
-        out[62 + i] = 2.0 * speed
-        out[65 + i] = robot.rot[6, i, 1]
+        out[TCP + i] = tcp[i]
+        out[TCP_VELOCITY + i] = 2.0 * speed
+        out[TOOL_AXIS + i] = robot.rot[6, i, 1]
     out[SCALARS + 1] = robot_tilt(robot)
 
 
@@ -181,7 +194,7 @@ def _write_target(goal: Vec, person: PersonWorkspace, tcp: Vec, out: Obs) -> Non
     """Write the target relative to tool, hands and elbows."""
     square, k = 0.0, ARMS + 3
     for i in range(3):
-        out[59 + i] = 2.0 * (goal[i] - tcp[i])
+        out[TO_GOAL + i] = 2.0 * (goal[i] - tcp[i])
         square += (goal[i] - tcp[i]) ** 2
     out[SCALARS] = 2.0 * math.sqrt(square)
     for point in (body.HAND_R, body.HAND_L, body.ELBOW_R, body.ELBOW_L):
@@ -207,15 +220,15 @@ def _write_nearest(work: PickObservationWorkspace, out: Obs) -> None:
         overall = min(overall, gap[lane])
     out[SCALARS + 2] = _scaled(overall)
     if out.shape[0] == N_WITH_PHASE or out.shape[0] == N_PICK:
-        out[N_FEATURES + 4] = min(1.0, overall / CLOSE_SCALE)
+        out[NEAR_CLEARANCE] = min(1.0, overall / CLOSE_SCALE)
 
 
 @kernel(inline="always")
 def _write_phase(state: PickQuery, out: Obs) -> None:
     """Write the phase of the pick and the share of closing."""
     for phase in range(3):
-        out[N_FEATURES + phase] = 1.0 if state.phase == phase else 0.0
-    out[N_FEATURES + 3] = state.closing
+        out[PHASE + phase] = 1.0 if state.phase == phase else 0.0
+    out[CLOSING] = state.closing
 
 
 @kernel(inline="always")

@@ -1,4 +1,8 @@
-"""Layout of the observations of the pick scenario: groups of features and their units."""
+"""Layout of the observations of the pick scenario: groups of features, and where each begins.
+
+``app/sim/envs/pick.py`` describes the features and their units. Joints of the robot are the
+first five: the sixth, which turns the tool about its axis, is at rest.
+"""
 
 from app.sim.core.observation_layout import slices_of
 from app.sim.human.kernels import kinematics as body
@@ -59,10 +63,15 @@ PICK_SIZES = (
 """Groups of the observation of a pick beside several people."""
 N_PICK = sum(size for _, size in PICK_SIZES)
 """Length of that observation."""
+(PHASE, CLOSING, NEAR_CLEARANCE) = (
+    slices_of(PHASE_SIZES)[name].start for name in ("phase", "closing", "near_clearance")
+)
+"""First index of each group of a pick."""
 (PELVIS, SECOND_ARMS, SECOND_CLEARANCE) = (
     slices_of(PICK_SIZES)[name].start
     for name in ("second_pelvis", "second_hands_and_elbows", "second_clearance")
 )
+"""First index of each group of the second person."""
 CLOSE_SCALE = 0.1
 """Unit of ``near_clearance`` [m], which is clipped at one unit."""
 MAX_PEOPLE = 4
@@ -70,7 +79,23 @@ MAX_PEOPLE = 4
 PRESENT_WITHIN = 4.0
 """Distance from the robot's base from which on nobody is observed as a second person [m]."""
 BASE_START = LAYOUT["base"].start
-"""Index of the base motion, for the residual action."""
+"""First index of the base motion, for the residual action."""
+(Q, QD, SIN_Q, COS_Q, HUMAN_Q, HUMAN_QD, TCP, TO_GOAL, TCP_VELOCITY, TOOL_AXIS) = (
+    LAYOUT[name].start
+    for name in (
+        "q",
+        "qd",
+        "sin_q",
+        "cos_q",
+        "human_q",
+        "human_qd",
+        "tcp",
+        "goal_minus_tcp",
+        "tcp_velocity",
+        "tool_axis",
+    )
+)
+"""First index of each group of joints and tool."""
 (ARMS, MOTION, SCALARS, NEAREST, STILL_AHEAD, BASE_AHEAD, AT_GOAL_AHEAD) = (
     LAYOUT[name].start
     for name in (
@@ -83,3 +108,4 @@ BASE_START = LAYOUT["base"].start
         "goal_clearance",
     )
 )
+"""First index of each other group."""

@@ -33,16 +33,16 @@ def test_a_turning_person_s_capsules_are_as_fast_as_their_farther_end() -> None:
 
 
 def test_speeds_are_differences_of_the_kinematics_and_bound_all_points() -> None:
-    rng, step = np.random.default_rng(4), 1e-5
+    rng, step = np.random.default_rng(4), 1e-6
     for _ in range(200):
         q = rng.uniform(human.Q_MIN, human.Q_MAX)
-        qd = rng.uniform(-4.0, 4.0, 18)
+        qd = rng.uniform(-50.0, 50.0, 18)
         before, after = (
             human.capsules(q + at * qd, CELL.body, CELL.floor_z) for at in (-step, step)
         )
         found = speeds(q, qd)
         ends = np.linalg.norm(after - before, axis=2).max(axis=1) / (2.0 * step)
-        assert found == pytest.approx(ends, rel=0.02, abs=0.02)
+        assert found == pytest.approx(ends, rel=3e-3, abs=0.01)
         for part in np.linspace(0.0, 1.0, 5):
             point = [a[:, 0] + part * (a[:, 1] - a[:, 0]) for a in (before, after)]
             speed = np.linalg.norm(point[1] - point[0], axis=1) / (2.0 * step)
