@@ -121,8 +121,8 @@ def evaluate(
         raise InvalidInput("seed", seed, "must lie in [0, 2^31)")
     if checkpoint is None and name not in WITHOUT_CHECKPOINT:
         raise InvalidInput("checkpoint", None, f"must name a checkpoint for {name}")
-    require_use(name, None if checkpoint is None else checkpoint.sha256)
     check_motions(name, [motion.name for motion in motions])
+    require_use(name, None if checkpoint is None else checkpoint.sha256)
     tested = {}
     if checkpoint is not None:
         preset = checkpoint.manifest["preset"].get("name")
