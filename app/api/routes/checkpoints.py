@@ -19,7 +19,7 @@ from app.policies.checkpoints.checkpoint import (
     purpose_of,
 )
 from app.policies.checkpoints.checkpoint import load as load_checkpoint
-from app.policies.checkpoints.upload import MAX_FILE, read_upload
+from app.policies.checkpoints.upload import MAX_FILE, read_upload, require_ranges
 from app.policies.inference.recalibration import recalibrated
 from app.store import checkpoints
 from jobs.checkpoints import read_sound, to_store
@@ -89,6 +89,7 @@ def _store(
         SORTING: services.sorting_policies,
     }
     registries[purpose_of(found.manifest)].check(found.manifest, found.tensors)
+    require_ranges(found.manifest)
     return _keep(found, services, response)
 
 

@@ -5,15 +5,19 @@ from typing import Any, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from app.api.schemas.examples import shows
 from app.api.schemas.numbers import Answer, Body
+from app.errors import InvalidInput
 from app.policies.checkpoints import pretrained
 from app.policies.checkpoints.checkpoint import purpose_of
 from app.policies.inference.recalibration import MIN_OUTCOMES, with_timeout
 from app.policies.networks.outcome import OUTCOMES
 from app.store.records import CheckpointRecord, Page
+
+ROUNDING = 1e-6
+"""Excess over 1 of a sum of probabilities that is accepted."""
 
 
 class CheckpointPublic(Answer):
@@ -62,7 +66,9 @@ class ObservedOutcome(Body):
     """A pick that was carried out after a task selection: its prediction and outcome."""
 
     success: float = Field(ge=0.0, le=1.0, description="`success.mean` of the answer")
-    contact: float = Field(ge=0.0, le=1.0, description="`contact.mean` of the answer")
+    contact: float = Field(
+        ge=0.0, le=1.0, description="`contact.mean` of the answer; with `success` at most 1"
+    )
     outcome: Literal["success", "contact", "timeout"]
 
 
@@ -84,6 +90,19 @@ class Recalibration(Body):
         max_length=10_000,
         description="predictions of this checkpoint whose pick has ended, in any order",
     )
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        """Check that predictions are probabilities of outcomes that exclude each other.
+
+        Raises:
+            InvalidInput: Success and contact of a prediction exceed 1 together.
+        """
+        for k, one in enumerate(self.outcomes):
+            if one.success + one.contact > 1.0 + ROUNDING:
+                rule = f"must be at most 1 together with success = {one.success!r}"
+                raise InvalidInput(f"outcomes[{k}].contact", one.contact, rule)
+        return self
 
     def to_domain(self) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
         """Return predicted probabilities, shape (n, 3), and indices of outcomes, (n,)."""

@@ -6,8 +6,7 @@ of its canonical manifest followed by its tensors. Both state what was learned a
 trainings: equal trainings give equal ids.
 """
 
-import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -20,6 +19,7 @@ from safetensors.numpy import save as save_tensors
 
 from app.digests import digest
 from app.errors import CheckpointMismatch, InvalidInput
+from app.policies.checkpoints.manifest_rules import check_ranges, check_values, is_whole
 
 FORMAT = "tandem-checkpoint/1"
 MAX_BYTES = 16 * 1024 * 1024
@@ -30,6 +30,12 @@ REAL = ("F16", "F32", "F64")
 """Types of tensors, as safetensors names them."""
 CHOOSING, REACHING, SORTING = "choosing tasks", "reaching goals", "sorting"
 """Purposes of policies."""
+RANGE_SIZES: Mapping[str, Mapping[str, int]] = {
+    CHOOSING: {"q": 6, "qd": 6, "goal": 3, "human_q": 18, "human_qd": 18},
+    REACHING: {"q": 6, "qd": 6, "goal": 3, "human": 5},
+    SORTING: {},
+}
+"""Groups of the training range of each purpose, and their numbers of values."""
 REQUIRED = {
     "format": str,
     "kind": str,
@@ -90,7 +96,8 @@ def check_file(
     if not isinstance(manifest, dict):
         raise InvalidInput("manifest", type(manifest).__name__, "must be a JSON object")
     for name, expected in required.items():
-        if not isinstance(value := manifest.get(name), expected):
+        value = manifest.get(name)
+        if not (is_whole(value) if expected is int else isinstance(value, expected)):
             raise InvalidInput(f"manifest.{name}", value, f"must be {expected.__name__}")
         if name == "format" and value != kind:
             raise CheckpointMismatch(name, kind, value)
@@ -138,47 +145,16 @@ def load(manifest: object, tensors: bytes) -> Checkpoint:
     """Return a checkpoint from untrusted data.
 
     Raises:
-        InvalidInput: A field is missing, of a wrong type, or the tensors are too large.
+        InvalidInput: A field is missing or breaks a rule, or the tensors are too large.
         CheckpointMismatch: The format is another one.
     """
     fields = check_file(manifest, tensors, FORMAT, REQUIRED, MAX_BYTES)
     if fields["kind"] != "policy":
         raise InvalidInput("manifest.kind", fields["kind"], "must be policy")
-    if not 1 <= fields["width"] <= 4096:
-        raise InvalidInput("manifest.width", fields["width"], "must lie in [1, 4096] units")
-    _check_layout(fields["layout"])
-    _check_ranges(fields["trained_range"])
+    check_values(fields)
+    purpose = purpose_of(fields)
+    check_ranges(fields["trained_range"], RANGE_SIZES[purpose], purpose)
     return Checkpoint(fields, bytes(tensors))
-
-
-def _check_layout(layout: Sequence[Any]) -> None:
-    for k, group in enumerate(layout):
-        is_pair = isinstance(group, list | tuple) and len(group) == 2
-        name, size = group if is_pair else (None, None)
-        if not isinstance(name, str) or not isinstance(size, int) or size < 1:
-            rule = "must be a name and a number of values, at least 1"
-            raise InvalidInput(f"manifest.layout[{k}]", group, rule)
-
-
-def _check_ranges(ranges: dict[str, Any]) -> None:
-    for name, entry in ranges.items():
-        fine = (
-            isinstance(entry, dict)
-            and set(entry) == {"low", "high"}
-            and isinstance(entry["low"], list)
-            and isinstance(entry["high"], list)
-            and len(entry["low"]) == len(entry["high"])
-            and all(
-                isinstance(value, int | float) and abs(value) <= sys.float_info.max
-                for value in entry["low"] + entry["high"]
-            )
-        )
-        if not fine:
-            raise InvalidInput(
-                f"manifest.trained_range.{name}",
-                entry,
-                "must hold two lists of finite numbers, low and high",
-            )
 
 
 def expect_layout(checkpoint: Checkpoint, layout: list[list[Any]], act_size: int) -> None:

@@ -6,9 +6,10 @@ policy can be evaluated even if the stored cell was changed or deleted.
 
 import json
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
-from app.errors import CheckpointMismatch
+from app.errors import BadCell, CheckpointMismatch, Fault, InvalidInput
 from app.sim.cell_validation.reader import read_cell
 from app.sim.cells.cell import Cell, cell_names, load_cell
 
@@ -32,14 +33,26 @@ def cell_of(manifest: Mapping[str, Any]) -> Cell:
     """Return the training cell from a manifest.
 
     Raises:
-        NotFound: The manifest names a cell that is not shipped, without a definition.
+        InvalidInput: The manifest names a cell that is not shipped, without a definition.
         BadCell: The definition is invalid.
         CheckpointMismatch: The definition has another name.
     """
     name = str(manifest["cell"])
     if DEFINITION not in manifest:
+        if name not in cell_names():
+            rule = f"must be a shipped cell where there is no {DEFINITION}"
+            raise InvalidInput("manifest.cell", name, rule, cell_names())
         return load_cell(name)
-    cell = read_cell(json.dumps(manifest[DEFINITION]).encode())
+    try:
+        cell = read_cell(json.dumps(manifest[DEFINITION]).encode())
+    except BadCell as error:
+        raise BadCell([_in_manifest(fault) for fault in error.faults]) from None
     if cell.name != name:
         raise CheckpointMismatch("cell", name, cell.name)
     return cell
+
+
+def _in_manifest(fault: Fault) -> Fault:
+    """Return a fault of the definition with its place in the manifest."""
+    inside = "" if fault.place == "file" else f".{fault.place}"
+    return replace(fault, place=f"manifest.{DEFINITION}{inside}")

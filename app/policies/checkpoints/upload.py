@@ -10,7 +10,15 @@ from typing import Any
 
 from app.digests import digest
 from app.errors import InvalidInput
-from app.policies.checkpoints.checkpoint import MAX_BYTES, Checkpoint, load
+from app.policies.checkpoints.checkpoint import (
+    CHOOSING,
+    MAX_BYTES,
+    RANGE_SIZES,
+    Checkpoint,
+    load,
+    purpose_of,
+)
+from app.policies.checkpoints.trained_cell import cell_of
 
 MAX_MANIFEST = 1 << 18
 """Longest manifest [bytes]."""
@@ -38,6 +46,33 @@ def read_upload(content: bytes) -> Checkpoint:
     checkpoint.arrays()
     _check_size(checkpoint)
     return checkpoint
+
+
+def require_ranges(manifest: Mapping[str, Any]) -> None:
+    """Check that no group of the training range is missing.
+
+    Inputs are not compared with a missing one. Groups of people may be missing where the
+    training had no people.
+
+    Args:
+        manifest: Manifest of a checkpoint that was loaded as a policy.
+
+    Raises:
+        InvalidInput: A group is missing.
+    """
+    for name, size in RANGE_SIZES[purpose_of(manifest)].items():
+        is_needed = not name.startswith("human") or _has_people(manifest)
+        if is_needed and name not in manifest["trained_range"]:
+            rule = f"must be given: low and high of {size} values in training"
+            raise InvalidInput(f"manifest.trained_range.{name}", None, rule)
+
+
+def _has_people(manifest: Mapping[str, Any]) -> bool:
+    """Return whether there were people in the training."""
+    people = manifest["preset"].get("people", {})
+    if purpose_of(manifest) == CHOOSING:
+        return people.get("human_absent") != 1 and bool(cell_of(manifest).workers)
+    return bool(people.get("n_people") != 0)
 
 
 def join(manifest: Mapping[str, Any], tensors: bytes) -> bytes:

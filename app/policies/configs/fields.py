@@ -209,6 +209,8 @@ def _invalid_input(
         return _unknown_field(field, value, path, kind)
     if path == ["cell"]:
         return InvalidInput(field, value, "must be the name of a work cell")
+    if path == ["name"]:
+        return InvalidInput(field, value, "must be text")
     if (bounds := bounds_of(info)) is not None:
         return InvalidInput(field, value, _rule_of_number(fault["type"], bounds, unit_of(info)))
     if choices := get_args(info.annotation):

@@ -10,6 +10,7 @@ from safetensors.numpy import load, save
 from app.policies.checkpoints import checkpoint, pretrained
 from app.policies.checkpoints.upload import MAX_FILE, MAX_MANIFEST
 from tests.api.routes.motion.motion_requests import TASK
+from tests.support import workshop
 
 
 def test_shipped_checkpoint_is_listed_with_its_alias(client: TestClient) -> None:
@@ -43,9 +44,9 @@ def uploaded(manifest: dict[str, Any], tensors: bytes) -> bytes:
     return json.dumps(manifest).encode() + b"\n" + tensors
 
 
-def changed(change: dict[str, Any]) -> bytes:
+def changed(change: dict[str, Any], alias: str = "reach") -> bytes:
     """Return the upload of a shipped checkpoint with other manifest fields."""
-    shipped = pretrained.load("reach")
+    shipped = pretrained.load(alias)
     return uploaded({**shipped.manifest, **change}, shipped.tensors)
 
 
@@ -78,6 +79,9 @@ def test_upload_with_another_id_than_expected_is_refused(client: TestClient) -> 
     assert (answer.status_code, answer.json()["field"]) == (422, "sha256")
 
 
+KINDS = ("pick", "reach", "sorting-e0")
+GARAGE = workshop.definition()
+GARAGE["robot"] = {**GARAGE["robot"], "dt": 50.0}
 NAN = np.full(6, np.nan, dtype=np.float32)
 WRONG = [
     (b"", "body"),
@@ -94,6 +98,18 @@ WRONG = [
         changed({"preset": {"networks": {"width": 4096, "layers": 4}}}),
         "manifest.preset.networks.width",
     ),
+    *((changed({"preset": {"name": {}}}, one), "manifest.preset.name") for one in KINDS),
+    *((changed({"cell": "garage"}, one), "manifest.cell") for one in KINDS),
+    (changed({"preset": {}}), "manifest.preset"),
+    (changed({"cell_definition": GARAGE}), "manifest.cell_definition.robot.dt"),
+    (changed({"trained_range": {}}), "manifest.trained_range.q"),
+    (changed({"trained_range": {}}, "pick"), "manifest.trained_range.q"),
+    (changed({"seed": -1}), "manifest.seed"),
+    (changed({"step": 10**30}), "manifest.step"),
+    (changed({"updates": True}), "manifest.updates"),
+    (changed({"cpu_s": "long"}), "manifest.cpu_s"),
+    (changed({"versions": [3]}), "manifest.versions"),
+    (changed({"commits": {}}), "manifest.commits"),
 ]
 
 
@@ -196,6 +212,7 @@ def test_recalibrated_checkpoint_predicts_what_was_observed(
         ("pick", {"outcomes": CAME[:19]}, "outcomes"),
         ("pick", {"outcomes": [{**CAME[0], "success": 1.5}] * 30}, "outcomes[0].success"),
         ("pick", {"outcomes": [{**CAME[0], "outcome": "luck"}] * 30}, "outcomes[0].outcome"),
+        ("pick", {"outcomes": [*CAME, {**CAME[0], "contact": 0.9}]}, "outcomes[30].contact"),
         ("reach", {"outcomes": CAME}, "checkpoint"),
     ],
 )
@@ -204,3 +221,9 @@ def test_recalibration_that_cannot_be_is_refused(
 ) -> None:
     answer = client.post(f"/v1/checkpoints/{reference}/recalibration", json=change)
     assert (answer.status_code, answer.json()["field"]) == (422, field)
+
+
+def test_recalibration_accepts_the_rounding_of_a_sum_of_one(client: TestClient) -> None:
+    outcomes = [{**CAME[0], "contact": 0.1 + 5e-7}] * 30
+    answer = client.post("/v1/checkpoints/pick/recalibration", json={"outcomes": outcomes})
+    assert answer.status_code in (200, 201), answer.text

@@ -2,12 +2,12 @@
 
 import pytest
 
-from app.errors import BadCell, CheckpointMismatch, InvalidInput, NotFound
+from app.errors import BadCell, CheckpointMismatch, InvalidInput
 from app.policies.checkpoints import pretrained
 from app.policies.checkpoints.checkpoint import load
 from app.policies.checkpoints.trained_cell import cell_of, is_for, manifest_fields
 from app.policies.inference.task_selection import TaskChooser
-from app.sim.cells.cell import load_cell
+from app.sim.cells.cell import cell_names, load_cell
 from tests.policies.conftest import TINY, Recorder, preset_of
 from tests.support import workshop
 
@@ -49,12 +49,36 @@ def test_manifest_states_the_cell_of_a_policy(own_policy):
 def test_carried_cell_is_checked_like_any_other():
     broken = workshop.definition()
     broken["robot"]["dt"] = 50.0
-    with pytest.raises(BadCell, match="milliseconds"):
+    with pytest.raises(BadCell, match="milliseconds") as caught:
         cell_of({"cell": "workshop", "cell_definition": broken})
+    assert caught.value.field == "manifest.cell_definition.robot.dt"
     with pytest.raises(CheckpointMismatch):
         cell_of({"cell": "garage", "cell_definition": workshop.definition()})
-    with pytest.raises(NotFound):
+
+
+def test_unknown_cell_without_a_definition_is_refused_with_the_shipped_ones():
+    with pytest.raises(
+        InvalidInput, match="must be a shipped cell where there is no"
+    ) as caught:
         cell_of({"cell": "garage"})
+    assert (caught.value.field, caught.value.choices) == ("manifest.cell", cell_names())
+
+
+@pytest.mark.parametrize(
+    ("definition", "field"),
+    [
+        (workshop.definition(name="No name"), "manifest.cell_definition.name"),
+        (workshop.definition(lamp=1), "manifest.cell_definition.lamp"),
+        ({}, "manifest.cell_definition.name"),
+        (None, "manifest.cell_definition"),
+        ([1], "manifest.cell_definition"),
+    ],
+)
+def test_every_fault_of_a_definition_has_its_place_in_the_manifest(definition, field):
+    with pytest.raises(BadCell) as caught:
+        cell_of({"cell": "workshop", "cell_definition": definition})
+    assert caught.value.field == field
+    assert all(one.place.startswith("manifest.cell_definition") for one in caught.value.faults)
 
 
 def test_cell_without_cubes_cannot_be_trained_in(tiny_preset):

@@ -28,6 +28,14 @@ def test_a_preset_is_read_from_its_own_data(name):
     assert read_config(type(preset), preset.model_dump(), "manifest.preset") == preset
 
 
+@pytest.mark.parametrize("name", ["pick-td3", "reach-td3", "sorting-e0-dqn"])
+@pytest.mark.parametrize("value", [{}, [], 1, None])
+def test_the_name_of_a_preset_is_text(name, value):
+    preset = presets.get(name)
+    with pytest.raises(InvalidInput, match=r"manifest\.preset\.name = .* must be text$"):
+        read_config(type(preset), preset.model_dump() | {"name": value}, "manifest.preset")
+
+
 def test_every_preset_has_its_own_title():
     assert list(presets.TITLES) == list(presets.PRESETS)
     assert len(set(presets.TITLES.values())) == len(presets.TITLES)
