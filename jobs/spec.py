@@ -13,6 +13,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter
 
 from app.errors import InvalidInput
+from app.one_line import ONE_LINE
 from app.policies.configs import presets
 from app.policies.configs.fields import entries
 from app.policies.evaluation.registry import (
@@ -46,9 +47,6 @@ MAX_STEPS = 1_000_000_000
 """Greatest step budget."""
 MAX_TIME_S = 366 * 86_400.0
 """Greatest time budget [s]."""
-
-ONE_LINE = r"^[^\x00-\x1f\x7f-\x9f\u2028\u2029\u202a-\u202e\u2066-\u2069]*$"
-"""Text without control characters, line separators and changes of the direction of writing."""
 
 Seed = Annotated[int, Field(ge=0, le=MAX_SEED)]
 Name = Annotated[str, Field(min_length=1, max_length=64)]

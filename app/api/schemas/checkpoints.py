@@ -16,7 +16,7 @@ from app.policies.inference.recalibration import MIN_OUTCOMES, with_timeout
 from app.policies.networks.outcome import OUTCOMES
 from app.store.records import CheckpointRecord, Page
 
-ROUNDING = 1e-6
+ROUNDING = 0.01
 """Excess over 1 of a sum of probabilities that is accepted."""
 
 

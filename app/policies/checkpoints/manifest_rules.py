@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, TypeGuard
 
 from app.errors import InvalidInput, interval
+from app.one_line import ONE_LINE
 
 MAX_NAME = 64
 """Longest name of a preset [characters]."""
@@ -18,8 +19,6 @@ MAX_WIDTH = 4096
 MAX_WHOLE = 2**63 - 1
 """Greatest seed and greatest number of steps and updates."""
 _WHOLE = {"seed": "", "width": "units", "step": "", "updates": ""}
-_NOT_IN_A_LINE = re.compile(r"[\x00-\x1f\x7f-\x9f\u2028\u2029\u202a-\u202e\u2066-\u2069]")
-"""Control characters, separators of lines and paragraphs, and controls of text direction."""
 
 
 def check_values(manifest: Mapping[str, Any]) -> None:
@@ -42,7 +41,7 @@ def _check_preset(preset: Mapping[str, Any]) -> None:
     if not preset:
         raise InvalidInput("manifest.preset", preset, "must hold the fields of the training")
     name = preset.get("name", "")
-    if not isinstance(name, str) or len(name) > MAX_NAME or _NOT_IN_A_LINE.search(name):
+    if not isinstance(name, str) or len(name) > MAX_NAME or not re.match(ONE_LINE, name):
         rule = f"must be text of one line, at most {MAX_NAME} characters, none a control"
         raise InvalidInput("manifest.preset.name", name, rule)
 

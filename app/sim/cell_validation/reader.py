@@ -16,6 +16,7 @@ from typing import Any
 from pydantic import BaseModel, ValidationError
 
 from app.errors import BadCell, Fault
+from app.one_line import ONE_LINE
 from app.sim.cell_validation.checks import check_cell
 from app.sim.cells.cell import LIMITS, Cell, load_cell
 from app.sim.cells.parts import (
@@ -28,7 +29,6 @@ from app.sim.cells.parts import (
 )
 from app.sim.cells.people import ConstantWalker, FixedSpeedWalker, Walker, Worker
 
-_CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f]")
 _TEXT_RULE = "must be text without control characters"
 MAX_BYTES = 256 * 1024
 """Largest file that is read [bytes]."""
@@ -165,7 +165,7 @@ def _tree_faults(node: object, place: str) -> Iterator[Fault]:
 
 
 def _is_text(text: str) -> bool:
-    if _CONTROL.search(text):
+    if not re.match(ONE_LINE, text):
         return False
     try:
         text.encode("utf-8")
