@@ -332,7 +332,7 @@ class CheckpointMismatch(ServiceError):
     """A checkpoint does not fit its use.
 
     Args:
-        field: The differing property, such as ``"cell"``.
+        field: The differing property of the checkpoint, such as ``"cell"``.
         expected: The required value.
         actual: The checkpoint's value.
     """
@@ -342,9 +342,13 @@ class CheckpointMismatch(ServiceError):
         self.field, self.expected, self.actual = field, expected, actual
 
     def problem(self) -> dict[str, object]:
-        """Return the property and both values."""
+        """Return the checkpoint as the faulty field, its property and both values."""
         return {
-            "field": self.field,
+            "field": "checkpoint",
+            "value": f"<{self.field} {self.actual!r}>",
+            "rule": f"must have the {self.field} {self.expected!r}",
+            "choices": [],
+            "property": self.field,
             "expected": repr(self.expected),
             "actual": repr(self.actual),
         }

@@ -2,7 +2,7 @@
 
 import logging
 
-from app.errors import Conflict, InvalidInput, NotFound
+from app.errors import InvalidInput, NotFound, WrongState
 from app.policies.configs.presets import Preset
 from app.policies.configs.reach import ReachPreset
 from app.policies.configs.sorting import SortingPreset
@@ -85,7 +85,7 @@ class CellCatalog:
             Whether it is new; the same one again has no effect.
 
         Raises:
-            Conflict: The name is taken.
+            WrongState: The name is taken.
         """
         self._require_own(cell.name)
         return put_cell(self._store, cell.name, cell.definition())
@@ -95,11 +95,11 @@ class CellCatalog:
 
         Raises:
             NotFound: No cell has that name.
-            Conflict: It is shipped, or a job that has not ended trains in it.
+            WrongState: It is shipped, or a job that has not ended trains in it.
         """
         self._require_own(name)
         remove_cell(self._store, name)
 
     def _require_own(self, name: str) -> None:
         if name in cell_names():
-            raise Conflict(f"the cell {name!r} is shipped with Tandem: its name is reserved")
+            raise WrongState("name", name, "is reserved for a cell shipped with Tandem")

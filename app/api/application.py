@@ -4,7 +4,7 @@ from collections.abc import Callable
 from contextlib import AbstractAsyncContextManager
 from pathlib import Path
 
-from fastapi import FastAPI, Request
+from fastapi import Depends, FastAPI, Request
 from fastapi.routing import APIRoute
 from opentelemetry.trace import TracerProvider
 from starlette.responses import FileResponse, Response
@@ -37,6 +37,7 @@ from app.api.routes import (
 )
 from app.api.routes.decisions import motion, plan, risk_map, sorting, task_selection
 from app.api.security import SESSION_PATH, AccessMiddleware
+from app.api.validation import check_query
 
 ICON_PATH = "/favicon.ico"
 """Default path of a page's icon; open, as the sign-in page is."""
@@ -77,6 +78,7 @@ def build_app(
         version=version,
         description=DESCRIPTION,
         lifespan=lifespan,
+        redirect_slashes=False,
         docs_url=None,
         redoc_url=None,
         responses={422: {}},
@@ -103,12 +105,9 @@ def build_app(
         protocols,
         cells,
         recordings,
-        health,
-        metrics,
-        session,
-        viewer,
-        reference,
     ):
+        app.include_router(part.router, dependencies=[Depends(check_query)])
+    for part in (health, metrics, session, viewer, reference):
         app.include_router(part.router)
     description.install(app)
     add_page(app, static)

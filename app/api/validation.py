@@ -1,16 +1,19 @@
 """Conversion of pydantic's validation errors to field, value, rule and choices.
 
 Pydantic's locations are inside our models; fields are paths in the JSON of the request.
+Parameters of an address that FastAPI ignores or repairs are errors here.
 """
 
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, TypeVar, get_args
+from typing import Any, TypeVar, get_args, get_origin
 
-from fastapi.exceptions import RequestValidationError
+from fastapi.dependencies.utils import get_flat_params
+from fastapi.exceptions import RequestValidationError, WebSocketRequestValidationError
+from fastapi.params import Query
 from pydantic import BaseModel, Tag, ValidationError
-from starlette.requests import Request
+from starlette.requests import HTTPConnection, Request
 
 MAX_VALUE_CHARACTERS = 200
 MAX_LISTED_ITEMS = 8
@@ -35,6 +38,11 @@ _WORDS = {
     "less than": "below",
 }
 """Pydantic's words, and ours."""
+_PLAIN: dict[object, tuple[re.Pattern[str], str]] = {
+    int: (re.compile(r"[^-0-9A-Za-z]"), "must be a whole number in plain digits"),
+    float: (re.compile(r"[^-.0-9A-Za-z]"), "must be a number in plain digits"),
+}
+"""Characters that pydantic takes in numbers of an address (``1_0``, ``1.0``), and the rule."""
 
 Member = dict[str, object]
 M = TypeVar("M", bound=BaseModel)
@@ -167,12 +175,14 @@ def without_inner_tags(
     """Remove the tags and scalar branches of unions inside a body from a location.
 
     Args:
-        location: Location of the error, ``body`` first.
+        location: Location of the error; those outside the body have no tags.
         model: The body's model.
 
     Returns:
         The location; the model of the last tag, or the body's; the path inside that model.
     """
+    if location[0] != "body":
+        return list(location), None, []
     place, inner = list(location[:1]), list[str | int]()
     variants = dict[str, type[BaseModel]]()
     for part in location[1:]:
@@ -192,10 +202,16 @@ def without_inner_tags(
 
 def _models(annotation: Any) -> Iterator[type[BaseModel]]:
     """Yield the models in an annotation."""
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        yield annotation
+    for one in _parts(annotation):
+        if isinstance(one, type) and issubclass(one, BaseModel):
+            yield one
+
+
+def _parts(annotation: Any) -> Iterator[Any]:
+    """Yield an annotation and its arguments at any depth."""
+    yield annotation
     for argument in get_args(annotation):
-        yield from _models(argument)
+        yield from _parts(argument)
 
 
 def without_tag(
@@ -203,7 +219,7 @@ def without_tag(
 ) -> tuple[dict[str, Any], type[BaseModel] | None]:
     """Return an error without the tag of a body's union, and the tag's variant."""
     location = error["loc"]
-    if len(variants) < 2 or len(location) < 2:
+    if len(variants) < 2 or len(location) < 2 or location[0] != "body":
         return error, variants[0] if variants else None
     for variant in variants:
         for field in variant.model_fields.values():
@@ -240,3 +256,37 @@ def body_models(request: Request) -> list[type[BaseModel]]:
     """Return the possible models of a request's body."""
     field = getattr(request.scope.get("route"), "body_field", None)
     return list(_models(field.field_info.annotation)) if field else []
+
+
+async def check_query(connection: HTTPConnection) -> None:
+    """Check that the route has the parameters of an address; each is given once, as text.
+
+    Raises:
+        RequestValidationError: One is unknown, repeated without being a list, or a number
+            that is not written in plain digits.
+        WebSocketRequestValidationError: Likewise, of a socket.
+    """
+    if not connection.scope["query_string"]:
+        return
+    parameters = get_flat_params(connection.scope["route"].dependant)
+    known = {one.alias: one for one in parameters if isinstance(one.field_info, Query)}
+    faults = list[dict[str, Any]]()
+    for name in connection.query_params:
+        values, context = connection.query_params.getlist(name), dict[str, Any]()
+        parts = list(_parts(known[name].field_info.annotation)) if name in known else []
+        odd, plain = next((_PLAIN[one] for one in (int, float) if one in parts), (None, ""))
+        if name not in known:
+            rule = "is no parameter" if known else "is no parameter: the route has none"
+            context = {"choices": list(known)}
+        elif len(values) > 1 and list not in [get_origin(one) for one in parts]:
+            rule = "must be given once"
+        elif odd is not None and any(map(odd.search, values)):
+            rule = plain
+        else:
+            continue
+        value = values if len(values) > 1 else values[0]
+        kind, place = "invalid_parameter", ("query", name)
+        faults.append({"type": kind, "loc": place, "msg": rule, "input": value, "ctx": context})
+    if faults:
+        is_socket = connection.scope["type"] == "websocket"
+        raise (WebSocketRequestValidationError if is_socket else RequestValidationError)(faults)

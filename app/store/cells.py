@@ -12,7 +12,7 @@ from typing import Any
 import sqlalchemy as sa
 
 from app.digests import digest, has_digest
-from app.errors import Conflict, Damaged, NotFound
+from app.errors import Conflict, Damaged, NotFound, WrongState
 from app.store.database.tables import cells
 from app.store.engine import Store
 from app.store.records import CellRecord
@@ -34,7 +34,8 @@ def put_cell(store: Store, name: str, definition: Mapping[str, Any]) -> bool:
         Whether it is new.
 
     Raises:
-        Conflict: Another cell has that name, or there are too many.
+        WrongState: Another cell has that name.
+        Conflict: There are too many.
         StorageFull: No room is left.
     """
     with store.writing() as connection:
@@ -42,10 +43,8 @@ def put_cell(store: Store, name: str, definition: Mapping[str, Any]) -> bool:
         if name in known:
             if known[name] == definition:
                 return False
-            raise Conflict(
-                f"a cell named {name!r} with other content is stored: remove it first, or "
-                "choose another name"
-            )
+            rule = "with other content is stored: remove it first, or choose another name"
+            raise WrongState("name", name, rule)
         if len(known) >= MAX_CELLS:
             raise Conflict(f"{MAX_CELLS} cells are stored, the limit: remove one first")
         values = {

@@ -12,7 +12,7 @@ from typing import Any
 import sqlalchemy as sa
 
 from app.digests import digest, has_digest
-from app.errors import Conflict, Damaged, InvalidInput, NotFound
+from app.errors import Conflict, Damaged, InvalidInput, NotFound, WrongState
 from app.store.database.tables import recordings
 from app.store.engine import Store
 from app.store.records import NewRecording, StoredRecording
@@ -67,7 +67,8 @@ def find_same(store: Store, name: str, sha256: str) -> StoredRecording | None:
         sha256: Of the file.
 
     Raises:
-        Conflict: Another file has that name, or the limits are reached.
+        WrongState: Another file has that name.
+        Conflict: The limits are reached.
     """
     with store.reading() as connection:
         return _same(connection, name, sha256)
@@ -152,10 +153,8 @@ def _same(connection: sa.Connection, name: str, sha256: str) -> StoredRecording 
     if row is not None:
         if row["sha256"] == sha256:
             return _record(row)
-        raise Conflict(
-            f"a recording named {name!r} from another file is stored: remove it first, or "
-            "choose another name"
-        )
+        rule = "from another file is stored: remove it first, or choose another name"
+        raise WrongState("name", name, rule)
     held = sa.select(sa.func.count(), sa.func.coalesce(sa.func.sum(recordings.c.size), 0))
     count, total = connection.execute(held.select_from(recordings)).one()
     if count >= MAX_RECORDINGS:

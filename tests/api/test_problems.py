@@ -10,6 +10,7 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 from app.api import problems
 from app.api.metrics import Metrics
 from app.api.responses import ResponseMiddleware
+from app.api.schemas.examples import MOTION
 from app.errors import (
     CheckpointMismatch,
     Conflict,
@@ -20,6 +21,10 @@ from app.errors import (
     SimulationError,
 )
 from app.storage_errors import StorageFull
+from tests.api.answers import problem_of
+
+JOB_PARAMETERS = ["cursor", "limit", "state", "part_of"]
+PLAIN_DIGITS = "must be a whole number in plain digits"
 
 ERRORS: list[tuple[ServiceError, int]] = [
     (NotFound("job", "x"), 404),
@@ -196,3 +201,61 @@ def test_body_that_is_no_json_is_refused(client: TestClient) -> None:
     answer = client.post("/v1/jobs", data={"kind": "train"})
     assert answer.status_code == 415
     assert answer.json()["choices"] == ["application/json"]
+
+
+@pytest.mark.parametrize(
+    ("method", "path", "field", "rule", "choices"),
+    [
+        ("GET", "/v1/jobs?LIMIT=1", "LIMIT", "is no parameter", JOB_PARAMETERS),
+        ("GET", "/v1/jobs?limit=1&foo", "foo", "is no parameter", JOB_PARAMETERS),
+        ("GET", "/v1/jobs?limit=5&limit=6", "limit", "must be given once", []),
+        ("GET", "/v1/jobs?limit=1_0", "limit", PLAIN_DIGITS, []),
+        ("GET", "/v1/jobs?limit=1.0", "limit", PLAIN_DIGITS, []),
+        ("GET", "/v1/jobs?limit=%2010", "limit", PLAIN_DIGITS, []),
+        ("GET", "/v1/trackers/x?t=1_0", "t", "must be a number in plain digits", []),
+        ("GET", "/v1/cells?x=1", "x", "is no parameter: the route has none", []),
+        ("GET", "/v1/cells/x?int=1", "int", "is no parameter: the route has none", []),
+        ("POST", "/v1/jobs?train=1", "train", "is no parameter: the route has none", []),
+        ("POST", "/v1/motion?a=1", "a", "is no parameter: the route has none", []),
+        ("POST", "/v1/checkpoints?sha265=zz", "sha265", "is no parameter", ["sha256"]),
+        (
+            "POST",
+            "/v1/recordings?file_name=x.csv&units=mm",
+            "units",
+            "is no parameter",
+            ["file_name", "name", "unit", "root_unit", "up", "map"],
+        ),
+    ],
+)
+def test_parameter_of_an_address_that_would_be_ignored_is_refused(
+    client: TestClient, method: str, path: str, field: str, rule: str, choices: list[str]
+) -> None:
+    body = {"kind": "evaluate", "protocol": "pick-single"} if "?train" in path else None
+    body = MOTION if "motion" in path else body
+    problem = problem_of(client.request(method, path, json=body))
+    assert (problem["field"], problem["rule"]) == (field, rule)
+    assert problem["choices"] == choices and problem["errors"][0]["value"] == problem["value"]
+
+
+@pytest.mark.parametrize(
+    "path", ["/?v=1", "/docs?v=1", "/healthz?v=1", "/static/app.js?v=1", "/openapi.json?v=1"]
+)
+def test_page_and_checks_ignore_parameters(client: TestClient, path: str) -> None:
+    assert client.get(path).status_code == 200
+
+
+@pytest.mark.parametrize(
+    "path",
+    ["/v1/jobs?limit=1&state=queued", "/v1/checkpoints?limit=2", "/v1/jobs?part_of=none"],
+)
+def test_parameters_of_a_route_are_taken(client: TestClient, path: str) -> None:
+    assert client.get(path).status_code == 200
+
+
+@pytest.mark.parametrize("path", ["/v1/jobs/", "/v1/cells/", "/docs/"])
+@pytest.mark.parametrize("method", ["GET", "POST"])
+def test_address_with_a_trailing_slash_is_not_found(
+    client: TestClient, method: str, path: str
+) -> None:
+    answer = client.request(method, path, follow_redirects=False)
+    assert problem_of(answer, 404)["instance"] == path

@@ -284,7 +284,7 @@ def test_every_fault_of_every_bad_motion_file_is_reported(
     faults = json.loads(printed.out)["faults"]
     lines = printed.err.splitlines()
     assert len(lines) == len(faults) >= 2
-    assert lines[0].startswith(f"{torn}: ") and lines[-1].startswith(f"{wrong}: file name")
+    assert lines[0].startswith(f"{torn}: ") and lines[-1].startswith(f"{wrong}: file_name")
     assert [fault["place"].split(": ")[0] for fault in faults][-1] == str(wrong)
 
 

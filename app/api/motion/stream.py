@@ -34,6 +34,7 @@ from app.api.schemas.motion import LeftOut, MotionRequest, StreamUse
 from app.api.services import Services
 from app.api.sockets import MAX_MESSAGE, POLICY
 from app.api.texts import fault_in_json
+from app.api.validation import member
 from app.errors import ServiceError
 
 logger = logging.getLogger(__name__)
@@ -201,17 +202,25 @@ def _malformed(text: str | None) -> tuple[ProblemResponse | None, object]:
     """Return the problem of a message that is no JSON, or None, and its request or data.
 
     Raises:
-        ValueError: It is no JSON.
-        RecursionError: It is nested too deeply.
+        json.JSONDecodeError: It is no JSON.
     """
     if text is None or len(text) > MAX_MESSAGE:
-        rule = f"a message must be JSON text of at most {MAX_MESSAGE} characters"
-        return problem(413 if text else 400, rule, instance=PATH), None
+        rule = f"must be JSON text of at most {MAX_MESSAGE} characters"
+        if text is None:
+            binary = member("body", "<bytes>", rule)
+            return member_problem(400, "malformed-json", binary, PATH), None
+        long = member("body", f"{len(text)} characters", rule)
+        return member_problem(413, "body-too-large", long, PATH), None
     fault = fault_in_json(text.encode())
     if fault is None:
         with suppress(ValidationError):
             return None, MotionRequest.model_validate_json(text)
-    body = json.loads(text)
+    try:
+        body = json.loads(text)
+    except (ValueError, RecursionError):
+        if fault is None:
+            raise
+        body = None
     return None if fault is None else member_problem(422, "invalid-input", fault, PATH), body
 
 
@@ -225,9 +234,10 @@ def _problem(error: Exception) -> ProblemResponse:
             for one in error.errors(include_url=False)
         ]
         return validation_problem(wrong, [MotionRequest], PATH)
-    if isinstance(error, ValueError | RecursionError):
-        detail = f"a message must be JSON: {error}"
-        return problem(400, detail, kind="malformed-json", instance=PATH)
+    if isinstance(error, json.JSONDecodeError):
+        malformed = {"type": "json_invalid", "loc": ("body", error.pos), "msg": ""}
+        context = {"error": error.msg}
+        return validation_problem([{**malformed, "ctx": context}], [MotionRequest], PATH)
     logger.error("a message on %s could not be answered", PATH, exc_info=error)
     return problem(500, "an unexpected error; the server's log has the trace", instance=PATH)
 

@@ -7,7 +7,7 @@ from fastapi import APIRouter, Response
 from app.api.description import CREATED
 from app.api.schemas.checkpoints import Alias, AliasList, AliasTarget
 from app.api.services import ServicesDep
-from app.errors import Conflict, NotFound
+from app.errors import NotFound, WrongState
 from app.policies.checkpoints import pretrained
 
 router = APIRouter(prefix="/v1/aliases", tags=["checkpoints"])
@@ -44,7 +44,7 @@ def set_alias(name: str, body: AliasTarget, services: ServicesDep, response: Res
     Its name can be used wherever a checkpoint is named; requests in progress, live worlds and
     posted jobs keep the checkpoint that it named before.
     """
-    _require_own(name)
+    _require_own(name, "choose another name")
     record, _ = services.checkpoints.read(body.checkpoint)
     if name not in services.checkpoints.aliases:
         response.status_code = 201
@@ -56,10 +56,10 @@ def set_alias(name: str, body: AliasTarget, services: ServicesDep, response: Res
 @router.delete("/{name}", status_code=204, summary="Remove an alias", responses=RESERVED)
 def remove_alias(name: str, services: ServicesDep) -> None:
     """Remove an alias; its checkpoint stays."""
-    _require_own(name)
+    _require_own(name, "shipped aliases cannot be deleted")
     services.checkpoints.remove(name)
 
 
-def _require_own(name: str) -> None:
+def _require_own(name: str, remedy: str) -> None:
     if name in pretrained.ALIASES:
-        raise Conflict(f"the alias {name!r} belongs to a shipped checkpoint: choose another")
+        raise WrongState("name", name, f"is the alias of a shipped checkpoint: {remedy}")

@@ -41,7 +41,7 @@ from app.live.reach.interfaces import LiveReachPolicy
 from app.sim.cells.cell import Cell
 from app.sim.pick.task_policy import TaskPolicy
 from app.sim.sorting.sorting_values import SortingValues
-from app.store.jobs import get_job
+from app.store.jobs import find_job
 
 STREAM_PERIOD_S = 0.1
 
@@ -140,7 +140,7 @@ def set_world_cell(world_id: str, body: WorldCell, services: ServicesDep) -> Wor
     with services.replacing:
         if services.stopping.is_set():
             raise NotReady("stopping")
-        cell = services.cells.get(body.cell)
+        cell = services.named_cell(body.cell)
         if (lack := lacks_for_live(cell)) is not None:
             raise InvalidInput("cell", cell.name, f"cannot be shown live: it {lack}")
 
@@ -185,7 +185,9 @@ def follow_training(world_id: str, body: FollowRequest, services: ServicesDep) -
 
     It ends with the job, whose last checkpoint then acts, with another cell, and with a delete.
     """
-    job = get_job(services.store, body.job)
+    services.world(world_id)
+    if (job := find_job(services.store, body.job)) is None:
+        raise InvalidInput("job", body.job, "is the id of no job")
     return following.start(world_id, job, services)
 
 

@@ -188,15 +188,14 @@ def check_task(name: str, manifest: Mapping[str, Any], found: str) -> None:
         found: Name of the checkpoint in the error.
 
     Raises:
-        InvalidInput: It is of another scenario; the choices are the protocols of its own.
+        InvalidInput: It is of another scenario; the rule lists the protocols of its own.
     """
     wanted, actual = task_measured(name), purpose_of(manifest)
     if wanted != actual:
         fitting = set(PROTOCOLS) - WITHOUT_CHECKPOINT
         known = sorted(one for one in fitting if task_measured(one) == actual)
-        raise InvalidInput(
-            "checkpoint", found, f"must be {_POLICIES[wanted]} for {name}", known
-        )
+        rule = f"must be {_POLICIES[wanted]} for {name}; protocols of this one"
+        raise InvalidInput("checkpoint", found, f"{rule}: {', '.join(known)}")
 
 
 def check_motions(

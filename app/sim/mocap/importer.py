@@ -184,7 +184,7 @@ def format_of(file_name: str) -> str:
     """
     ending = PurePath(file_name).suffix.lower()
     if ending not in FORMATS:
-        raise bad("file name", repr(file_name[-60:]), f"must end with {', '.join(FORMATS)}")
+        raise bad("file_name", repr(file_name[-60:]), f"must end with {', '.join(FORMATS)}")
     return ending
 
 

@@ -243,7 +243,7 @@ def check_map(names: Mapping[str, str], ours: Sequence[str]) -> None:
     for theirs, own in names.items():
         if own not in ours:
             hint = f"choices: {', '.join(ours)}"
-            raise bad("name map", shown(f"{theirs}={own}"), "must end with one of ours", hint)
+            raise bad("map", shown(f"{theirs}={own}"), "must end with one of ours", hint)
 
 
 def no_such_name(theirs: str, there: Sequence[str]) -> BadRecording:
@@ -258,7 +258,7 @@ def no_such_name(theirs: str, there: Sequence[str]) -> BadRecording:
     close = [one for one in near if likeness[one] >= MIN_LIKENESS]
     said = "nearly the same" if close else "the file's columns"
     hint = f"{said}: {', '.join((close[:3] or list(there))[:40])[:300]}"
-    return bad("name map", shown(theirs), "is the name of no column, or of several", hint)
+    return bad("map", shown(theirs), "is the name of no column, or of several", hint)
 
 
 def number(cell: str, decimal: str = ".") -> float:

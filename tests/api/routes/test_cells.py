@@ -59,12 +59,14 @@ def test_same_cell_again_is_fine_and_a_changed_one_a_conflict(
     changed = client.post("/v1/cells", json=workshop.definition(title="Changed"))
     assert changed.status_code == 409
     assert "remove it first" in changed.json()["detail"]
+    assert (changed.json()["field"], changed.json()["value"]) == ("name", "'workshop'")
     assert client.get("/v1/cells/workshop").json() == added
 
 
 def test_shipped_cell_can_be_neither_replaced_nor_removed(client: TestClient) -> None:
     own = workshop.definition(name="pick-and-place")
-    assert client.post("/v1/cells", json=own).status_code == 409
+    taken = problem_of(client.post("/v1/cells", json=own), 409)
+    assert (taken["field"], taken["value"]) == ("name", "'pick-and-place'")
     assert client.delete("/v1/cells/pick-and-place").status_code == 409
 
 

@@ -9,6 +9,7 @@ from safetensors.numpy import load, save
 
 from app.policies.checkpoints import checkpoint, pretrained
 from app.policies.checkpoints.upload import MAX_FILE, MAX_MANIFEST
+from tests.api.answers import problem_of
 from tests.api.routes.motion.motion_requests import TASK
 from tests.support import workshop
 
@@ -122,7 +123,7 @@ def test_bad_upload_is_refused_by_field(client: TestClient, body: bytes, field: 
 def test_upload_whose_tensors_do_not_fit_is_refused(client: TestClient) -> None:
     body = with_tensor("actor.net.4.bias", np.zeros(5, dtype=np.float32))
     answer = client.post("/v1/checkpoints", content=body, headers=FILE)
-    assert (answer.status_code, answer.json()["field"]) == (409, "tensors.actor.net.4")
+    assert (answer.status_code, answer.json()["property"]) == (409, "tensors.actor.net.4")
 
 
 def test_upload_over_the_limit_is_refused(client: TestClient) -> None:
@@ -147,8 +148,11 @@ def test_alias_points_to_another_checkpoint_in_one_step(client: TestClient, alia
 
 
 def test_alias_of_a_shipped_checkpoint_stays(client: TestClient) -> None:
-    assert client.put("/v1/aliases/pick", json={"checkpoint": "reach"}).status_code == 409
-    assert client.delete("/v1/aliases/pick").status_code == 409
+    taken = problem_of(client.put("/v1/aliases/pick", json={"checkpoint": "reach"}), 409)
+    assert (taken["field"], taken["value"]) == ("name", "'pick'")
+    assert "choose another name" in taken["rule"]
+    kept = problem_of(client.delete("/v1/aliases/pick"), 409)
+    assert kept["rule"].endswith("shipped aliases cannot be deleted")
 
 
 def test_unknown_alias_and_checkpoint_are_named(client: TestClient) -> None:

@@ -140,6 +140,7 @@ def test_same_file_again_is_fine_and_another_one_a_conflict(
     other = post(client, CLIP, file_name="leap-1.bvh")
     assert other.status_code == 409
     assert "'leap-1' from another file is stored: remove it first" in other.json()["detail"]
+    assert (other.json()["field"], other.json()["value"]) == ("name", "'leap-1'")
     named = post(client, CLIP, file_name="leap-1.bvh", name="leap-2")
     client.delete("/v1/recordings/leap-2")
     assert named.status_code == 201
@@ -176,8 +177,8 @@ IN_RADIANS = csv_text(working(100), degrees=False).replace("radians", "degrees")
         (b"\xff\xfd", "a.bvh", "file", "must be text in UTF-8"),
         (b"\x80\x04K\x01.", "a.csv", "file", "must be text in UTF-8"),
         (b"\x00" * 5000, "a.bvh", "line 1", "has no line MOTION"),
-        (CLIP, "a.c3d", "file name", "must end with .bvh, .mot, .sto, .csv"),
-        (CLIP, "a", "file name", "must end with"),
+        (CLIP, "a.c3d", "file_name", "must end with .bvh, .mot, .sto, .csv"),
+        (CLIP, "a", "file_name", "must end with"),
         (CLIP, "a.csv", "line 1", "lacks the columns pelvis_x"),
         (UNDECLARED, "a.csv", "angles", "must be declared in the first line"),
         (CLIP[: len(CLIP) // 2], "a.bvh", "line ", "must hold"),
@@ -202,6 +203,14 @@ def test_file_that_is_no_recording_is_named_with_place_and_rule(
     assert rule in problem["rule"] + str(problem.get("errors", ""))
     assert {"value", "choices"} <= problem.keys()
     assert client.get("/v1/recordings").json() == {"items": []}
+
+
+@pytest.mark.parametrize("pair", ["spine=pelvis_xyz", "nobody=pelvis_x"])
+def test_wrong_name_map_is_named_as_its_parameter(client: TestClient, pair: str) -> None:
+    problem = problem_of(
+        post(client, csv_text(working(100)).encode(), file_name="a.csv", map=pair)
+    )
+    assert problem["field"] == "map" and problem["value"] and problem["rule"]
 
 
 def test_unknown_unit_is_named(client: TestClient) -> None:

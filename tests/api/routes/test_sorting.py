@@ -361,10 +361,13 @@ def test_policy_that_sorts_is_refused_as_the_one_that_moves_an_arm(
 ) -> None:
     command = {"tag": "set-policy", "checkpoint": checkpoint}
     answer = client.post("/v1/worlds/main/commands", json=command)
-    assert (answer.status_code, answer.json()["field"]) == (409, "purpose")
+    assert (answer.status_code, answer.json()["field"]) == (409, "checkpoint")
 
 
 def test_policy_that_chooses_tasks_is_refused_where_moves_are(client: TestClient) -> None:
     problem = refused(client, {**TASK, "checkpoint": "pick"}, status=409)
+    assert (problem["field"], problem["property"]) == ("checkpoint", "purpose")
+    assert problem["value"] == "<purpose 'choosing tasks'>"
+    assert problem["rule"] == "must have the purpose 'sorting'"
     assert problem["expected"] == "'sorting'"
     assert problem["actual"] == "'choosing tasks'"

@@ -38,9 +38,9 @@ def refused(client: TestClient, status: int = 422, **changes: Any) -> dict[str, 
 
 BAD: list[tuple[dict[str, Any], int, str]] = [
     ({"cell": "moon"}, 422, "cell"),
-    ({"cell": "pick-and-place"}, 409, "cell"),
+    ({"cell": "pick-and-place"}, 409, "checkpoint"),
     ({"checkpoint": "nobody"}, 422, "checkpoint"),
-    ({"checkpoint": "pick"}, 409, "purpose"),
+    ({"checkpoint": "pick"}, 409, "checkpoint"),
     ({"frame": "world"}, 422, "frame"),
     ({"robot": {"q": HOME[:5], "qd": [0.0] * 6}}, 422, "robot.q"),
     ({"robot": {"q": [9.0, *HOME[1:]], "qd": [0.0] * 6}}, 422, "robot.q[0]"),

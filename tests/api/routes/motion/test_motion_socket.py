@@ -9,8 +9,17 @@ from fastapi.testclient import TestClient
 from starlette.testclient import WebSocketTestSession
 from starlette.websockets import WebSocketDisconnect
 
+from tests.api.answers import post_json
 from tests.api.conftest import services_of
-from tests.api.routes.motion.motion_requests import BAD, SOCKET, STREAM, TASK, asked, refused
+from tests.api.routes.motion.motion_requests import (
+    BAD,
+    SOCKET,
+    STREAM,
+    TASK,
+    URL,
+    asked,
+    refused,
+)
 
 pytestmark = pytest.mark.usefixtures("policies")
 
@@ -42,7 +51,7 @@ def test_socket_gives_the_answers_of_the_route(
     [
         ("", 400),
         ("{", 400),
-        ("[" * 50_000, 400),
+        ("[" * 50_000, 422),
         ("null", 422),
         ("[1, 2]", 422),
         ('{"cell": "shared-workspace"}', 422),
@@ -59,6 +68,7 @@ def test_a_bad_message_is_answered_by_a_problem_and_the_socket_lives_on(
     socket.send_text(message)
     problem = json.loads(socket.receive_text(), parse_constant=pytest.fail)
     assert problem["status"] == status and problem["detail"]
+    assert problem["field"] and problem["value"] and problem["rule"]
     assert problem["instance"] == STREAM
     assert problem.get("stamp") in (None, 7)
     socket.send_json({**TASK, "stamp": "next"})
@@ -67,7 +77,8 @@ def test_a_bad_message_is_answered_by_a_problem_and_the_socket_lives_on(
 
 def test_bytes_are_no_message(socket: WebSocketTestSession) -> None:
     socket.send_bytes(json.dumps(TASK).encode())
-    assert socket.receive_json()["status"] == 400
+    problem = socket.receive_json()
+    assert (problem["status"], problem["field"]) == (400, "body")
     socket.send_json(TASK)
     assert socket.receive_json()["inference_mode"] == "interpolated"
 
@@ -81,6 +92,19 @@ def test_problems_on_the_socket_are_those_of_the_route(
         assert found.pop("stream")["left_out"] == []
         differ = {"instance": "", "request_id": ""}
         assert found | differ == expected | differ
+
+
+@pytest.mark.parametrize(
+    "message", ["{", '{"a": 1,}', "[" * 50_000, "1" * 5_000, '{"cell": "\\ud800"}']
+)
+def test_message_that_is_no_json_is_answered_as_by_the_route(
+    client: TestClient, socket: WebSocketTestSession, message: str
+) -> None:
+    socket.send_text(message)
+    found, expected = socket.receive_json(), post_json(client, URL, message).json()
+    assert found.pop("stream")["left_out"] == []
+    differ = {"instance": "", "request_id": ""}
+    assert found | differ == expected | differ
 
 
 def test_socket_refuses_pages_of_other_sites(client: TestClient) -> None:

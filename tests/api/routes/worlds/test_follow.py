@@ -4,6 +4,7 @@ from fastapi.testclient import TestClient
 
 from app.live.commands import SetPolicy
 from app.store.checkpoints import drop_job_checkpoints
+from tests.api.answers import problem_of
 from tests.api.conftest import services_of
 from tests.api.routes.worlds.live_world import WORLD, send, until
 
@@ -90,4 +91,6 @@ def test_evaluation_and_unknown_job_are_not_followed(client: TestClient) -> None
     client.post(f"/v1/jobs/{job['id']}/cancel")
     refused = client.put(f"{WORLD}/follow", json={"job": job["id"]})
     assert (refused.status_code, refused.json()["field"]) == (409, "kind")
-    assert client.put(f"{WORLD}/follow", json={"job": "gone"}).status_code == 404
+    unknown = problem_of(client.put(f"{WORLD}/follow", json={"job": "gone"}))
+    assert (unknown["field"], unknown["value"]) == ("job", "'gone'")
+    assert client.put("/v1/worlds/x/follow", json={"job": "gone"}).status_code == 404
