@@ -29,8 +29,8 @@ from app.api.registry import (
     CheckpointNames,
     PolicyRegistry,
 )
-from app.api.service_state import ServiceState
 from app.api.services import LiveWorld, ResponseCache, Services
+from app.api.state_metrics import StateMetrics
 from app.errors import Damaged, InvalidInput, MissingPackage, NotReady, ServiceError
 from app.live.reach.interfaces import LiveReachPolicy
 from app.policies.checkpoints import pretrained
@@ -164,7 +164,7 @@ class Service:
             supervisor.stop()
             store.close()
             raise
-        counts.watch(ServiceState(self.parts))
+        counts.watch(StateMetrics(self.parts))
         self._warm_up = threading.Thread(target=self._start_cell, name="warm-up", daemon=True)
         self._warm_up.start()
 

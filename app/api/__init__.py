@@ -17,7 +17,7 @@ problems          Errors as problem documents (RFC 9457, ``application/problem+j
 registry          Cache of loaded policies, and names of stored checkpoints
 responses         Outermost ASGI middleware: completes every response
 security          Access control: one ASGI middleware around every route, mount and socket
-service_state     Metrics that are read from the service at a scrape
+state_metrics     Metrics that are read from the service at a scrape
 services          Parts of the service that routes use; ``app.main`` creates them
 sockets           Size of WebSocket messages, and refusal of a socket with a reason; idle time
                   and number of motion sockets: ``motion/load.py``

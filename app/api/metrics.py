@@ -1,4 +1,4 @@
-"""Metrics for Prometheus that are counted at requests; ``service_state`` reads the others.
+"""Metrics for Prometheus that are counted at requests; ``state_metrics`` reads the others.
 
 Every application has its own registry. ``docs/operations.md`` lists the metrics.
 """

@@ -194,7 +194,7 @@ class SetSafety(LiveCommand):
     """whether the robot obeys the safety layer"""
     protective_distance: Annotated[float, Field(ge=0.0, le=2.0)] | None = None
     """least distance to people while the robot moves [m]"""
-    human_speed: Annotated[float, Field(ge=0.0, le=5.0)] | None = None
+    human_speed: Annotated[float, Field(ge=0.0, le=10.0)] | None = None
     """assumed speed of people v_h; parts observed faster count at their speed [m/s]"""
     reaction_time: Annotated[float, Field(ge=0.0, le=2.0)] | None = None
     """reaction time, a part of T_r [s]"""

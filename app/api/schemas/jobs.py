@@ -14,12 +14,14 @@ from app.store.records import JobRecord, MetricRow, SpentBudget
 class JobPublic(Answer):
     """A job."""
 
-    id: str
+    id: str = Field(description="name in addresses")
     number: int = Field(description="running number")
-    kind: str
-    preset: str | None
-    seed: int
-    overrides: dict[str, Any]
+    kind: str = Field(description="train, evaluate, sweep or report")
+    preset: str | None = Field(description="preset of a training; null for other kinds")
+    seed: int = Field(description="seed of training, episodes or ranges")
+    overrides: dict[str, Any] = Field(
+        description="fields that differ from the preset, by group"
+    )
     spec: dict[str, Any] = Field(description="the posted body, without labels")
     name: str | None = Field(description="a name for people")
     notes: str | None = Field(description="text for people")
@@ -37,11 +39,13 @@ class JobPublic(Answer):
     attempt: int = Field(description="number of starts")
     failures: int = Field(description="number of crashed attempts")
     created_at: datetime
-    started_at: datetime | None
-    finished_at: datetime | None
-    error: str | None
+    started_at: datetime | None = Field(description="first start; null before it")
+    finished_at: datetime | None = Field(description="null until it has ended")
+    error: str | None = Field(description="why it failed, else null")
     step: int = Field(description="environment steps done")
-    total_steps: int | None
+    total_steps: int | None = Field(
+        description="steps at its end; of a sweep or report, its trials or evaluations"
+    )
     step_budget: int | None = Field(description="steps after which it ends and can be resumed")
     time_budget_s: float | None = Field(
         description="run time after which it ends and can be resumed [s]"
@@ -62,9 +66,9 @@ class JobPublic(Answer):
         description="estimated run time until its end or the first spent budget [s]; null if "
         "it does not run or nothing is known"
     )
-    cancel_requested: bool
-    idempotency_key: str | None
-    result: dict[str, Any] | None
+    cancel_requested: bool = Field(description="whether it has been cancelled, or is to be")
+    idempotency_key: str | None = Field(description="`Idempotency-Key` of its request")
+    result: dict[str, Any] | None = Field(description="its result once it has succeeded")
     last_event: int = Field(description="id of its newest event")
     kills: int = Field(
         description=f"number of attempts killed with the server; the job fails at {MAX_KILLS}"

@@ -1,7 +1,7 @@
 // The live cell as this page knows it: its last snapshot, its recent values, the link to it.
 import { useCallback, useEffect, useRef, useState } from "../vendor/htm-preact-standalone.module.js";
 import { follow, get, post, put, Unreachable } from "../api.js";
-import { Lost, Unconfirmed } from "../confirm.js";
+import { Lost, Unconfirmed } from "../unconfirmed.js";
 import { History } from "./history.js";
 import { hidden, seen } from "../visibility.js";
 

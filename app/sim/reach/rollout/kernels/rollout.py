@@ -9,8 +9,8 @@ the first moments, in which no action can change the distance.
 (``ssm.py``), a collision is also a person who is, or will be at the end of a motion that begins
 now, nearer than the layer allows, because the layer would then stop the robot. Candidates are
 simulated for as long as a person takes to walk past, and scored by time; a candidate that does
-not reach the goal by then is charged the remaining joint motion at half speed. The
-safety layer alone handles a person near which the robot is already stopped.
+not reach the goal by then is charged the remaining joint motion at half speed. Where a person
+is already nearer than the layer allows, the constraint is dropped: the layer alone acts.
 """
 
 from typing import NamedTuple

@@ -1,6 +1,6 @@
 from pathlib import Path
 
-from app.api.service_state import STORED_METRICS
+from app.api.state_metrics import STORED_METRICS
 from app.store import attempts, jobs
 from app.store.engine import Store
 from app.store.records import NewJob

@@ -35,7 +35,7 @@ class StateMetric:
     """Whether it is a counter; a counter of a live world starts again at its reset."""
 
 
-class ServiceState(Collector):
+class StateMetrics(Collector):
     """Reads the state of a service."""
 
     def __init__(self, services: Services) -> None:
