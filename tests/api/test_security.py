@@ -44,6 +44,11 @@ def test_foreign_host_is_refused_on_loopback(client: TestClient, host: str) -> N
     assert problem_of(client.get("/healthz", headers={"Host": host}), 421)["field"] == "Host"
 
 
+def test_second_host_is_refused(client: TestClient) -> None:
+    headers = [("Host", "127.0.0.1"), ("Host", "evil.example")]
+    assert problem_of(client.get("/healthz", headers=headers), 421)["field"] == "Host"
+
+
 @pytest.mark.parametrize("host", ["127.0.0.1:8000", "localhost:9000", "[::1]:8000"])
 def test_loopback_names_are_answered(client: TestClient, host: str) -> None:
     assert client.get("/healthz", headers={"Host": host}).status_code == 200

@@ -47,10 +47,11 @@ class GridFields(Body):
         """Check the order of the bounds.
 
         Raises:
-            InvalidInput: An upper bound is below the lower one.
+            InvalidInput: An upper bound is below the lower one, or equal for several
+                positions.
         """
-        for name, (low, high) in (("x", self.x), ("y", self.y)):
-            if low > high:
+        for name, (low, high), n in (("x", self.x, self.nx), ("y", self.y, self.ny)):
+            if low > high or (low == high and n > 1):
                 rule = "must be the least and the greatest value, in this order"
                 raise InvalidInput(f"grid.{name}", [low, high], rule)
         return self
