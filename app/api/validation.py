@@ -40,7 +40,7 @@ _WORDS = {
 """Pydantic's words, and ours."""
 _PLAIN: dict[object, tuple[re.Pattern[str], str]] = {
     int: (re.compile(r"[^-0-9A-Za-z]"), "must be a whole number in plain digits"),
-    float: (re.compile(r"[^-.0-9A-Za-z]"), "must be a number in plain digits"),
+    float: (re.compile(r"[^-+.0-9A-Za-z]|^\+"), "must be a number in plain digits"),
 }
 """Characters that pydantic takes in numbers of an address (``1_0``, ``1.0``), and the rule."""
 

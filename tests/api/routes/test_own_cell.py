@@ -52,7 +52,7 @@ def test_policy_decides_in_its_own_cell_and_in_no_other(
     for reference, cell in ((checkpoint, "pick-and-place"), (None, "workshop")):
         refused = client.post("/v1/task-selection", json=asked(state, reference, cell))
         assert refused.status_code == 409
-        assert refused.json()["field"] == "cell"
+        assert refused.json()["property"] == "cell"
 
 
 def test_unknown_cell_of_a_request_names_the_known(
