@@ -335,16 +335,20 @@ class CheckpointMismatch(ServiceError):
         field: The differing property of the checkpoint, such as ``"cell"``.
         expected: The required value.
         actual: The checkpoint's value.
+        member: Member of the request that names the checkpoint.
     """
 
-    def __init__(self, field: str, expected: object, actual: object) -> None:
+    def __init__(
+        self, field: str, expected: object, actual: object, *, member: str = "checkpoint"
+    ) -> None:
         super().__init__(f"checkpoint {field} is {actual!r}, expected {expected!r}")
         self.field, self.expected, self.actual = field, expected, actual
+        self.member = member
 
     def problem(self) -> dict[str, object]:
         """Return the checkpoint as the faulty field, its property and both values."""
         return {
-            "field": "checkpoint",
+            "field": self.member,
             "value": f"<{self.field} {self.actual!r}>",
             "rule": f"must have the {self.field} {self.expected!r}",
             "choices": [],

@@ -16,6 +16,7 @@ import torch
 from app.errors import CheckpointMismatch, Damaged, InvalidInput
 from app.policies.checkpoints.checkpoint import Checkpoint
 from app.policies.configs import presets
+from app.policies.evaluation.registry import WITHOUT_CHECKPOINT
 from app.policies.evaluation.registry import evaluate as run_protocol
 from app.policies.evaluation.rows import Row
 from app.policies.training import state as states
@@ -89,15 +90,18 @@ def evaluate(inputs: JobInputs, worker: JobWorker) -> dict[str, Any]:
     worker.end_at_once()
     spec = parse_spec(worker.job.spec)
     assert isinstance(spec, EvaluateSpec)
-    reference = worker.job.checkpoint or spec.checkpoint  # a job queued before migration 0013
-    assert reference is not None
+    tested = None
+    if spec.protocol not in WITHOUT_CHECKPOINT:
+        reference = worker.job.checkpoint or spec.checkpoint  # queued before migration 0013
+        assert reference is not None
+        tested = inputs.checkpoint(reference)
 
     def on_row(done: int, total: int, row: Row) -> None:
         worker.record_progress(done, _rates(row), total_steps=total)
 
     return run_protocol(
         spec.protocol,
-        inputs.checkpoint(reference),
+        tested,
         episodes=spec.episodes,
         seed=spec.seed,
         motions=inputs.motions(spec.recordings),

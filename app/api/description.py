@@ -24,7 +24,10 @@ PROBLEMS = {
     409: ("Conflict", "The request contradicts the present state"),
     413: ("BodyTooLarge", "The body is longer than the route allows"),
     415: ("WrongMediaType", "`Content-Type` or `Content-Encoding` is not one of `choices`"),
-    421: ("WrongHost", "`Host` is no name of this machine, and the server has no token"),
+    421: (
+        "WrongHost",
+        "`Host` is given twice, or names another machine and no token is set",
+    ),
     422: ("InvalidInput", "A value breaks a rule: `field`, `value`, `rule`, `choices`"),
     431: ("HeadTooLarge", "URL and headers are longer than the server allows"),
     500: ("Failure", "Stored data are damaged, or an unexpected error occurred"),

@@ -9,7 +9,7 @@ from fastapi import Depends, Header, Response
 from app.api.schemas.jobs import JobList, JobPublic
 from app.api.services import Services, ServicesDep
 from app.policies.configs import presets
-from app.policies.evaluation.registry import check_task
+from app.policies.evaluation.registry import WITHOUT_CHECKPOINT, check_task
 from app.sim.cells.cell import cell_names
 from app.store import job_actions, jobs, metrics
 from app.store.records import JobRecord, JobState, MetricRow, NewJob, References
@@ -125,3 +125,11 @@ def newest_point(services: Services, job: JobRecord) -> MetricRow | None:
     if job.step <= 0:
         return None
     return metrics.newest_point(services.store, job.id)
+
+
+def known_spec(job: JobRecord) -> dict[str, Any]:
+    """Return a job's spec by the present rules; older evaluations without policy name one."""
+    spec = dict(job.spec)
+    if spec.get("protocol") in WITHOUT_CHECKPOINT:
+        spec["checkpoint"] = None
+    return spec

@@ -118,8 +118,9 @@ class AccessMiddleware:
         self, scope: Scope, headers: Mapping[str, str]
     ) -> tuple[int, str, str, dict[str, object]] | None:
         """Return status, kind, detail and data of a refusal, or None."""
-        hosts = [value for name, value in scope["headers"] if name == b"host"]
-        host = b", ".join(hosts).decode("latin-1")  # several are no name of this machine
+        host = headers.get("host", "")
+        if sum(name == b"host" for name, _ in scope["headers"]) > 1:
+            return _refusal(421, "wrong-host", "Host", host, "must be given once")
         if self.token is None and not is_loopback(host):
             rule = "must be a loopback name: this server is open to this machine only"
             return _refusal(421, "wrong-host", "Host", host, rule)

@@ -132,8 +132,13 @@ def newest_for(
     return None
 
 
-def require_sorting_policy(policy: SortingValues, cell: Cell) -> None:
+def require_sorting_policy(
+    policy: SortingValues, cell: Cell, member: str = "checkpoint"
+) -> None:
     """Check that a sorting policy was trained for tasks of the size of a cell.
+
+    Args:
+        member: Member of the request that names the policy.
 
     Raises:
         InvalidInput: The cell is no sorting cell.
@@ -142,7 +147,8 @@ def require_sorting_policy(policy: SortingValues, cell: Cell) -> None:
     here, known = shape_of(cell), policy.shape
     if here != known:
         text = "{0.n_cells} cells, {0.n_colours} colours, {0.n_sizes} sizes"
-        raise CheckpointMismatch("shape", text.format(here), text.format(known))
+        sizes = text.format(here), text.format(known)
+        raise CheckpointMismatch("shape", *sizes, member=member)
 
 
 def sorting_policy_for(cell: Cell, services: Services) -> SortingValues | None:

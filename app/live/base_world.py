@@ -311,6 +311,7 @@ class BaseWorld(ABC, Generic[P]):
         self.previous = before if before in names else None
         if self.previous is None:
             self.progress = NOT_BEGUN
+        self.decided_from = self.progress
         self.decision = self.planner.act = None
         if self.policy is None or not names:
             return None
@@ -328,7 +329,6 @@ class BaseWorld(ABC, Generic[P]):
             self.set_message(error.message)
             return None
         self.decision, self.decided_s = decision, self.t
-        self.decided_from = self.progress
         if decision.chosen != self.previous:
             self.progress = NOT_BEGUN
         if self.previous is None or decision.chosen == self.previous:

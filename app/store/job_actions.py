@@ -53,8 +53,7 @@ def resume_job(
         job = read_job(connection, job_id, for_update=True)
         if job.ended_by is None:
             require_repeatable(job, "resume")
-        newest = sa.select(sa.func.max(resume_states.c.step))
-        step = connection.execute(newest.where(resume_states.c.job_id == job_id)).scalar()
+        step = _newest_step(connection, job_id)
         if step is None and job.kind in COMPOSITE_KINDS:
             step = job.step
         elif step is None:
@@ -79,6 +78,15 @@ def resume_job(
         }
         change_state(connection, job_id, "queued", changes, {"attempt": job.attempt})
         return read_job(connection, job_id)
+
+
+def _newest_step(connection: sa.Connection, job_id: str) -> int | None:
+    """Return the step of the newest state to resume from; None without one."""
+    newest = sa.select(sa.func.max(resume_states.c.step))
+    found: int | None = connection.execute(
+        newest.where(resume_states.c.job_id == job_id)
+    ).scalar()
+    return found
 
 
 def _require_left(
@@ -114,8 +122,7 @@ def require_repeatable(job: JobRecord, action: str) -> None:
 def change_labels(store: Store, job_id: str, changes: Mapping[str, Any]) -> JobRecord:
     """Change name, notes, priority or budgets of a job.
 
-    A priority counts while the job is queued, a budget until it has
-    succeeded.
+    A priority counts while the job is queued, a budget until it has succeeded.
 
     Raises:
         NotFound: There is no such job.
@@ -128,7 +135,8 @@ def change_labels(store: Store, job_id: str, changes: Mapping[str, Any]) -> JobR
         if budgets and job.state == "succeeded":
             rule = f"must not be succeeded to change a budget of job {job.number}: resume it"
             raise WrongState("state", job.state, rule)
-        _require_left(job, budgets, {"step_budget": job.step, "time_budget_s": job.run_s})
+        step = _newest_step(connection, job_id) if job.state in REPEATABLE else job.step
+        _require_left(job, budgets, {"step_budget": step or 0, "time_budget_s": job.run_s})
         if changes:
             connection.execute(sa.update(jobs).where(jobs.c.id == job_id).values(**changes))
         return read_job(connection, job_id)

@@ -3,6 +3,7 @@
 import os
 import signal
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -158,6 +159,20 @@ def test_killed_training_goes_on_and_its_policy_can_be_evaluated(store: Store) -
         spec.spec["checkpoint"],
         5,
     )
+
+
+@pytest.mark.usefixtures("supervisor")
+@SQLITE_ONLY
+@pytest.mark.parametrize("named", [None, "pick"])  # evaluations of former versions named one
+def test_protocol_without_policy_is_run_without_checkpoint(
+    store: Store, named: str | None
+) -> None:
+    body = {"kind": "evaluate", "protocol": "safety-ssm", "episodes": 2}
+    new = parse_spec(body).new_job()
+    new = replace(new, spec={**new.spec, "checkpoint": named})
+    job = wait_until_final(store, jobs.create_job(store, new).id)
+    assert (job.state, job.error) == ("succeeded", None)
+    assert job.result is not None and "checkpoint" not in job.result
 
 
 @pytest.mark.usefixtures("supervisor")

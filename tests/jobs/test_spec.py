@@ -133,4 +133,6 @@ def test_evaluation_without_policy_has_no_checkpoint() -> None:
 def test_name_is_one_line_in_one_direction(letter: str) -> None:
     with pytest.raises(ValidationError, match="name"):
         parse_spec(TRAIN | {"name": f"a{letter}b"})
+    with pytest.raises(ValidationError, match="name"):
+        parse_spec(TRAIN | {"name": f"a{letter}"})
     assert parse_spec(TRAIN | {"name": "größer 大 😀"}).new_job().name == "größer 大 😀"

@@ -10,6 +10,7 @@ from app.api.job_requests import (
     IdempotencyKey,
     JobDep,
     checked,
+    known_spec,
     queued,
     shown,
     stored_references,
@@ -20,7 +21,14 @@ from app.api.schemas.jobs import JobPublic
 from app.api.services import ServicesDep
 from app.api.validation import validated
 from app.store import job_actions, jobs
-from jobs.spec import Budget, JobChanges, budgets, merge, require_budgeted, spec_type
+from jobs.spec import (
+    Budget,
+    JobChanges,
+    budgets,
+    merge,
+    require_budgeted,
+    spec_type,
+)
 
 CHANGES = Body(
     description="fields that differ from the job's spec, as a JSON merge patch (RFC 7396): "
@@ -103,8 +111,10 @@ def retry_job(
     """
     job_actions.require_repeatable(job, "retry")
     labels = {"name": job.name, "priority": job.priority}
-    same = {} if job.checkpoint is None else {"checkpoint": job.checkpoint}
-    body = validated(spec_type(job.kind), {**job.spec, **same, **labels, **budgets(job)})
+    spec = known_spec(job)
+    if spec.get("checkpoint") is not None:
+        spec["checkpoint"] = job.checkpoint or spec["checkpoint"]
+    body = validated(spec_type(job.kind), {**spec, **labels, **budgets(job)})
     new = replace(checked(body, services), parent=job.id)
     return queued(new, services, response, idempotency_key, {"retry": job.id})
 
@@ -126,7 +136,7 @@ def clone_job(
 
     Name, notes and priority are those of the changes, or the defaults.
     """
-    body = validated(spec_type(job.kind), merge({**job.spec, **budgets(job)}, changes))
+    body = validated(spec_type(job.kind), merge({**known_spec(job), **budgets(job)}, changes))
     new = replace(checked(body, services), parent=job.id)
     submitted = {"clone": job.id, "changes": changes}
     return queued(new, services, response, idempotency_key, submitted)

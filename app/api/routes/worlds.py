@@ -165,7 +165,7 @@ def _policies_of(
         sorting_policy = sorting_policy_for(cell, services)
     else:
         sorting_policy = services.sorting_policies.load(body.sorting_policy)
-        require_sorting_policy(sorting_policy, cell)
+        require_sorting_policy(sorting_policy, cell, "sorting_policy")
     if is_reaching(cell):
         if body.checkpoint is None:
             return None, None, reach_policy_for(cell, services)

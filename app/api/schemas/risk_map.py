@@ -51,8 +51,11 @@ class GridFields(Body):
                 positions.
         """
         for name, (low, high), n in (("x", self.x, self.nx), ("y", self.y, self.ny)):
-            if low > high or (low == high and n > 1):
+            if low > high:
                 rule = "must be the least and the greatest value, in this order"
+                raise InvalidInput(f"grid.{name}", [low, high], rule)
+            if low == high and n > 1:
+                rule = f"must be two values for n{name} = {n} positions"
                 raise InvalidInput(f"grid.{name}", [low, high], rule)
         return self
 

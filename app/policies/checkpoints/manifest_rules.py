@@ -41,7 +41,7 @@ def _check_preset(preset: Mapping[str, Any]) -> None:
     if not preset:
         raise InvalidInput("manifest.preset", preset, "must hold the fields of the training")
     name = preset.get("name", "")
-    if not isinstance(name, str) or len(name) > MAX_NAME or not re.match(ONE_LINE, name):
+    if not isinstance(name, str) or len(name) > MAX_NAME or not re.fullmatch(ONE_LINE, name):
         rule = f"must be text of one line, at most {MAX_NAME} characters, none a control"
         raise InvalidInput("manifest.preset.name", name, rule)
 

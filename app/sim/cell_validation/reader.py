@@ -165,7 +165,7 @@ def _tree_faults(node: object, place: str) -> Iterator[Fault]:
 
 
 def _is_text(text: str) -> bool:
-    if not re.match(ONE_LINE, text):
+    if not re.fullmatch(ONE_LINE, text):
         return False
     try:
         text.encode("utf-8")

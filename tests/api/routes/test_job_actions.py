@@ -1,9 +1,11 @@
 from typing import Any
 
 import pytest
+import sqlalchemy as sa
 from fastapi.testclient import TestClient
 
 from app.main import acting_in
+from app.store.database import tables
 from tests.api.conftest import services_of
 
 TRAIN = {"kind": "train", "preset": "pick-td3", "seed": 1, "priority": -100}
@@ -167,6 +169,21 @@ def test_evaluation_is_retried_with_the_checkpoint_that_its_alias_named(
     again = client.post(f"/v1/jobs/{job['id']}/retry").json()
     assert again["checkpoint"] == job["checkpoint"] == sha256
     cancelled(client, again)
+
+
+@pytest.mark.parametrize("action", ["retry", "clone"])
+def test_older_evaluation_without_policy_is_repeated_without_its_checkpoint(
+    client: TestClient, action: str
+) -> None:
+    body = {"kind": "evaluate", "protocol": "safety-ssm", "episodes": 2, "priority": -100}
+    job = cancelled(client, client.post("/v1/jobs", json=body).json())
+    older = sa.update(tables.jobs).where(tables.jobs.c.id == job["id"])
+    with services_of(client).store.writing() as connection:
+        connection.execute(older.values(spec={**job["spec"], "checkpoint": "pick"}))
+    answer = client.post(f"/v1/jobs/{job['id']}/{action}", json={"priority": -100})
+    assert answer.status_code == 202, answer.text
+    assert answer.json()["spec"]["checkpoint"] is None
+    cancelled(client, answer.json())
 
 
 def test_actions_on_an_unknown_job_are_not_found(client: TestClient) -> None:

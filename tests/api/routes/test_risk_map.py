@@ -106,7 +106,7 @@ def test_a_hand_is_moved_as_far_as_it_reaches(client: TestClient) -> None:
     [
         ({"person": 1}, ("grid.person", "1", "four people nearest", "choices: 0")),
         ({"x": [0.5, -0.5]}, ("grid.x", "[0.5, -0.5]", "in this order")),
-        ({"y": [0.5, 0.5], "ny": 2}, ("grid.y", "[0.5, 0.5]", "in this order")),
+        ({"y": [0.5, 0.5], "ny": 2}, ("grid.y", "[0.5, 0.5]", "must be two values for ny = 2")),
         ({"nx": 51}, ("grid.nx", "51", "50")),
         ({"what": "head"}, ("grid.what", "head", "person", "hand")),
         ({"height": 1.0}, ("grid.height", "1.0")),

@@ -341,6 +341,7 @@ def test_pick_ends_when_its_policy_or_all_candidates_are_removed(
     after = run(world, 20)
     assert after.status == status
     assert (after.chosen, after.counters.reached) == (None, 0)
+    assert (after.previous, after.phase) == (None, "approach")
     assert np.abs(after.robot_qd).max() < 1e-9
 
 

@@ -33,7 +33,7 @@ def test_shipped_manifests_keep_every_rule(alias):
 @pytest.mark.parametrize("alias", ["pick", "reach", "sorting-e0"])
 @pytest.mark.parametrize(
     "name",
-    [{}, [], None, 3, "x" * 65, *(f"a{one}b" for one in CONTROLS)],
+    [{}, [], None, 3, "x" * 65, "a\n", *(f"a{one}b" for one in CONTROLS)],
 )
 def test_name_of_a_preset_is_one_line_of_text(alias, name):
     preset = {**pretrained.load(alias).manifest["preset"], "name": name}

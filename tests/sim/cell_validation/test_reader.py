@@ -98,6 +98,7 @@ def test_what_is_no_cell_at_all_is_one_fault_of_the_file(content: bytes, text: s
         (lambda c: c.update(human={}), "human", '"kind": "worker"'),
         (lambda c: c.update(title="\ud800"), "title", "must be text"),
         (lambda c: c.update(title="a\x1b[31m"), "title", "without control characters"),
+        (lambda c: c.update(title="a\n"), "title", "without control characters"),
         (lambda c: c["stations"][0].update(label="a\0"), "stations.cube0.label", "control"),
         (lambda c: c.update(name="Big Cell"), "name", "begin with a-z"),
     ],

@@ -72,7 +72,8 @@ export function Labels({ job, onChanged }) {
     },
   });
   const values = { ...shown, ...form.typed };
-  const changed = Object.keys(form.typed).filter((name) => values[name] !== shown[name]);
+  const changed = ["notes", ...fields.map(({ name }) => name)]
+    .filter((name) => name in form.typed && values[name] !== shown[name]);
   const save = () => {
     const body = { ...values, ...budgetBody(values), priority: parsed(values.priority) };
     return patch(`v1/jobs/${job.id}`, Object.fromEntries(changed.map((name) => [name, body[name]])));
