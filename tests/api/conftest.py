@@ -65,6 +65,6 @@ def cold_app_settings(tmp_path: Path) -> Settings:
 
 @pytest.fixture
 def state(client: TestClient) -> dict[str, Any]:
-    """The live world's state, with something to choose, as it can be posted."""
-    chosen: dict[str, Any] = client.get("/v1/worlds/main").json()["state"]
-    return chosen
+    """The live world's state, as it can be posted, before the descent to an object."""
+    now: dict[str, Any] = client.get("/v1/worlds/main").json()["state"]
+    return now | {"phase": "approach", "closing_s": 0.0}

@@ -113,13 +113,10 @@ class PlanRequest(SortingFields):
         )
 
     def _check_previous(self, names: SortingNames) -> None:
-        if self.previous in names.stations or (
-            self.previous is None and self.phase == "approach"
-        ):
+        if self.previous in names.stations or (self.previous is None and self.phase != "lift"):
             return
-        rule = (
-            "must be a station" if self.previous else f"must be given in the phase {self.phase}"
-        )
+        lacking = self.previous is None
+        rule = "must be given in the phase lift" if lacking else "must be a station"
         raise InvalidInput("previous", self.previous, rule, names.stations)
 
     def _held(self, held: str, names: SortingNames, state: SortingState) -> int:

@@ -62,8 +62,8 @@ class TaskSelectionRequest(Body):
         None,
         min_length=1,
         max_length=128,
-        description="last chosen id, for hysteresis; one that is no longer offered counts only "
-        "in the phase `approach`, as none; null: none",
+        description="last chosen id, for hysteresis; one that is no candidate counts as none, "
+        "and is refused in the phase `lift`; null: none",
     )
     phase: Literal["approach", "descend", "lift"] = Field(
         "approach",
@@ -92,10 +92,10 @@ class TaskSelectionRequest(Body):
         """Return q, qd and candidates as arrays; ``known_people`` converts the people.
 
         Raises:
-            InvalidInput: An id occurs twice, or the target of a pick in progress is missing.
+            InvalidInput: An id occurs twice, or the lifted candidate is missing.
         """
         self._check_ids_are_unique()
-        self._check_pick_is_offered()
+        self._check_lifted_is_offered()
         return (
             self.robot.joints(self.robot.q),
             self.robot.joints(self.robot.qd),
@@ -109,10 +109,10 @@ class TaskSelectionRequest(Body):
             phase=("approach", "descend", "lift").index(self.phase), closing_s=self.closing_s
         )
 
-    def _check_pick_is_offered(self) -> None:
+    def _check_lifted_is_offered(self) -> None:
         ids = [one.id for one in self.candidates]
-        if self.phase != "approach" and self.previous not in ids:
-            rule = f"must be the id of a candidate in the phase {self.phase}"
+        if self.phase == "lift" and self.previous not in ids:
+            rule = "must be the id of a candidate in the phase lift"
             raise InvalidInput("previous", self.previous, rule, ids)
 
     def _check_ids_are_unique(self) -> None:

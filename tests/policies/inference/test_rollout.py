@@ -223,7 +223,7 @@ def test_plans_are_continued_no_longer_than_their_duration() -> None:
     batch, improvement, continued = batch_of(120, "walker"), RolloutImprovement(ACTOR), 0
     controller = controller_of(ACTOR, "direct")
     cycles, before = round(STEP_S / batch.arm.dt), np.zeros((120, 6), dtype=np.float32)
-    for _ in range(90):
+    for _ in range(120):
         acts = controller.acts(batch)
         chosen = improvement.improve(batch, acts)
         work = improvement._work
