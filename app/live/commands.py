@@ -27,9 +27,6 @@ FIRST = 0
 Name = Annotated[str, Field(min_length=1, max_length=64)]
 Coordinate = Annotated[float, Field(ge=-FARTHEST_M, le=FARTHEST_M)]
 Point = Annotated[tuple[Coordinate, Coordinate, Coordinate], Field(strict=False)]
-Yaw = Annotated[float, Field(ge=-10.0, le=10.0)]
-"""More than a turn in each direction, so that angles in degrees are refused [rad]."""
-Placement = Annotated[tuple[Coordinate, Coordinate, Yaw], Field(strict=False)]
 Percentile = Annotated[float, Field(ge=PERCENTILES[0], le=PERCENTILES[1])]
 
 
@@ -90,7 +87,7 @@ class MovePerson(PersonCommand):
     """
 
     tag: Literal["move-person"] = "move-person"
-    pelvis: Placement | None = None
+    pelvis: Point | None = None
     """pelvis x [m], y [m], yaw [rad]"""
     right: Point | None = None
     """target of the right hand [m]"""

@@ -220,10 +220,10 @@ def test_motion_into_the_table_is_replaced(people: tuple[str, ...]) -> None:
 
 
 def test_plans_are_continued_no_longer_than_their_duration() -> None:
-    batch, improvement, continued = batch_of(120, "walker"), RolloutImprovement(ACTOR), 0
+    batch, improvement, continued = batch_of(240, "walker"), RolloutImprovement(ACTOR), 0
     controller = controller_of(ACTOR, "direct")
-    cycles, before = round(STEP_S / batch.arm.dt), np.zeros((120, 6), dtype=np.float32)
-    for _ in range(120):
+    cycles, before = round(STEP_S / batch.arm.dt), np.zeros((240, 6), dtype=np.float32)
+    for _ in range(90):
         acts = controller.acts(batch)
         chosen = improvement.improve(batch, acts)
         work = improvement._work
