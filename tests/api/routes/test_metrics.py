@@ -50,8 +50,7 @@ def test_decision_outside_the_training_range_is_counted(
     name, labels = "tandem_decisions_outside_training_total", {"endpoint": "/v1/task-selection"}
     before = value(client, name, **labels)
     far = [{"id": "far", "position": [0.0, 3.0, 0.1]}]
-    body = {**state, "candidates": far}
-    answer = client.post("/v1/task-selection", json=body)
+    answer = client.post("/v1/task-selection", json={**state, "candidates": far})
     assert answer.json()["candidates"][0]["outside"]
     assert value(client, name, **labels) == before + 1
 
