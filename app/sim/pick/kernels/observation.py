@@ -63,7 +63,6 @@ from app.sim.pick.kernels.observation_workspace import (
     FIRST_PART,
     GOAL_LANES,
     LAST_PART,
-    MOVING_LANES,
     N_COARSE,
     N_LANES,
     STILL,
@@ -246,9 +245,8 @@ def _write_look_ahead(
     second: int,
     work: PickObservationWorkspace,
     out: Obs,
-    lanes: int,
 ) -> None:
-    """Write the clearances to the observed people at all horizons, of the first ``lanes``."""
+    """Write the clearances to the observed people at all horizons."""
     q, q_goal, base = state.q, state.q_goal, work.base
     person = work.person
     work.q[5] = q[5]
@@ -267,9 +265,8 @@ def _write_look_ahead(
         if not predicts:
             extrapolate_capsules(person.now, person.later, HORIZONS[i], person.moved)
         moved = work.ahead[0, i] if predicts else person.moved
-        _measure_gaps(work, lanes, moved)
-        if lanes == N_LANES:
-            out[STILL_AHEAD + i] = _lane_clearance(STILL, work)
+        _measure_gaps(work, N_LANES, moved)
+        out[STILL_AHEAD + i] = _lane_clearance(STILL, work)
         _write_clearances(work, STILL_AHEAD, i, out)
         if second > 0:
             moved, k = work.ahead[1, i], SECOND_CLEARANCE + 1
@@ -316,7 +313,7 @@ def observe_target(
     With ``again`` only what depends on the target is written: work space and ``out`` have the
     rest from another target in the same state.
     """
-    n_obs, second, lanes = out.shape[0], 0, MOVING_LANES if again else N_LANES
+    n_obs, second = out.shape[0], 0
     q, goal, q_goal, person = state.q, state.goal, state.q_goal, work.person
     base, tcp = work.base, robot.tcp
     if not again:
@@ -353,7 +350,7 @@ def observe_target(
         _measure_gaps(work, N_LANES, work.second.now)
         out[SECOND_CLEARANCE] = _lane_clearance(STILL, work)
         out[SECOND_CLEARANCE + 7] = _lane_clearance(AT_GOAL, work)
-    _write_look_ahead(arm, floor_z, state, second, work, out, lanes)
+    _write_look_ahead(arm, floor_z, state, second, work, out)
 
 
 @kernel()

@@ -44,8 +44,8 @@ AT_GOAL, ALONG_BASE, STILL = 0, N_COARSE, 2 * N_COARSE
 """First lane of three robot configurations that are evaluated together: at the goal, along the
 base motion, now."""
 N_LANES = padded_size(3 * N_COARSE)
-GOAL_LANES, MOVING_LANES = 8, 12
-"""Numbers of lanes that cover the first and the first two of them in whole vectors."""
+GOAL_LANES = 8
+"""Number of lanes that covers the first of them in whole vectors."""
 FIRST_PART, LAST_PART = body.C_ABDOMEN, body.C_HAND_L
 """Human capsules used by the features: those above the table."""
 
