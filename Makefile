@@ -30,7 +30,7 @@ CUDA_PACKAGES := triton cuda-bindings cuda-pathfinder cuda-toolkit \
 # cores, because tests of jobs wait for other processes. Files of a folder follow each other and
 # share its fixtures.
 SIDE_BY_SIDE = --numprocesses $$((1 + $$(getconf _NPROCESSORS_ONLN))) --maxprocesses 4 \
-	--dist loadgroup --no-loadscope-reorder
+	--dist loadfile --no-loadscope-reorder
 
 # $(call INSTALL_LOCK,file): installs exactly what the file lists, with progress on a terminal.
 INSTALL_LOCK = $(INSTALL) $$(test -t 2 || echo --quiet) --require-hashes --no-deps -r $(1)
@@ -56,7 +56,7 @@ test-ci: $(VENV)/dev.stamp $(VENV)/setup.stamp ## tests of test, test-postgres a
 	@$(PY) -m pytest -m 'not slow and not bench and not browser' $(SIDE_BY_SIDE) --durations 15
 
 test-browser: $(VENV)/dev.stamp $(VENV)/setup.stamp ## the page in a real Chromium
-	@$(PY) -m pytest tests/browser -m browser --numprocesses 3 --dist loadgroup --no-loadscope-reorder --durations 15
+	@$(PY) -m pytest tests/browser -m browser --numprocesses 3 --dist loadfile --no-loadscope-reorder --durations 15
 
 test-postgres: $(VENV)/dev.stamp ## store and supervisor on a PostgreSQL server of the tests
 	@$(PY) -m pytest -m 'postgres and not slow' $(SIDE_BY_SIDE) tests/store tests/jobs

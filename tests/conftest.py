@@ -5,8 +5,8 @@ Under ``CI=true`` a skip is a failure: a test that silently stops running guards
 The imports of all tests leave about two million objects that stay. They are kept out of garbage
 collection: a full one takes 0.3 s, which made up a third of the time until the first test.
 
-Several processes take the tests file by file. Files of one ``xdist_group`` go to one process,
-because each process would compile the kernels that they share; they are long and come first.
+Several processes take the tests file by file, those of ``FIRST`` before others; files of one of
+its groups go to one process.
 """
 
 import gc
@@ -28,22 +28,56 @@ IN_CI = os.environ.get("CI", "").lower() in ("1", "true")
 os.environ.setdefault("NUMBA_CACHE_DIR", str(kernel_cache(Path(__file__).parents[1] / "data")))
 
 
+FIRST = (
+    # Each process would compile the kernels that these share.
+    (
+        "policies/evaluation/pick/test_ssm.py",
+        "policies/evaluation/sorting/test_cycle_time.py",
+        "policies/evaluation/sorting/test_people.py",
+        "sim/pick/test_monitored_batch.py",
+    ),
+    (
+        "policies/evaluation/reach/test_ssm.py",
+        "policies/inference/test_rollout_constraint.py",
+        "sim/reach/monitored/test_batch.py",
+        "sim/reach/monitored/test_planners.py",
+    ),
+    (
+        "policies/evaluation/safety/test_ssm.py",
+        "policies/evaluation/test_registry.py",
+        "sim/safety/test_adversarial_trials.py",
+    ),
+    # These are long. At most two processes draw the scene; others have time to wait.
+    ("browser/test_job_forms.py",),
+    ("browser/scenes/test_windows.py", "browser/scenes/test_view.py"),
+    ("browser/scenes/test_servers.py",),
+    ("browser/test_connections.py",),
+    ("browser/test_training.py",),
+)
+"""Groups of test files, the longest first."""
+GROUPS = {f"tests/{file}": n for n, group in enumerate(FIRST) for file in group}
+
+
+def _group_of(nodeid: str) -> tuple[int, str]:
+    """Return the place of a test's group or, behind all groups, its file."""
+    file = nodeid.partition("::")[0]
+    return (GROUPS[file], "") if file in GROUPS else (len(FIRST), file)
+
+
 class _GroupOrFile(LoadFileScheduling):
     """Hands a process all tests of a group, or those of a file."""
 
     def _split_scope(self, nodeid: str) -> str:
-        file, _, test = nodeid.partition("::")
-        group = test.rpartition("]")[2].partition("@")[2]  # which --dist loadgroup appends
-        return group or file
+        return " ".join(map(str, _group_of(nodeid)))
 
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_make_scheduler(config: pytest.Config, log: Producer) -> _GroupOrFile | None:
-    return _GroupOrFile(config, log) if config.getvalue("dist") == "loadgroup" else None
+    return _GroupOrFile(config, log) if config.getvalue("dist") == "loadfile" else None
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    items.sort(key=lambda item: item.get_closest_marker("xdist_group") is None)
+    items.sort(key=lambda item: _group_of(item.nodeid)[0])
 
 
 @pytest.hookimpl(tryfirst=True)

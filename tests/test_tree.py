@@ -8,6 +8,8 @@ from pathlib import Path, PurePath
 
 import pytest
 
+from tests.conftest import GROUPS
+
 ROOT = Path(__file__).resolve().parent.parent
 FILES = subprocess.run(
     ["git", "ls-files", "--cached", "--others", "--exclude-standard"],
@@ -37,6 +39,11 @@ def test_folders_have_at_most_20_modules() -> None:
     modules.pop(CHAIN)
     assert len(modules) > 50
     assert {folder: n for folder, n in modules.items() if n > MAX_MODULES} == {}
+
+
+def test_groups_of_test_files_name_files_that_exist() -> None:
+    assert len(GROUPS) > 10
+    assert [name for name in GROUPS if not (ROOT / name).is_file()] == []
 
 
 ENTRY = re.compile(r"^([a-z_0-9]+/?)(?:  +\S|$)", re.MULTILINE)

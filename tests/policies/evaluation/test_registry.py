@@ -20,8 +20,6 @@ from tests.policies.untrained import untrained_reach
 from tests.sim.recorded_person import working
 from tests.sim.working_people import run_of
 
-pytestmark = pytest.mark.xdist_group("trials-of-the-safety-layer")
-
 
 def test_recorded_motion_without_any_is_refused():
     with pytest.raises(InvalidInput, match="must hold at least one motion") as caught:

@@ -30,8 +30,6 @@ from app.sim.robot.kernels.arm import new_robot_pose, place_robot
 from app.sim.safety.layer import SafetySettings, safety_settings
 from tests.policies.inference.test_rollout import workspace
 
-pytestmark = pytest.mark.xdist_group("monitored-reaching")
-
 CELL = load_cell("shared-workspace")
 ACTOR = ReachPolicy(pretrained.load("reach"))
 MEASURED = replace(safety_settings(CELL), use_measured_velocity=True)

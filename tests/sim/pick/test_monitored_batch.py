@@ -16,8 +16,6 @@ from app.sim.safety.layer import SafetyLayer, SafetySettings
 from app.sim.scenario.kernels.episode import RUNNING, SUCCESS
 from app.sim.scenario.monitoring import MonitoredEpisodes, MonitoringSettings
 
-pytestmark = pytest.mark.xdist_group("monitored-picks")
-
 CELL = load_cell("pick-and-place")
 CONTINUES = MonitoringSettings(rest_ends=False)
 BARE = MonitoringSettings(active=False, rest_ends=False)

@@ -10,8 +10,6 @@ from app.sim.robot.actions import ActionSettings
 from app.sim.safety.adversarial_trials import MODES, POLICIES, TrialSettings, run_trial
 from app.sim.safety.layer import SafetySettings
 
-pytestmark = pytest.mark.xdist_group("trials-of-the-safety-layer")
-
 NO_MARGINS = SafetySettings(reaction_time=0.0, protective_distance=0.0)
 WORKER = TrialSettings(safety=NO_MARGINS)
 WALKER = TrialSettings(safety=NO_MARGINS, cell="shared-workspace", people=("walker",))

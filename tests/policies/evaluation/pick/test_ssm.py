@@ -7,8 +7,6 @@ from app.policies.evaluation.pick import ssm
 from app.policies.evaluation.pick.ssm import CONDITIONS, MonitoredPicks
 from app.policies.evaluation.registry import evaluate
 
-pytestmark = pytest.mark.xdist_group("monitored-picks")
-
 N = 80
 
 

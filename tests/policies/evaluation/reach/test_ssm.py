@@ -25,8 +25,6 @@ from app.sim.scenario.monitoring import selected
 from tests.policies.straight_controller import Straight
 from tests.sim.recorded_motion import recorded
 
-pytestmark = pytest.mark.xdist_group("monitored-reaching")
-
 CELL = load_cell("shared-workspace")
 LIMIT_S = DEFAULT_SETTINGS.time_limit_s
 

@@ -5,8 +5,6 @@ import pytest
 from app.errors import InvalidInput
 from app.policies.evaluation.registry import evaluate
 
-pytestmark = pytest.mark.xdist_group("trials-of-the-safety-layer")
-
 
 @pytest.fixture(scope="module")
 def result():

@@ -12,8 +12,6 @@ from app.policies.evaluation.sorting.order_rules import nearest
 from app.policies.evaluation.sorting.people import SortingBesidePeople, parts_of
 from app.policies.evaluation.statistics import mean_of
 
-pytestmark = pytest.mark.xdist_group("monitored-picks")
-
 
 def tasks_of(parts: list[int], seconds: list[float]) -> FullTasks:
     none = np.zeros(len(parts), dtype=np.int64)

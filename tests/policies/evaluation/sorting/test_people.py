@@ -18,8 +18,6 @@ from app.policies.inference.value_networks import ValueNetworks, pick_preset_of
 from app.sim.cells.cell import load_cell
 from app.sim.sorting.planner import solve
 
-pytestmark = pytest.mark.xdist_group("monitored-picks")
-
 CELL = load_cell("sorting-e0")
 
 

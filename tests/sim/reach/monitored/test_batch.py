@@ -18,8 +18,6 @@ from app.sim.scenario.monitoring import MonitoringSettings
 from app.sim.scene.scene import NO_CYLINDERS, people_of
 from tests.sim.driven_batches import straight
 
-pytestmark = pytest.mark.xdist_group("monitored-reaching")
-
 CELL = load_cell("shared-workspace")
 SAFETY = safety_settings(CELL)
 BOX = ReachSettings(goals="box")

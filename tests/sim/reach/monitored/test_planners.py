@@ -3,7 +3,6 @@
 from dataclasses import replace
 
 import numpy as np
-import pytest
 
 from app.sim.cells.cell import load_cell
 from app.sim.planning.ompl_planners import PlanSettings
@@ -15,8 +14,6 @@ from app.sim.robot.ur10 import Robot
 from app.sim.safety.layer import safety_settings
 from app.sim.scenario.monitoring import MonitoringSettings
 from app.sim.scene.scene import arm_of
-
-pytestmark = pytest.mark.xdist_group("monitored-reaching")
 
 CELL = load_cell("shared-workspace")
 ARM = arm_of(CELL)

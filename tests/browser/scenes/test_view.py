@@ -7,9 +7,8 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from tests.browser.scene import VIEWER, scene_of
-from tests.browser.test_scene import WINDOWS
 
-pytestmark = [pytest.mark.browser, WINDOWS]
+pytestmark = pytest.mark.browser
 
 SMALL, PHONE = (400, 320), (390, 500)
 BEHIND = "getComputedStyle(document.querySelector('[data-dock-root]')).backgroundImage"
