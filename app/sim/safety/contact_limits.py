@@ -104,7 +104,7 @@ def contact_speed(region: Region, robot_mass: float, contact_area: float) -> flo
     return force / math.sqrt(reduced_mass(region, robot_mass) * 1000.0 * region.stiffness)
 
 
-def capsule_speeds(robot_mass: float, contact_area: float) -> Vec:
+def capsule_contact_speeds(robot_mass: float, contact_area: float) -> Vec:
     """Return the greatest contact speed of each of a worker's capsules [m/s], shape (12,)."""
     speeds = [
         min(contact_speed(REGIONS[name], robot_mass, contact_area) for name in names)
@@ -114,6 +114,6 @@ def capsule_speeds(robot_mass: float, contact_area: float) -> Vec:
     return np.array(speeds)
 
 
-def cylinder_speed(robot_mass: float, contact_area: float) -> float:
+def cylinder_contact_speed(robot_mass: float, contact_area: float) -> float:
     """Return the limit of a cylinder: that of the most sensitive region [m/s]."""
     return min(contact_speed(region, robot_mass, contact_area) for region in REGIONS.values())

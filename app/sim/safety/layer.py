@@ -146,9 +146,9 @@ def contact_speeds(settings: SafetySettings, n_columns: int, n_cylinders: int) -
     """
     out = np.zeros(n_columns + n_cylinders)
     if settings.pfl:
-        one = contact_limits.capsule_speeds(settings.robot_mass, settings.contact_area)
+        one = contact_limits.capsule_contact_speeds(settings.robot_mass, settings.contact_area)
         out[:n_columns] = np.resize(one, n_columns)
-        out[n_columns:] = contact_limits.cylinder_speed(
+        out[n_columns:] = contact_limits.cylinder_contact_speed(
             settings.robot_mass, settings.contact_area
         )
     return out

@@ -5,7 +5,12 @@ import pytest
 from app.sim.human.kernels import kinematics as body
 from app.sim.robot.ur10 import Robot
 from app.sim.safety import contact_limits
-from app.sim.safety.contact_limits import REGIONS, capsule_speeds, contact_speed, cylinder_speed
+from app.sim.safety.contact_limits import (
+    REGIONS,
+    capsule_contact_speeds,
+    contact_speed,
+    cylinder_contact_speed,
+)
 
 BY_HAND = {
     # F [N], k [N/mm], mu = m_H m_R / (m_H + m_R) with m_R = 14.35 kg, v = F / sqrt(mu k)
@@ -45,17 +50,17 @@ def test_a_larger_contact_helps_only_where_pressure_counts():
 
 
 def test_a_heavier_load_must_be_moved_more_slowly():
-    speeds = [capsule_speeds(14.35 + load, 1.0) for load in (0.0, 5.0, 10.0)]
+    speeds = [capsule_contact_speeds(14.35 + load, 1.0) for load in (0.0, 5.0, 10.0)]
     assert (speeds[0] > speeds[1]).all()
     assert (speeds[1] > speeds[2]).all()
 
 
 def test_a_head_is_as_delicate_as_its_face_and_a_cylinder_as_any_part():
-    speeds = capsule_speeds(14.35, 1.0)
+    speeds = capsule_contact_speeds(14.35, 1.0)
     assert speeds[body.C_HEAD] == pytest.approx(BY_HAND["face"], rel=1e-4)
     assert speeds[body.C_HAND_R] == speeds[body.C_HAND_L]
     assert speeds[body.C_LEG_R] == pytest.approx(BY_HAND["lower legs"], rel=1e-4)
-    assert cylinder_speed(14.35, 1.0) == pytest.approx(speeds.min())
+    assert cylinder_contact_speed(14.35, 1.0) == pytest.approx(speeds.min())
 
 
 def test_the_moving_mass_is_that_of_the_robot_s_model():
