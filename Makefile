@@ -56,7 +56,7 @@ test-ci: $(VENV)/dev.stamp $(VENV)/setup.stamp ## tests of test, test-postgres a
 	@$(PY) -m pytest -m 'not slow and not bench and not browser' $(SIDE_BY_SIDE) --durations 15
 
 test-browser: $(VENV)/dev.stamp $(VENV)/setup.stamp ## the page in a real Chromium
-	@$(PY) -m pytest tests/browser -m browser --numprocesses 4 --dist loadfile --no-loadscope-reorder --durations 15
+	@$(PY) -m pytest tests/browser -m browser --numprocesses 3 --dist loadfile --no-loadscope-reorder --durations 15
 
 test-postgres: $(VENV)/dev.stamp ## store and supervisor on a PostgreSQL server of the tests
 	@$(PY) -m pytest -m 'postgres and not slow' $(SIDE_BY_SIDE) tests/store tests/jobs

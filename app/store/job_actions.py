@@ -20,13 +20,8 @@ REPEATABLE = ("cancelled", "failed")
 
 def resume_steps(store: Store, job_ids: Sequence[str]) -> dict[str, int]:
     """Return the step of the newest state to resume from, for the jobs that have one."""
-    query = (
-        sa.select(resume_states.c.job_id, sa.func.max(resume_states.c.step).label("step"))
-        .where(resume_states.c.job_id.in_(job_ids))
-        .group_by(resume_states.c.job_id)
-    )
     with store.reading() as connection:
-        return {row.job_id: row.step for row in connection.execute(query)}
+        return _newest_steps(connection, job_ids)
 
 
 def resume_job(
@@ -53,7 +48,7 @@ def resume_job(
         job = read_job(connection, job_id, for_update=True)
         if job.ended_by is None:
             require_repeatable(job, "resume")
-        step = _newest_step(connection, job_id)
+        step = _newest_steps(connection, [job_id]).get(job_id)
         if step is None and job.kind in COMPOSITE_KINDS:
             step = job.step
         elif step is None:
@@ -80,13 +75,13 @@ def resume_job(
         return read_job(connection, job_id)
 
 
-def _newest_step(connection: sa.Connection, job_id: str) -> int | None:
-    """Return the step of the newest state to resume from; None without one."""
-    newest = sa.select(sa.func.max(resume_states.c.step))
-    found: int | None = connection.execute(
-        newest.where(resume_states.c.job_id == job_id)
-    ).scalar()
-    return found
+def _newest_steps(connection: sa.Connection, job_ids: Sequence[str]) -> dict[str, int]:
+    query = (
+        sa.select(resume_states.c.job_id, sa.func.max(resume_states.c.step).label("step"))
+        .where(resume_states.c.job_id.in_(job_ids))
+        .group_by(resume_states.c.job_id)
+    )
+    return {row.job_id: row.step for row in connection.execute(query)}
 
 
 def _require_left(
@@ -135,7 +130,9 @@ def change_labels(store: Store, job_id: str, changes: Mapping[str, Any]) -> JobR
         if budgets and job.state == "succeeded":
             rule = f"must not be succeeded to change a budget of job {job.number}: resume it"
             raise WrongState("state", job.state, rule)
-        step = _newest_step(connection, job_id) if job.state in REPEATABLE else job.step
+        step = job.step
+        if job.state in REPEATABLE:
+            step = _newest_steps(connection, [job_id]).get(job_id)
         _require_left(job, budgets, {"step_budget": step or 0, "time_budget_s": job.run_s})
         if changes:
             connection.execute(sa.update(jobs).where(jobs.c.id == job_id).values(**changes))

@@ -29,7 +29,7 @@ import numpy as np
 import torch
 
 from app.policies.checkpoints import pretrained
-from app.policies.checkpoints.model_state import under
+from app.policies.checkpoints.model_state import tensors_under
 from app.policies.inference.sorting_policy import SortingPolicy
 from app.policies.inference.task_selection import TaskChooser
 from app.policies.inference.value_networks import ValueNetworks, pick_preset_of
@@ -115,7 +115,7 @@ def network_rows(seed: int, seconds: float) -> Iterator[Row]:
     actor, critics = actor_of(preset, networks.n_obs), critics_for(preset, networks.n_obs)
     head = OutcomeHead(networks.n_obs)
     for name, module in (("actor", actor), ("critic", critics), ("outcome", head)):
-        module.load_state_dict(under(checkpoint.arrays(), name))
+        module.load_state_dict(tensors_under(checkpoint.arrays(), name))
 
     def by_torch(rows: torch.Tensor) -> None:
         head.predict(rows, critics.least(rows, actor(rows)))

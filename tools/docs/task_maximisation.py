@@ -22,7 +22,7 @@ import torch
 from matplotlib.figure import Figure
 
 from app.policies.checkpoints.checkpoint import Checkpoint
-from app.policies.checkpoints.model_state import under
+from app.policies.checkpoints.model_state import tensors_under
 from app.policies.configs import presets
 from app.policies.configs.pick import PickPreset
 from app.policies.evaluation.pick.episodes import EVALUATION_LIBRARY
@@ -132,8 +132,8 @@ def judge_of(policy: Checkpoint, batch: ValuedTargetBatch) -> Judge:
     """Return the judge of a policy in a batch of episodes."""
     preset, arrays = pick_preset_of(policy), policy.arrays()
     actor, critics = actor_of(preset, batch.obs_size), critics_for(preset, batch.obs_size)
-    actor.load_state_dict(under(arrays, "actor"))
-    critics.load_state_dict(under(arrays, "critic"))
+    actor.load_state_dict(tensors_under(arrays, "actor"))
+    critics.load_state_dict(tensors_under(arrays, "critic"))
     critic, gamma = values_of(actor, critics), preset.learning.gamma
     return Judge(actor=actor, batch=batch, critic=critic, gamma=gamma)
 

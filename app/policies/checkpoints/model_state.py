@@ -8,6 +8,8 @@ from typing import Any
 import torch
 from numpy.typing import NDArray
 
+from app.state_dict import under
+
 
 def weights_of(modules: Mapping[str, torch.nn.Module]) -> dict[str, NDArray[Any]]:
     """Return the tensors of networks as ``network.tensor``."""
@@ -35,23 +37,18 @@ def restore(
 ) -> None:
     """Load tensors and moments of a checkpoint into networks and optimisers."""
     for name, module in modules.items():
-        module.load_state_dict(under(arrays, name))
+        module.load_state_dict(tensors_under(arrays, name))
     for name, optimizer in optimizers.items():
         state: dict[int, dict[str, torch.Tensor]] = {}
-        for key, tensor in under(arrays, name).items():
+        for key, tensor in tensors_under(arrays, name).items():
             index, moment = key.split(".", 1)
             state.setdefault(int(index), {})[moment] = tensor.clone()
         optimizer.load_state_dict({**optimizer.state_dict(), "state": state})
 
 
-def under(arrays: Mapping[str, NDArray[Any]], prefix: str) -> dict[str, torch.Tensor]:
+def tensors_under(arrays: Mapping[str, NDArray[Any]], prefix: str) -> dict[str, torch.Tensor]:
     """Return the tensors whose names start with ``prefix.``, without it."""
-    start = f"{prefix}."
-    return {
-        key.removeprefix(start): torch.as_tensor(value)
-        for key, value in arrays.items()
-        if key.startswith(start)
-    }
+    return {name: torch.as_tensor(value) for name, value in under(arrays, prefix).items()}
 
 
 def versions() -> dict[str, str]:

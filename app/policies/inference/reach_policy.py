@@ -19,7 +19,7 @@ from app.policies.checkpoints.checkpoint import (
     expect_layout,
     require_purpose,
 )
-from app.policies.checkpoints.model_state import under
+from app.policies.checkpoints.model_state import tensors_under
 from app.policies.configs.fields import read_config
 from app.policies.configs.reach import ReachPreset
 from app.policies.inference.trained_policy import TrainedPolicy
@@ -236,7 +236,7 @@ def _moments_of(arrays: Mapping[str, NDArray[Any]], n_obs: int) -> tuple[Floats,
     """
     norm = RunningNormalisation(n_obs)
     try:
-        norm.load_state_dict(under(arrays, NORMALISATION))
+        norm.load_state_dict(tensors_under(arrays, NORMALISATION))
     except RuntimeError as error:
         raise CheckpointMismatch("tensors", "those of its normalisation", str(error)) from None
     mean, spread = norm.moments()

@@ -14,7 +14,7 @@ from app.policies.checkpoints.checkpoint import (
     expect_layout,
     require_purpose,
 )
-from app.policies.checkpoints.model_state import under
+from app.policies.checkpoints.model_state import tensors_under
 from app.policies.configs.fields import read_config
 from app.policies.configs.sorting import SortingPreset
 from app.policies.inference.trained_policy import TrainedPolicy
@@ -43,7 +43,7 @@ class SortingPolicy(TrainedPolicy):
         expect_layout(checkpoint, layout_of(self.shape), self.shape.n_actions)
         self._network = NETWORKS[preset.networks.kind](self.shape, preset.networks.width)
         try:
-            self._network.load_state_dict(under(checkpoint.arrays(), "q"))
+            self._network.load_state_dict(tensors_under(checkpoint.arrays(), "q"))
         except RuntimeError as error:
             raise CheckpointMismatch("tensors", "those of q", str(error)) from error
         self._network.eval()

@@ -15,7 +15,7 @@ from app.policies.checkpoints.checkpoint import (
     expect_layout,
     require_purpose,
 )
-from app.policies.checkpoints.model_state import under
+from app.policies.checkpoints.model_state import tensors_under
 from app.policies.checkpoints.trained_cell import cell_of
 from app.policies.configs.fields import read_config
 from app.policies.configs.pick import PickPreset
@@ -109,7 +109,7 @@ class ValueNetworks:
             parts["outcome"] = outcome
         for name, module in parts.items():
             try:
-                module.load_state_dict(under(arrays, name))
+                module.load_state_dict(tensors_under(arrays, name))
             except RuntimeError as error:
                 raise CheckpointMismatch("tensors", f"those of {name}", str(error)) from error
         base, fade = n, None

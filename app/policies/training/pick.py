@@ -15,7 +15,7 @@ from app.policies.algorithms.exploration import (
 from app.policies.algorithms.parameter_noise import ParameterNoise
 from app.policies.algorithms.td3 import BatchTD3, Networks, critics_of
 from app.policies.checkpoints.checkpoint import Checkpoint
-from app.policies.checkpoints.model_state import under
+from app.policies.checkpoints.model_state import tensors_under
 from app.policies.configs.pick import PickPeople, PickPreset
 from app.policies.networks.actor_critic import Critics
 from app.policies.networks.outcome import OutcomeHead
@@ -184,8 +184,8 @@ def fit_outcomes(
     actor = actor_of(preset, batch.obs_size)
     critic = critics_for(preset, batch.obs_size)
     arrays = policy.arrays()
-    actor.load_state_dict(under(arrays, "actor"))
-    critic.load_state_dict(under(arrays, "critic"))
+    actor.load_state_dict(tensors_under(arrays, "actor"))
+    critic.load_state_dict(tensors_under(arrays, "critic"))
     n_steps = round(OUTCOME_SHARE * learning.total_steps) // learning.n_envs
     data = collect(batch, actor, critic, n_steps, seed)
     return fit(data, seed) if len(np.unique(data.episode)) >= MIN_EPISODES else None

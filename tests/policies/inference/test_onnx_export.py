@@ -10,7 +10,7 @@ from app.errors import InvalidInput
 from app.policies.algorithms.td3 import critics_of
 from app.policies.checkpoints import pretrained
 from app.policies.checkpoints.checkpoint import Checkpoint, load, pack
-from app.policies.checkpoints.model_state import under, weights_of
+from app.policies.checkpoints.model_state import tensors_under, weights_of
 from app.policies.configs.pick import PICK, THESIS, PickPreset
 from app.policies.inference.onnx_export import LIMITS, export
 from app.policies.inference.reach_policy import LAYOUTS, PEOPLE_SET, ReachPolicy
@@ -82,7 +82,7 @@ def normalised_reach(obs: Vec) -> Checkpoint:
     """Return an untrained reach policy that normalises by given observations."""
     checkpoint = untrained_reach(seed=4, **NORMALISED)
     actor = networks_of(reach_preset(**NORMALISED), obs.shape[1]).actor()
-    actor.load_state_dict(under(checkpoint.arrays(), "actor"))
+    actor.load_state_dict(tensors_under(checkpoint.arrays(), "actor"))
     actor.norm.update(torch.as_tensor(obs))
     tensors = {**checkpoint.arrays(), **weights_of({"actor": actor})}
     return pack(checkpoint.manifest, tensors)

@@ -9,7 +9,7 @@ import torch
 from app.errors import CheckpointMismatch, InvalidInput
 from app.policies.checkpoints import checkpoint as formats
 from app.policies.checkpoints import pretrained
-from app.policies.checkpoints.model_state import under, weights_of
+from app.policies.checkpoints.model_state import tensors_under, weights_of
 from app.policies.inference.reach_policy import PEOPLE_SET, ReachPolicy
 from app.policies.training.reach import networks_of
 from app.sim.cells.cell import load_cell
@@ -37,7 +37,7 @@ def test_it_acts_as_the_network_that_was_trained(layers, kind):
     policy = ReachPolicy(checkpoint)
     preset = reach_preset(width=48, layers=layers, actor=kind)
     actor = networks_of(preset, policy.n_obs).actor()
-    actor.load_state_dict(under(checkpoint.arrays(), "actor"))
+    actor.load_state_dict(tensors_under(checkpoint.arrays(), "actor"))
     obs = np.random.default_rng(1).normal(size=(300, policy.n_obs)).astype(np.float32)
     with torch.no_grad():
         expected = actor(torch.as_tensor(obs)).numpy()
@@ -53,7 +53,7 @@ def test_a_normalised_actor_acts_as_in_training():
     n_obs = sum(size for _, size in checkpoint.manifest["layout"])
     actor = networks_of(reach_preset(**overrides), n_obs).actor()
     obs = 3.0 + 2.0 * np.random.default_rng(1).normal(size=(300, n_obs)).astype(np.float32)
-    actor.load_state_dict(under(checkpoint.arrays(), "actor"))
+    actor.load_state_dict(tensors_under(checkpoint.arrays(), "actor"))
     actor.norm.update(torch.as_tensor(obs))
     tensors = {**checkpoint.arrays(), **weights_of({"actor": actor})}
     policy = ReachPolicy(formats.pack(checkpoint.manifest, tensors))
@@ -96,7 +96,7 @@ def test_the_set_encoding_ignores_order_and_absent_people(kind):
     policy = ReachPolicy(checkpoint)
     preset = reach_preset(width=48, actor=kind, observation="people-set")
     actor = networks_of(preset, policy.n_obs).actor()
-    actor.load_state_dict(under(checkpoint.arrays(), "actor"))
+    actor.load_state_dict(tensors_under(checkpoint.arrays(), "actor"))
     obs = np.random.default_rng(1).normal(size=(50, policy.n_obs)).astype(np.float32)
     blocks = obs[:, PEOPLE_SET.first :].reshape(50, PEOPLE_SET.n_people, PEOPLE_SET.n_block)
     blocks[:, :, 0] = [1.0, 1.0, 1.0, 0.0]

@@ -5,7 +5,7 @@ import pytest
 import torch
 
 from app.policies.checkpoints import pretrained
-from app.policies.checkpoints.model_state import under
+from app.policies.checkpoints.model_state import tensors_under
 from app.policies.configs.pick import PICK, THESIS
 from app.policies.inference.value_networks import ValueNetworks, pick_preset_of
 from app.policies.networks.forward import FEW
@@ -27,7 +27,7 @@ def test_the_shipped_policy_decides_as_its_modules_of_torch_do(n: int) -> None:
         "outcome": OutcomeHead(networks.n_obs),
     }
     for name, module in parts.items():
-        module.load_state_dict(under(checkpoint.arrays(), name))
+        module.load_state_dict(tensors_under(checkpoint.arrays(), name))
     obs = PickBatch(load_cell(), n, 5, WHOLE_PICK).reset()
     act, values, found = networks.evaluate(obs)
     assert found is not None and networks.evaluate(obs, predict=False)[2] is None
@@ -48,7 +48,7 @@ def test_the_value_of_quantiles_is_the_least_mean(n: int) -> None:
     run, _ = start(PICK, 4, cell)
     checkpoint = run.policy()
     critics = critics_for(PICK, N_PICK)
-    critics.load_state_dict(under(checkpoint.arrays(), "critic"))
+    critics.load_state_dict(tensors_under(checkpoint.arrays(), "critic"))
     obs = PickBatch(cell, n, 5, settings_of(PICK)).reset()
     act, values, _ = ValueNetworks(checkpoint).evaluate(obs)
     with torch.inference_mode():
@@ -63,7 +63,7 @@ def test_a_policy_of_the_raw_state_decides_on_features(n: int) -> None:
     run, _ = start(THESIS, 4, cell)
     checkpoint = run.policy()
     actor, critics = run.model.actor.mu, critics_for(THESIS, 51)
-    critics.load_state_dict(under(checkpoint.arrays(), "critic"))
+    critics.load_state_dict(tensors_under(checkpoint.arrays(), "critic"))
     raw = PickBatch(cell, n, 5, settings_of(THESIS)).reset()
     obs = PickBatch(cell, n, 5, PickSettings(observation="features")).reset()
     act, values, found = ValueNetworks(checkpoint).evaluate(obs)
