@@ -130,7 +130,7 @@ def change_labels(store: Store, job_id: str, changes: Mapping[str, Any]) -> JobR
         if budgets and job.state == "succeeded":
             rule = f"must not be succeeded to change a budget of job {job.number}: resume it"
             raise WrongState("state", job.state, rule)
-        step = job.step
+        step: int | None = job.step
         if job.state in REPEATABLE:
             step = _newest_steps(connection, [job_id]).get(job_id)
         _require_left(job, budgets, {"step_budget": step or 0, "time_budget_s": job.run_s})
