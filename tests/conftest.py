@@ -54,7 +54,8 @@ FIRST = (
     ("browser/test_connections.py",),
     ("browser/test_training.py",),
 )
-"""Groups of test files, the longest first."""
+"""Groups of test files, the longest first. Marks ``xdist_group`` have no effect with pytest 9.2
+(https://github.com/pytest-dev/pytest-xdist/issues/1386)."""
 GROUPS = {f"tests/{file}": n for n, group in enumerate(FIRST) for file in group}
 
 
