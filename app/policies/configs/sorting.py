@@ -1,8 +1,9 @@
 """Training configurations of the sorting task: DQN (docs/method.md 1.4).
 
 Double, dueling and prioritised as in the thesis. Deviates: network, action mask, n-step
-returns, disturbed starts, people in the training and expert labels are ours; the thesis'
-recipe has its own presets.
+returns, disturbed starts, people in the training and expert labels are ours, and so are
+discount, learning rate, replay memory, exploration, uniform episode sizes and random failure
+maps; the thesis' recipe has its own presets.
 """
 
 from typing import Literal, Self
@@ -247,7 +248,8 @@ E1_PURE = SortingPreset(
     people=SortingPeople(human_rate=0.0),
     expert=ExpertLabels(share=0.0),
 )
-"""``sorting-e1-dqn`` without expert labels."""
+"""``sorting-e1-dqn`` without expert labels and people, with a wider network and larger
+minibatches."""
 SORTING_PRESETS = (
     E0,
     E1,

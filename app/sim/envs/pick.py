@@ -94,10 +94,10 @@ class PickEnv(SingleEnv):
     - c_v |v_tcp| [d <= d_v] + c_s [success]``; coefficients in ``PickSettings.weights``.
 
     ## Start
-    The robot rests at home, a cube or a dock in equal shares; the target is another station,
-    drawn uniformly; a worker is at a random time of a random script of primitives, a cylinder
-    anywhere in its area. Starts nearer to a person than ``start_clearance_m`` (0.05 m) are
-    drawn again, unless ``settings.start`` is ``uniform``.
+    The robot rests at home, a cube or a dock in about equal shares; the target is another
+    station, drawn uniformly; a worker is at a random time of a random script of primitives, a
+    cylinder anywhere in its area. Starts nearer to a person than ``start_clearance_m`` (0.05 m)
+    are drawn again, unless ``settings.start`` is ``uniform``.
 
     ## End
     Success, collision and timeout (12 s) *terminate*: the time left is observed, so a timeout

@@ -37,7 +37,9 @@ def separation_zone(arm: Arm, settings: SafetySettings, q: Vec, qd: Vec) -> Vec:
     """Return the outline of the area in which a person is nearer than S_p.
 
     The convex hull, in the horizontal plane, of all capsules, each grown by its own S_p for
-    people at the assumed speed; a part that is observed faster is stopped for further out.
+    people at the assumed speed; a part that is observed faster is stopped for further out. With
+    measured velocities it is the zone of cylinders at rest; workers are stopped for further
+    out.
 
     Args:
         q: Joint positions [rad], shape (6,).

@@ -180,7 +180,10 @@ def _draw_configuration(
 
 @kernel()
 def _draw_station(world: PickCell, candidates: Indices, q: Vec, rng: random.State) -> None:
-    """Write the configuration at home, a cube or a dock in equal shares, not at a candidate."""
+    """Write the configuration at home, a cube or a dock that is no candidate.
+
+    Kind and station are drawn again where it is one.
+    """
     n_stations = world.stations.shape[0]
     while True:
         kind = random.below(rng, 3)

@@ -68,7 +68,7 @@ SPREAD = np.array([1.5, 0.8, 0.8, 0.8, 0.8, 0.0])
 """Half width of the box around home or the present configuration in which waypoints are sampled
 [rad]."""
 STOP_SHARE = 0.25
-"""Share of samples whose waypoint is home or the present configuration itself."""
+"""Share of samples whose waypoint is the present configuration itself."""
 PERTURBED_SHARE = 0.7
 """Share of samples that perturb the incumbent, the best sample so far."""
 WIDEST, LONGEST = 0.3, 8.0
