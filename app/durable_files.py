@@ -2,12 +2,15 @@
 
 import errno
 import os
+from contextlib import suppress
 from pathlib import Path
 
-from app.storage_errors import StorageFull
+from app.storage_errors import StorageFull, StorageUnavailable
 
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 """Errors of a full disk."""
+UNREADABLE = (errno.EIO, errno.EROFS, errno.ESTALE)
+"""Errors of a disk that fails, is mounted read-only or is no longer there."""
 
 
 def write_durably(path: Path, content: bytes) -> None:
@@ -15,6 +18,7 @@ def write_durably(path: Path, content: bytes) -> None:
 
     Raises:
         StorageFull: No room is left.
+        StorageUnavailable: The disk fails, is mounted read-only or is no longer there.
     """
     unfinished = path.with_name(f"{path.name}.unfinished")
     try:
@@ -26,9 +30,13 @@ def write_durably(path: Path, content: bytes) -> None:
         unfinished.replace(path)
         sync_folder(path.parent)
     except OSError as error:
-        unfinished.unlink(missing_ok=True)
+        with suppress(OSError):  # a read-only folder
+            unfinished.unlink(missing_ok=True)
         if error.errno in FULL:
             raise StorageFull(str(path.parent)) from error
+        if error.errno in UNREADABLE:
+            reason = f"disk I/O: {error.strerror}"
+            raise StorageUnavailable(str(path.parent), reason) from error
         raise
 
 

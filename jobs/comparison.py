@@ -6,8 +6,9 @@ band reaches from the least to the greatest of them.
 
 import csv
 import io
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -229,7 +230,18 @@ def _groups(
         label = _label(values) or str(own.get("preset"))
         ids = tuple(job.id for job in members[key])
         groups.append(Group(label=label, jobs=ids, mean=mean, low=low, high=high, n=n))
-    return tuple(groups)
+    return _distinct(groups, {job.id: job.number for job in trained})
+
+
+def _distinct(groups: Sequence[Group], numbers: Mapping[str, int]) -> tuple[Group, ...]:
+    """Return the groups; those of the same label have the numbers of their jobs in it."""
+    labels = Counter(group.label for group in groups)
+    return tuple(
+        replace(one, label=f"{one.label} (job {', '.join(str(numbers[i]) for i in one.jobs)})")
+        if labels[one.label] > 1
+        else one
+        for one in groups
+    )
 
 
 def _label(values: Mapping[str, Any]) -> str:

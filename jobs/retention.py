@@ -16,6 +16,9 @@ from jobs import resume_files
 
 logger = logging.getLogger(__name__)
 
+MAX_JOBS_AT_ONCE = 20
+"""Jobs that are deleted at once; the supervisor renews its lease in between."""
+
 Loaded = TypeVar("Loaded")
 Used = TypeVar("Used")
 
@@ -90,8 +93,13 @@ class Retention:
             retention.delete_checkpoint(self.store, sha256, self.acting())
             self._note((sha256,))
 
-    def apply(self) -> None:
-        """Remove what is beyond the numbers to keep."""
+    def apply(self) -> bool:
+        """Remove what is beyond the numbers to keep, of at most ``MAX_JOBS_AT_ONCE`` jobs.
+
+        Returns:
+            Whether there may be more.
+        """
+        n_jobs = 0
         with self._lock:
             for job_id, removed in retention.prune(
                 self.store,
@@ -102,6 +110,10 @@ class Retention:
                 self._note(removed)
                 logger.info("job %s is deleted: the newest %d are kept", job_id, self.keep_jobs)
                 self._remove_files(job_id)
+                n_jobs += 1
+                if n_jobs == MAX_JOBS_AT_ONCE:
+                    return True
+        return False
 
     def _note(self, removed: Collection[str]) -> None:
         self._removals += 1

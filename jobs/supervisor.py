@@ -23,6 +23,7 @@ from pathlib import Path
 from opentelemetry.context import Context
 from opentelemetry.trace import NoOpTracer, Span, StatusCode, Tracer
 
+from app.durable_files import UNREADABLE
 from app.errors import Conflict, NotFound
 from app.storage_errors import LeaseLost, StaleAttempt, StorageFull, StorageUnavailable
 from app.store import attempts, completion
@@ -45,6 +46,7 @@ logger = logging.getLogger(__name__)
 MIN_FREE_BYTES = 64 * 1024 * 1024
 """Free space of the disk below which no job starts [bytes]."""
 DISK_FULL = "disk full"
+DISK_ERROR = "disk error"
 NO_RESOURCES = "no free resources"
 """No further process or file can be had on this machine."""
 _FOR_NOW = {
@@ -54,6 +56,7 @@ _FOR_NOW = {
     errno.ENOMEM: NO_RESOURCES,
     errno.EMFILE: NO_RESOURCES,
     errno.ENFILE: NO_RESOURCES,
+    **dict.fromkeys(UNREADABLE, DISK_ERROR),
 }
 """Errors that pass by themselves."""
 OTHER_SERVER = "another server runs the jobs"
@@ -204,18 +207,19 @@ class Supervisor:
         self._reap()
         self._retain()
         waiting = self._watch() or self._lack_of_room()
-        if waiting is None and time.monotonic() >= self._not_before:
-            if self._waiting is not None:
-                self._store.check_writable()
-                self._fill_reserve()
-                logger.info("the queue goes on after: %s", self._waiting)
+        goes_on = waiting is None and time.monotonic() >= self._not_before
+        if goes_on and self._waiting is not None:
+            self._store.check_writable()
+            self._fill_reserve()
+            logger.info("the queue goes on after: %s", self._waiting)
+        if goes_on:
             self._waiting = None
-            for one in self.composed:
-                one.advance(self._store)
-            while len(self._workers) < self._max_running and self._start_next():
-                pass
         elif waiting is not None:
             self._wait_for(waiting, waiting)
+        for one in self.composed:
+            one.advance(self._store, goes_on=goes_on)
+        while goes_on and len(self._workers) < self._max_running and self._start_next():
+            pass
 
     def _guarded(self, act: Callable[[], object]) -> None:
         """Log an error of the database once and try again at the next tick."""
@@ -286,8 +290,8 @@ class Supervisor:
         """Remove old jobs and files after the end of a worker, and once in a while."""
         if time.monotonic() >= self._retain_at:
             self._retain_at = time.monotonic() + self._timeouts.retain_s
-            if self._retention is not None:
-                self._retention.apply()
+            if self._retention is not None and self._retention.apply():
+                self._retain_at = -math.inf
             remove_unneeded(self._store, self._data_dir)
 
     def _settle(self, claim: Claim, worker: _Worker, ended: Exit) -> None:
@@ -345,6 +349,8 @@ class Supervisor:
         for worker in self._workers.values():
             self._executor.stop(worker.handle, force=False)
         while self._alive() and time.monotonic() < deadline:
+            if self._holds_lease:  # for the last states of the workers
+                self._guarded(self._lease.renew)
             time.sleep(0.05)
         for worker in self._alive():
             self._executor.stop(worker.handle, force=True)

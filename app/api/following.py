@@ -20,6 +20,7 @@ from app.policies.checkpoints.checkpoint import SORTING, purpose_of
 from app.policies.inference.live_reach_policy import TrainedReachPolicy
 from app.sim.cells.cell import Cell
 from app.sim.pick.task_policy import TaskPolicy
+from app.storage_errors import StorageFull, StorageUnavailable
 from app.store.checkpoints import list_checkpoints
 from app.store.jobs import find_job
 from app.store.records import JobRecord
@@ -103,6 +104,9 @@ def _refreshed(
         return _ended(follow, f"job {follow.number} was deleted"), choices
     try:
         now, choices = _updated(follow, world, choices, services)
+    except (StorageFull, StorageUnavailable) as error:
+        logger.warning("job %d cannot be looked at for now: %s", follow.number, error.message)
+        return follow, choices
     except ServiceError as error:
         return _ended(follow, error.message), choices
     if job.is_final:

@@ -45,6 +45,7 @@ class Server(uvicorn.Server):
         """Stop the jobs, whose workers may write over HTTP, then stop as uvicorn does."""
         services = getattr(self._app.state, "services", None)
         if services is not None:
+            services.readiness.ready, services.readiness.reason = False, "stopping"
             await run_in_threadpool(services.supervisor.stop)
         await super().shutdown(sockets)
         if self._traces is not None:

@@ -190,7 +190,7 @@ class SetSafety(LiveCommand):
     """Enable or disable the safety layer, and change its settings; null keeps a setting."""
 
     tag: Literal["set-safety"] = "set-safety"
-    on: bool
+    on: bool | None = None
     """whether the robot obeys the safety layer"""
     protective_distance: Annotated[float, Field(ge=0.0, le=2.0)] | None = None
     """least distance to people while the robot moves [m]"""

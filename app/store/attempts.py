@@ -64,11 +64,11 @@ def claim_next(store: Store) -> tuple[Claim, JobRecord] | None:
             return None
         step = _forget_beyond_resume(connection, job_id)
         attempt = read_job(connection, job_id).attempt + 1
-        now = datetime.now(UTC)
+        now, started = datetime.now(UTC), jobs.c.started_at
         changes = {
             "state": "running",
             "attempt": attempt,
-            "started_at": sa.func.coalesce(jobs.c.started_at, now),
+            "started_at": sa.func.coalesce(started, sa.literal(now, started.type)),
             "heartbeat_at": now,
             "step": max(step, 0),
             "waiting": None,
@@ -195,8 +195,13 @@ def load_resume(
     Args:
         usable: Whether what a state refers to is there, such as its files.
     """
-    with store.reading() as connection:
-        return next(filter(usable, _sound_states(connection, job_id)), None)
+    below: int | None = None
+    while True:
+        with store.reading() as connection:  # over before files are read
+            found = next(_sound_states(connection, job_id, below), None)
+        if found is None or usable(found):
+            return found
+        below = found.step
 
 
 def has_resume(store: Store, job_id: str) -> bool:
@@ -331,9 +336,13 @@ def _replace_resume(connection: sa.Connection, job_id: str, resume: ResumeState)
     connection.execute(sa.insert(resume_states).values(values))
 
 
-def _sound_states(connection: sa.Connection, job_id: str) -> Iterator[ResumeState]:
-    """Yield the undamaged resume states of a job, newest first."""
+def _sound_states(
+    connection: sa.Connection, job_id: str, below: int | None = None
+) -> Iterator[ResumeState]:
+    """Yield the undamaged resume states of a job, newest first; those of earlier steps."""
     mine = sa.select(resume_states).where(resume_states.c.job_id == job_id)
+    if below is not None:
+        mine = mine.where(resume_states.c.step < below)
     for row in connection.execute(mine.order_by(resume_states.c.step.desc())):
         if has_digest(row.digest, {"manifest": row.manifest}, row.tensors):
             yield ResumeState(step=row.step, manifest=row.manifest, tensors=row.tensors)

@@ -14,7 +14,13 @@ import sqlalchemy as sa
 
 from app.digests import has_digest
 from app.errors import Damaged, InvalidInput, NotFound
-from app.store.cursors import check_limit, decode_cursor, encode_cursor
+from app.store.cursors import (
+    MAX_INTEGER,
+    MAX_NUMBER,
+    check_limit,
+    decode_cursor,
+    encode_cursor,
+)
 from app.store.database.tables import aliases, checkpoints, job_checkpoints
 from app.store.engine import Store
 from app.store.records import CheckpointRecord, NewCheckpoint, Page
@@ -116,24 +122,26 @@ def list_checkpoints(
     """Return one page of the checkpoints, newest first.
 
     Args:
-        job_id: Only checkpoints of this job.
+        job_id: Only checkpoints of this job, by their steps in it: it may share one with an
+            older job.
         cursor: ``next_cursor`` of the page before; None for the first.
         limit: Length of the page, 1 to 200.
 
     Raises:
         InvalidInput: The cursor or limit is invalid.
     """
-    query = _described(job_id).order_by(checkpoints.c.number.desc())
-    query = query.limit(check_limit(limit) + 1)
-    below = decode_cursor(cursor)
+    found = _described(job_id).subquery()
+    place = found.c.number if job_id is None else found.c.step
+    query = sa.select(found).order_by(place.desc()).limit(check_limit(limit) + 1)
+    below = decode_cursor(cursor, MAX_NUMBER if job_id is None else MAX_INTEGER)
     if below is not None:
-        query = query.where(checkpoints.c.number < below)
+        query = query.where(place < below)
     with store.reading() as connection:
         rows = connection.execute(query).all()
         names = _names(connection)
     items = tuple(_record(row, names) for row in rows[:limit])
-    more = len(rows) > limit
-    return Page(items=items, next_cursor=encode_cursor(items[-1].number) if more else None)
+    last = getattr(rows[limit - 1], place.name) if len(rows) > limit else None
+    return Page(items=items, next_cursor=None if last is None else encode_cursor(last))
 
 
 def set_alias(store: Store, name: str, sha256: str) -> None:

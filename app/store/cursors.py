@@ -7,6 +7,8 @@ from app.errors import InvalidInput
 
 MAX_INTEGER = 2**63 - 1
 """Greatest integer of the database."""
+MAX_NUMBER = 2**31 - 1
+"""Greatest running number, such as of a job or an attempt: an INTEGER of PostgreSQL."""
 MAX_PAGE = 200
 """Longest page of a list."""
 
@@ -16,8 +18,11 @@ def encode_cursor(number: int) -> str:
     return base64.urlsafe_b64encode(f"n{number}".encode()).decode().rstrip("=")
 
 
-def decode_cursor(cursor: str | None) -> int | None:
+def decode_cursor(cursor: str | None, greatest: int = MAX_NUMBER) -> int | None:
     """Return the number of a cursor; None for the first page.
+
+    Args:
+        greatest: Greatest number that the list has.
 
     Raises:
         InvalidInput: The text was not made by :func:`encode_cursor`.
@@ -27,7 +32,7 @@ def decode_cursor(cursor: str | None) -> int | None:
     try:
         text = base64.urlsafe_b64decode(cursor + "=" * (-len(cursor) % 4)).decode()
         number = int(text.removeprefix("n"))
-        if not 0 <= number <= MAX_INTEGER:
+        if not 0 <= number <= greatest:
             raise ValueError(number)
     except (binascii.Error, ValueError) as error:
         rule = "must be a cursor that an earlier page returned"

@@ -26,10 +26,14 @@ class Composer(ABC):
     def __init__(self) -> None:
         self._next = 0.0
 
-    def advance(self, store: Store) -> None:
+    def advance(self, store: Store, *, goes_on: bool = True) -> None:
         """Advance the open jobs; at most once in a period.
 
         A job that cannot continue fails, so that it does not block others.
+
+        Args:
+            goes_on: Whether the queue goes on; otherwise only cancelled jobs advance, which may
+                free what it waits for.
 
         Raises:
             StorageFull: No room is left.
@@ -39,6 +43,8 @@ class Composer(ABC):
         if time.monotonic() < self._next:
             return
         for job in composed_jobs.open_jobs(store, self.kind):
+            if not goes_on and not job.cancel_requested:
+                continue
             try:
                 self._advance(store, job)
             except (StorageFull, StorageUnavailable, LeaseLost):

@@ -24,7 +24,10 @@ PAUSE_S = 1.0
 """Time until a request is repeated [s]."""
 PREFIX = "urn:tandem:problem:"
 FOR_NOW = (408, 425, 429, 502, 503, 504)
-"""Statuses of a server, or a proxy before it, that did not take a request for now."""
+"""Statuses of a server, or a proxy before it, that did not take a request for now.
+
+Tandem states its errors as problems: others below 500 are those of a proxy without a server.
+"""
 
 
 class ServiceConnection:
@@ -111,7 +114,8 @@ class ServiceConnection:
             raise StorageFull(str(problem.get("database", self._address)))
         if kind == "not-found":
             raise MissingAtServer(detail)
-        if answer.status_code in FOR_NOW:
+        of_proxy = not kind and answer.status_code < 500 and answer.status_code != 413
+        if answer.status_code in FOR_NOW or of_proxy:
             raise ServerUnreachable(self._address, f"{answer.status_code} {detail}")
         if answer.status_code >= 500:
             answer.raise_for_status()  # the attempt ends as a crash, and is repeated

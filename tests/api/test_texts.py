@@ -97,13 +97,15 @@ def test_integers_beyond_64_bits_are_refused_with_the_bound(
         assert answer.json()["field"] == field
         assert "9223372036854775807" in answer.json()["rule"]
     for path in ("/v1/jobs", "/v1/checkpoints"):
-        for cursor in (encode_cursor(number), encode_cursor(-number), encode_cursor(-1)):
+        beyond = (number, 2**31, -number, -1)
+        for cursor in map(encode_cursor, beyond):
             assert problem_of(client.get(path, params={"cursor": cursor}))["field"] == "cursor"
     assert client.get(f"{url}/metrics", params={"after_step": 2**63 - 1}).json()["items"] == []
 
 
 def test_the_greatest_cursor_is_one() -> None:
-    assert decode_cursor(encode_cursor(2**63 - 1)) == 2**63 - 1
+    assert decode_cursor(encode_cursor(2**31 - 1)) == 2**31 - 1
+    assert decode_cursor(encode_cursor(2**63 - 1), 2**63 - 1) == 2**63 - 1
 
 
 @pytest.mark.parametrize(

@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 from playwright.sync_api import Page, expect
 
+from app.policies.checkpoints import pretrained
 from app.policies.evaluation.statistics import wilson
 from tests.browser.test_drag import state, tell
 from tests.support import patient_http
@@ -301,7 +302,15 @@ def test_evaluation_is_shown_with_its_intervals(
     result = patient_http.get(f"{server}/v1/jobs/{posted.json()['id']}").json()["result"]
     success = result["results"][0]["success"]
     low, high = (f"{100 * success[end]:.1f}" for end in ("low", "high"))
-    expect(rows).to_contain_text(f"{100 * success['mean']:.1f} % ({low} to {high})")
+    interval = f"{100 * success['mean']:.1f} % ({low} to {high})"
+    expect(rows).to_contain_text(interval)
+    for alias in ("pick", "reach"):
+        card = page.locator(f'[data-checkpoint="{pretrained.SHA256[alias]}"]')
+        card.locator(".job-head").click()
+        card.locator("[data-action=compare-checkpoint]").check()
+    compared = page.locator("[data-role=checkpoint-differences]")
+    expect(compared).to_contain_text("Success in pick-single: ")
+    expect(compared).to_contain_text(interval)
 
 
 def test_evaluation_of_another_protocol_shows_its_own_measures(

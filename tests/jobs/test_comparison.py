@@ -13,10 +13,16 @@ from jobs.spec import TrainSpec, parse_spec
 from tests.support.databases import claimed
 
 
-def trained(store: Store, seed: int, values: list[float | None], **changes: Any) -> str:
+def trained(
+    store: Store,
+    seed: int,
+    values: list[float | None],
+    preset: str = "pick-td3",
+    **changes: Any,
+) -> str:
     """Add a training with a curve of a point every 10 steps."""
     overrides = {"learning": changes} if changes else {}
-    spec = TrainSpec(kind="train", preset="pick-td3", seed=seed, overrides=overrides)
+    spec = TrainSpec(kind="train", preset=preset, seed=seed, overrides=overrides)
     job = jobs.create_job(store, spec.new_job())
     found = claimed(store)
     for place, value in enumerate(values):
@@ -52,6 +58,15 @@ def test_jobs_of_other_seeds_are_one_group_and_other_values_another(store: Store
     assert found.differences.keys() == {"learning.gamma", "seed"}
     assert found.differences["seed"] == (1, 1, 2)
     assert found.differences["learning.gamma"][1] == 0.95
+
+
+def test_groups_that_a_preset_alone_does_not_tell_apart_have_the_numbers_of_jobs(
+    store: Store,
+) -> None:
+    first, other = trained(store, 1, [0.1]), trained(store, 1, [0.2], gamma=0.95)
+    third = trained(store, 1, [0.3], preset="sorting-e1-dqn")
+    labels = [group.label for group in compare(store, [first, other, third]).groups]
+    assert labels == ["pick-td3 (job 1)", "pick-td3 (job 2)", "sorting-e1-dqn"]
 
 
 def test_override_that_equals_the_preset_is_no_difference(store: Store) -> None:

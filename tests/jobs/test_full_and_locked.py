@@ -140,6 +140,7 @@ class Exhausted(LocalProcess):
         (errno.ENOSPC, "disk full"),
         (errno.EAGAIN, "no free resources"),
         (errno.EMFILE, "no free resources"),
+        (errno.EROFS, "disk error"),
     ],
 )
 def test_worker_that_cannot_be_started_for_now_is_started_later(

@@ -12,7 +12,7 @@ from app.store import attempts, completion, jobs
 from app.store.engine import Store
 from app.store.records import NewCheckpoint, NewJob, ResumeState
 from jobs.resume_files import KEEP_UNKNOWN_S, folder_of, remove_unneeded
-from jobs.retention import Retention
+from jobs.retention import MAX_JOBS_AT_ONCE, Retention
 from tests.support.databases import claimed
 
 
@@ -94,6 +94,18 @@ def test_what_is_no_folder_keeps_no_other_from_being_deleted(
         path.parent.touch()
     remove_unneeded(store, tmp_path)
     assert not any(path.exists() for path in paths)
+
+
+def test_jobs_beyond_those_to_keep_are_deleted_some_at_a_time(
+    store: Store, tmp_path: Path
+) -> None:
+    for _ in range(MAX_JOBS_AT_ONCE + 1):
+        jobs.request_cancel(store, jobs.create_job(store, NewJob(kind="x", spec={})).id)
+    keep = Retention(store=store, logs=tmp_path, keep_jobs=0, keep_states=0, acting=dict)
+    assert keep.apply()
+    assert len(jobs.list_jobs(store).items) == 1
+    assert not keep.apply()
+    assert jobs.list_jobs(store).items == ()
 
 
 def test_log_that_cannot_be_deleted_is_stated_and_its_job_is_deleted_with_its_files(

@@ -1,5 +1,6 @@
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing
 
 import pytest
 
@@ -204,6 +205,33 @@ def test_checkpoint_of_the_same_step_replaces_the_earlier(store: Store, claim: C
         (20, policy(b"c").sha256),
         (10, policy(b"a").sha256),
     ]
+
+
+def test_start_does_not_depend_on_the_time_zone_of_the_database(
+    store: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("PGTZ", "Asia/Tokyo")
+    with closing(Store(store.url)) as abroad:
+        created = jobs.create_job(abroad, NewJob(kind="count", spec={}))
+        claimed(abroad)
+        job = jobs.get_job(abroad, created.id)
+    assert job.started_at == job.heartbeat_at
+
+
+def test_files_of_a_state_are_checked_outside_of_transactions(
+    store: Store, claim: Claim
+) -> None:
+    """PostgreSQL ends a transaction that does nothing for 30 s."""
+    for step in (1, 2):
+        attempts.record_checkpoint(store, claim, step, policy(bytes([step])), resume(step))
+    asked = []
+
+    def usable(state: ResumeState) -> bool:
+        asked.append((state.step, store.engine.pool.checkedout()))
+        return state.step == 1
+
+    assert attempts.load_resume(store, claim.job_id, usable) == resume(1)
+    assert asked == [(2, 0), (1, 0)]
 
 
 def test_resume_state_goes_when_the_job_ends(store: Store, claim: Claim) -> None:

@@ -27,6 +27,21 @@ def test_checkpoint_of_a_job_is_found_by_its_hash(store: Store, claim: Claim) ->
     assert checkpoints.read_checkpoint(store, new.sha256) == (found, new.tensors)
 
 
+def test_newest_checkpoint_of_a_job_may_be_as_old_as_another_job(
+    store: Store, claim: Claim
+) -> None:
+    shared = policy(b"last")
+    attempts.record_checkpoint(store, claim, 30, shared)
+    again = second_job(store)
+    for step, one in ((10, policy(b"first")), (20, policy(b"second")), (30, shared)):
+        attempts.record_checkpoint(store, again, step, one)
+    pages = [checkpoints.list_checkpoints(store, job_id=again.job_id, limit=2)]
+    cursor = pages[0].next_cursor
+    pages.append(checkpoints.list_checkpoints(store, job_id=again.job_id, cursor=cursor))
+    assert [[one.step for one in page.items] for page in pages] == [[30, 20], [10]]
+    assert pages[1].next_cursor is None
+
+
 def test_imported_checkpoint_has_no_job(store: Store) -> None:
     found = checkpoints.put_checkpoint(store, policy(b"shipped"))
     assert (found.job_id, found.step) == (None, None)

@@ -16,6 +16,9 @@ export class Problem extends Error {
 /** No answer at all: the server is away or has stopped. */
 export class Unreachable extends Error {}
 
+/** Event of the window when the server no longer takes the page's token. */
+export const SIGN_IN = "tandem-sign-in";
+
 let aheadMs = 0;
 
 /** The time of the server [ms], from the last answer: the clock of this machine may be wrong. */
@@ -25,6 +28,7 @@ export function serverTime() {
 
 const ANSWER_MS = 15000;
 const FILE_MS = 180000;
+const QUIET_MS = 45000; // silence after which a stream is lost: the server writes every 15 s
 
 /**
  * Send one request, a body as JSON; resolves to the JSON answer, throws Problem or Unreachable,
@@ -67,6 +71,7 @@ async function send(path, { method = "GET", body, headers, signal, patience = AN
     }
     throw new Unreachable("the server does not answer");
   }
+  if (response.status === 401) dispatchEvent(new Event(SIGN_IN));
   if (!response.ok) throw new Problem(response.status, json);
   return json;
 }
@@ -103,6 +108,16 @@ export function inTurn(ask) {
     asking = false;
   };
   return { run, isAsking: () => asking };
+}
+
+/** Requests that wait for each other, so that the server gets them in the order of the clicks. */
+export function inOrder() {
+  let before = Promise.resolve();
+  return (ask) => {
+    const sent = before.then(ask);
+    before = sent.catch(() => {});
+    return sent;
+  };
 }
 
 /**
@@ -150,16 +165,19 @@ export function follow(path, { onEvent, onUp = () => {}, onDown = () => {}, last
 /** Read one response body as events until it ends; true when `handle` says it is over. */
 async function read(body, signal, handle) {
   const reader = body.pipeThrough(new TextDecoderStream()).getReader();
-  signal.addEventListener("abort", () => reader.cancel().catch(() => {}), { once: true });
+  const leave = () => void reader.cancel().catch(() => {});
+  signal.addEventListener("abort", leave, { once: true });
   let rest = "";
   for (;;) {
+    const quiet = setTimeout(leave, QUIET_MS);
     const { value, done } = await reader.read();
+    clearTimeout(quiet);
     if (done) return false;
     const blocks = (rest + value).replace(/\r\n?/g, "\n").split("\n\n");
     rest = blocks.pop();
     for (const block of blocks) {
       if (handle(fields(block))) {
-        reader.cancel().catch(() => {});
+        leave();
         return true;
       }
     }
@@ -185,9 +203,15 @@ function parse(text) {
   }
 }
 
-function wait(ms, signal) {
+/** Wait, no longer than until the signal aborts. */
+export function wait(ms, signal) {
   return new Promise((resolve) => {
-    const timer = setTimeout(resolve, ms);
-    signal.addEventListener("abort", () => (clearTimeout(timer), resolve()), { once: true });
+    const end = () => {
+      clearTimeout(timer);
+      signal.removeEventListener("abort", end);
+      resolve();
+    };
+    const timer = setTimeout(end, ms);
+    signal.addEventListener("abort", end);
   });
 }

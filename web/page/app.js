@@ -5,6 +5,7 @@ import { Controls } from "./live/controls.js";
 import { FirstUse } from "./firstuse.js";
 import { capital, sentence } from "./format.js";
 import { useFrameFocus } from "./framefocus.js";
+import { Guard } from "./guard.js";
 import { Close, Icon, Logo } from "./icons.js";
 import { isActive } from "./training/jobactions.js";
 import { useJobs } from "./training/jobs.js";
@@ -44,9 +45,9 @@ function App() {
   const training = useMemo(() => {
     const act = ({ purpose, sha256 }) =>
       cell.send({ tag: purpose === "sorting" ? "set-sorting-policy" : "set-policy", checkpoint: sha256 });
-    return html`<${Training} link=${link} jobs=${jobs} error=${error} waiting=${waiting} refresh=${refresh}
-      cell=${cell.cell?.name} presets=${checkpoints.presets} acting=${[acting, sortingPolicy]}
-      onAct=${act} />`;
+    return html`<${Guard}><${Training} link=${link} jobs=${jobs} error=${error} waiting=${waiting}
+      refresh=${refresh} cell=${cell.cell?.name} presets=${checkpoints.presets}
+      acting=${[acting, sortingPolicy]} onAct=${act} /></${Guard}>`;
   }, [link, jobs, error, waiting, acting, sortingPolicy, cell.cell?.name, checkpoints.presets]);
   if (link === "signin") return html`<${SignIn} />`;
   return html`<div class="frame" data-link=${link}>
@@ -66,8 +67,8 @@ function App() {
       <aside class="side" aria-label="Decision and training">
         <${Tabs} tab=${tab} onTab=${setTab} active=${active} />
         <div class="panel" id="panel-cell" role="tabpanel" aria-labelledby="tab-cell"
-          data-hidden=${tab !== "cell"}><${Decision} cell=${cell}
-            checkpoints=${checkpoints} jobs=${jobs} /></div>
+          data-hidden=${tab !== "cell"}><${Guard}><${Decision} cell=${cell}
+            checkpoints=${checkpoints} jobs=${jobs} /></${Guard}></div>
         <div class="panel" id="panel-training" role="tabpanel" aria-labelledby="tab-training"
           data-hidden=${tab !== "training"}>
           ${visited.current && training}</div>
@@ -95,7 +96,7 @@ function CellTitle({ cell: { cell, cells, show } }) {
 }
 
 function stamp(jobs) {
-  return (jobs ?? []).map((j) => j.state).join(",");
+  return (jobs ?? []).map((j) => `${j.id}:${j.state}`).join(",");
 }
 
 function useMedia(condition) {

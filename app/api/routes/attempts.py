@@ -23,7 +23,7 @@ from app.api.services import ServicesDep
 from app.errors import NotFound
 from app.policies.checkpoints.upload import join
 from app.policies.configs import presets
-from app.store.cursors import MAX_INTEGER
+from app.store.cursors import MAX_INTEGER, MAX_NUMBER
 from app.store.records import Claim
 from jobs.access import EndOfAttempt, StoreAccess
 from jobs.remote.uploads import (
@@ -52,7 +52,7 @@ FILES = {
 
 async def claim_of_path(
     job_id: str,
-    attempt: Annotated[int, Path(ge=1, le=MAX_INTEGER, description="number of the attempt")],
+    attempt: Annotated[int, Path(ge=1, le=MAX_NUMBER, description="number of the attempt")],
 ) -> Claim:
     """Return the claim that the path names."""
     return Claim(job_id=job_id, attempt=attempt)

@@ -74,7 +74,10 @@ class Difference(Answer):
 class CurveGroup(Answer):
     """Curve of the jobs that differ in nothing but the seed."""
 
-    label: str = Field(description="values of the fields that differ; the preset if none does")
+    label: str = Field(
+        description="values of the fields that differ; the preset if it differs or none does; "
+        "where several groups have the same, with the numbers of their jobs"
+    )
     jobs: list[str] = Field(description="their ids")
     mean: Sparse = Field(description="mean over the jobs at each of `steps`")
     low: Sparse = Field(description="least value of a job")

@@ -63,7 +63,8 @@ class LiveSafety:
 
     def change(self, command: SetSafety) -> None:
         """Enable or disable the layer, and change its settings."""
-        self._enabled, self.suspended = command.on, False
+        if command.on is not None:
+            self._enabled, self.suspended = command.on, False
         changed = command.model_dump(exclude={"tag", "on"}, exclude_none=True)
         if changed:
             self._layer = SafetyLayer(self._robot.arm, replace(self.settings, **changed))

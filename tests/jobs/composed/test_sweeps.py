@@ -180,6 +180,16 @@ def test_cancelled_sweep_ends_with_its_trials_and_goes_on_when_resumed(store: St
     assert (job.state, [one.number for one in trials]) == ("succeeded", [1, 2, 3])
 
 
+def test_cancelled_sweep_ends_while_the_queue_waits(store: Store) -> None:
+    cancelled, other = post(store, trials=2), post(store, trials=2)
+    look(store, cancelled)
+    jobs.request_cancel(store, cancelled.id)
+    for _ in range(2):
+        Sweeps().advance(store, goes_on=False)
+    assert jobs.get_job(store, cancelled.id).state == "cancelled"
+    assert jobs.get_job(store, other.id).state == "running"
+
+
 def test_sweep_ends_however_few_jobs_are_kept(store: Store) -> None:
     sweep = post(store, trials=3)
     for success in (0.2, 0.9, 0.4):

@@ -150,8 +150,21 @@ def test_layer_starts_with_the_settings_of_the_cell_and_takes_others(
     assert (after.human_speed, after.reaction_time, after.pfl) == (2.0, 0.2, True)
     assert after.required > before.required + 0.3
     world.apply(commands.SetSafety(on=False))
+    world.apply(commands.SetSafety(protective_distance=0.2))
     off = world.snapshot().safety
-    assert (off.on, off.override, off.protective_distance) == (False, 1.0, 0.3)
+    assert (off.on, off.override, off.protective_distance) == (False, 1.0, 0.2)
+
+
+def test_settings_that_change_in_a_case_study_do_not_disable_the_layer(
+    world: LivePickWorld,
+) -> None:
+    world.apply(commands.StartCase(id="case-1"))
+    assert not world.snapshot().safety.on
+    world.apply(commands.SetSafety(protective_distance=0.3))
+    assert not world.snapshot().safety.on
+    world.apply(commands.SetCandidates(ids=("cube1",)))
+    safety = world.snapshot().safety
+    assert (safety.on, safety.protective_distance) == (True, 0.3)
 
 
 def test_robot_does_not_set_off_into_a_person_after_a_pick(

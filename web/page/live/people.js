@@ -76,6 +76,9 @@ function MotionSource({ person, send, sized, onSized }) {
   useEffect(() => {
     if (shown) refresh();
   }, [shown, refresh]);
+  useEffect(() => {
+    if (playing) setOpen(false);
+  }, [playing]);
   const pick = (wanted) => {
     setOpen(wanted === "recorded");
     if (wanted !== "recorded") send({ tag: "set-mode", person: id, mode: wanted });

@@ -18,7 +18,7 @@ const DISTANCES = [0, 0.1, 0.3];
 export function SafetyControls({ world, send }) {
   const { safety } = world;
   const items = world.reach ? AMONG_CYLINDERS : AMONG_WORKERS;
-  const change = (fields) => send({ tag: "set-safety", on: safety.on, ...fields });
+  const change = (fields) => send({ tag: "set-safety", ...fields });
   const settings = (one) => (world.reach ? { use_measured_velocity: one === "measured" } : { pfl: one === "pfl" });
   return html`<span class="dock-pair"><span class="dock-label dock-label-free" id="layer-label">Safety layer</span>
     <${Segmented} labelledby="layer-label" mark=${marked("safety")} value=${layerOf(world)} items=${items}

@@ -1,6 +1,6 @@
 // The live cell as this page knows it: its last snapshot, its recent values, the link to it.
 import { useCallback, useEffect, useRef, useState } from "../vendor/htm-preact-standalone.module.js";
-import { follow, get, post, put, Unreachable } from "../api.js";
+import { follow, get, inOrder, post, put, SIGN_IN, Unreachable, wait } from "../api.js";
 import { Lost, Unconfirmed } from "../unconfirmed.js";
 import { History } from "./history.js";
 import { hidden, seen } from "../visibility.js";
@@ -45,8 +45,16 @@ export function useCell() {
 
   useEffect(() => {
     const stop = new AbortController();
+    const signIn = () => {
+      stop.abort();
+      setState((now) => ({ ...now, link: "signin" }));
+    };
     watch(stop.signal, history.current, unconfirmed.current, setState, setEpoch);
-    return () => stop.abort();
+    addEventListener(SIGN_IN, signIn);
+    return () => {
+      removeEventListener(SIGN_IN, signIn);
+      stop.abort();
+    };
   }, []);
 
   const report = useCallback(async (request) => {
@@ -63,7 +71,8 @@ export function useCell() {
       setErrors((now) => now.filter((one) => !(one instanceof Unreachable)));
     }
   }, [state.link]);
-  const send = useCallback((command) => report(carryOut(command, unconfirmed.current)), []);
+  const [posts] = useState(inOrder);
+  const send = useCallback((command) => report(carryOut(command, unconfirmed.current, posts)), []);
   const show = useCallback((name) =>
     report(put(`v1/worlds/${WORLD}/cell`, { cell: name }, { patience: CELL_MS })), []);
   const dismiss = () => setErrors([]);
@@ -71,11 +80,11 @@ export function useCell() {
 }
 
 /** Send a command; resolves once a snapshot shows its effect, throws if none does in time. */
-async function carryOut(command, unconfirmed) {
+async function carryOut(command, unconfirmed, posts) {
   const name = command.tag.replaceAll("-", " ");
   try {
     const options = { patience: COMMAND_MS };
-    const { number } = await post(`v1/worlds/${WORLD}/commands`, command, {}, options);
+    const { number } = await posts(() => post(`v1/worlds/${WORLD}/commands`, command, {}, options));
     await unconfirmed.wait(number, COMMAND_MS);
   } catch (problem) {
     if (problem instanceof Lost) {
@@ -140,10 +149,10 @@ async function watch(signal, history, unconfirmed, setState, setEpoch) {
       merge({ link });
     } catch (error) {
       isBack = false;
-      if (error.status === 401) return merge({ link: "signin" });
+      if (error.status === 401) return; // the page asks for the token
       merge({ link: error.silent ? "stale" : "lost", reason: error.message });
     }
-    await pause(signal);
+    await wait(RETRY_MS, signal);
   }
 }
 
@@ -160,7 +169,7 @@ async function ready(signal, merge) {
       if (signal.aborted) break;
       merge({ link: error.name === "TimeoutError" ? "stale" : "lost", reason: "" });
     }
-    await pause(signal);
+    await wait(RETRY_MS, signal);
   }
   return { first: false, stalled: false };
 }
@@ -183,17 +192,12 @@ function listen(onSilence) {
 /** Run `start(lost)` until `lost` is called or the signal aborts, then stop it. */
 function until(signal, start) {
   return new Promise((resolve) => {
-    const stop = start(() => {
+    const end = () => {
+      signal.removeEventListener("abort", end);
       stop();
       resolve();
-    });
-    signal.addEventListener("abort", () => (stop(), resolve()), { once: true });
-  });
-}
-
-function pause(signal) {
-  return new Promise((resolve) => {
-    const timer = setTimeout(resolve, RETRY_MS);
-    signal.addEventListener("abort", () => (clearTimeout(timer), resolve()), { once: true });
+    };
+    const stop = start(end);
+    signal.addEventListener("abort", end);
   });
 }

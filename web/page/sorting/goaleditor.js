@@ -1,10 +1,8 @@
 // The goal, tower by tower: what stands there now beside what shall stand there. Blocks are
 // clicked in from below and out of the tower; the largest always lies at the bottom.
-import { html, useEffect, useRef, useState } from "../vendor/htm-preact-standalone.module.js";
+import { html, useState } from "../vendor/htm-preact-standalone.module.js";
 import { Block, kindOf, nameOf } from "./block-icon.js";
 import * as format from "../format.js";
-
-const SETTLE_MS = 2000;
 
 export function GoalEditor({ sorting, cell, send, picked, onPick }) {
   const [goal, setGoal] = useGoal(sorting, send);
@@ -89,30 +87,19 @@ function Offer({ colour, size, sizes, sorting, asked, onAdd }) {
 
 /**
  * The goal as sizes from the bottom by tower, and how to change it. What was clicked holds at
- * once; the world's own goal holds again when it agrees, or after a while in any case.
+ * once; the world's own goal holds again once it shows the newest click, or has not in time.
  */
 function useGoal(sorting, send) {
   const [draft, setDraft] = useState(null);
-  const timer = useRef(0);
   const known = {};
   for (const one of sorting.goal) (known[one.tower] ??= [])[one.level] = one.size;
-  const agrees = draft !== null && written(draft) === written(known);
-  useEffect(() => {
-    if (agrees) setDraft(null);
-  }, [agrees]);
-  useEffect(() => () => clearTimeout(timer.current), []);
-  const change = (towers) => {
+  const change = async (towers) => {
     const asked = Object.fromEntries(Object.entries(towers).filter(([, sizes]) => sizes.length));
     setDraft(asked);
-    clearTimeout(timer.current);
-    timer.current = setTimeout(() => setDraft(null), SETTLE_MS);
-    send({ tag: "set-goal", towers: asked });
+    await send({ tag: "set-goal", towers: asked });
+    setDraft((now) => (now === asked ? null : now));
   };
   return [draft ?? known, change];
-}
-
-function written(towers) {
-  return Object.keys(towers).sort().map((id) => `${id}:${towers[id].join(",")}`).join(";");
 }
 
 function sorted(chosen, sizes) {

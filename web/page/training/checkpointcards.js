@@ -1,7 +1,7 @@
 // Stored checkpoints: card, use, evaluations, aliases, upload, delete, two of them side by side.
 import { html, useEffect, useState } from "../vendor/htm-preact-standalone.module.js";
 import { Ask, Fault, useAction } from "../action.js";
-import { postFile, put, remove } from "../api.js";
+import { inTurn, postFile, put, remove } from "../api.js";
 import * as format from "../format.js";
 import { Alert, Icon } from "../icons.js";
 import { answers } from "../live/world-stream.js";
@@ -18,9 +18,9 @@ export function CheckpointCards({ link, jobs, acting, presets, protocols }) {
   const [error, setError] = useState(null);
   const [open, setOpen] = useState(null);
   const [pair, setPair] = useState([]);
-  const refresh = () => storedCheckpoints().then(
-    (stored) => { setList(stored); setError(null); }, setError);
-  const stamp = (jobs ?? []).map((job) => job.state).join();
+  const [{ run: refresh }] = useState(() => inTurn(() => storedCheckpoints().then(
+    (stored) => { setList(stored); setError(null); }, setError)));
+  const stamp = (jobs ?? []).map((job) => `${job.id}:${job.state}:${job.step}`).join();
   useEffect(() => { if (answers(link)) refresh(); }, [link, stamp]);
   const choose = (sha256) => setPair((now) =>
     (now.includes(sha256) ? now.filter((one) => one !== sha256) : [...now, sha256].slice(-2)));
@@ -40,7 +40,7 @@ export function CheckpointCards({ link, jobs, acting, presets, protocols }) {
     <ul class="jobs">${(list ?? []).map((one) => html`<${Card} key=${one.sha256} one=${one}
       open=${open === one.sha256} chosen=${pair.includes(one.sha256)} ...${{ acting, jobs, presets, protocols }}
       onOpen=${setOpen} onChoose=${choose} onChanged=${refresh} />`)}</ul>
-    ${list?.length >= PAGE && html`<p class="faint">The newest ${PAGE} and the shipped ones are
+    ${list?.length >= PAGE && html`<p class="faint">The newest ${PAGE} and those with an alias are
       shown.</p>`}
   </section>`;
 }
@@ -220,6 +220,7 @@ function flat(value, prefix = "") {
 
 function latestRates(one, jobs) {
   const found = evaluations(one, jobs).reverse().flatMap((job) =>
-    rates(job).map(([name, text]) => [`Success in ${job.spec.protocol}: ${name}`, text]));
+    (job.result?.results ?? []).filter((row) => row.success).map((row) =>
+      [`Success in ${job.spec.protocol}: ${row.name}`, format.interval(row.success)]));
   return Object.fromEntries(found);
 }

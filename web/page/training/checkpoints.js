@@ -12,13 +12,14 @@ const CHOOSING = "choosing tasks";
 const REACHING = "reaching goals";
 const SORTING = "sorting";
 
-/** The newest checkpoints and all shipped ones; `shipped` are the names of these. */
+/** The newest checkpoints and all with an alias; `shipped` are the aliases that came with Tandem. */
 export async function storedCheckpoints() {
   const [{ items }, aliases] = await Promise.all([get(`v1/checkpoints?limit=${PAGE}`), get("v1/aliases")]);
-  const shipped = aliases.items.filter((one) => one.shipped);
-  const older = shipped.filter(({ checkpoint }) => items.every(({ sha256 }) => sha256 !== checkpoint));
-  const found = await Promise.allSettled(older.map(({ name }) => get(`v1/checkpoints/${name}`)));
-  const names = shipped.map((one) => one.name);
+  const newest = new Set(items.map((one) => one.sha256));
+  const older = new Map(aliases.items.map((one) => [one.checkpoint, one.name]).filter(([id]) => !newest.has(id)));
+  const found = await Promise.allSettled([...older.values()].map((name) =>
+    get(`v1/checkpoints/${encodeURIComponent(name)}`)));
+  const names = aliases.items.filter((one) => one.shipped).map((one) => one.name);
   return [...items, ...found.flatMap(({ value }) => value ?? [])].map((one) =>
     ({ ...one, shipped: one.aliases.filter((name) => names.includes(name)) }));
 }

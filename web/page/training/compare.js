@@ -24,9 +24,7 @@ export function Comparison({ ids, presets, onClose }) {
   const query = ids.map((id) => `job=${encodeURIComponent(id)}`).join("&");
   const chosen = quantity ? `&quantity=${encodeURIComponent(quantity)}` : "";
   const { answer, error } = useAnswer(`v1/comparison?${query}${chosen}`);
-  const found = useMemo(() => answer && { ...answer,
-    groups: answer.groups.map((group) => ({ ...group, label: labelOf(group, answer, presets) })) },
-  [answer, presets.items]);
+  const found = useMemo(() => answer && { ...answer, groups: labelled(answer, presets) }, [answer, presets.items]);
   useEffect(() => dialog.current.showModal(), []);
   return html`<dialog class="compare" ref=${dialog} onClose=${onClose} data-role="comparison"
     aria-labelledby="compare-title">
@@ -65,7 +63,7 @@ function Curves({ found, query, dialog, onQuantity }) {
       <span>${!Number.isInteger(at)
       ? "last point of each curve" : format.count(found.steps[at], "step")}</span></p>
     <ul class="groups" data-role="groups">${found.groups.map((group, i) => html`
-      <li key=${group.label}><i class="line-mark" style=${{ background: colour(i) }}></i>
+      <li key=${group.jobs[0]}><i class="line-mark" style=${{ background: colour(i) }}></i>
         <b>${group.label}</b> <span>${seedsOf(group, found)}</span>
         <span class="readout">${readout(group, at ?? lastOf(group), found.quantity)}</span></li>`)}</ul>
     <p class="field-help">Line: mean over the seeds. Band: from the least to the greatest
@@ -151,6 +149,16 @@ function Differences({ found, presets }) {
         ${values.map((v, i) => html`<td key=${jobs[i].id}>${
           field === "preset" ? presetTitle(presets, v) : fieldValue(v)}</td>`)}</tr>`)}</tbody>
     </table></div>`;
+}
+
+/** The groups with their labels; groups of the same label have the numbers of their jobs, too. */
+function labelled(answer, presets) {
+  const labels = answer.groups.map((group) => labelOf(group, answer, presets));
+  return answer.groups.map((group, i) => {
+    if (labels.indexOf(labels[i]) === labels.lastIndexOf(labels[i])) return { ...group, label: labels[i] };
+    const numbers = answer.jobs.filter(({ id }) => group.jobs.includes(id)).map((job) => job.number);
+    return { ...group, label: `${labels[i]} (job ${numbers.join(", ")})` };
+  });
 }
 
 /** A group's values of the fields that differ between the trainings; the preset if none does. */

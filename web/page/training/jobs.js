@@ -19,6 +19,7 @@ import { whileSeen } from "../visibility.js";
 
 const POLL_MS = 2000;
 const PAGE = 50;
+const ACTIVE = ["queued", "running", "cancelling"]; // shown however many newer jobs there are
 const TONES = { queued: "quiet", running: "accent", cancelling: "warn", succeeded: "good",
   failed: "bad", cancelled: "quiet" };
 const OUTCOMES = [
@@ -42,7 +43,10 @@ export function useJobs(link) {
       if (over) return;
       try {
         const [own, all] = await Promise.all([get(`v1/jobs?part_of=none&limit=${PAGE}`), get("v1/jobs")]);
-        const items = [...own.items, ...all.items.filter((one) => one.part_of)];
+        const older = own.next_cursor ? await Promise.all(ACTIVE.map((one) =>
+          get(`v1/jobs?part_of=none&state=${one}`))) : [];
+        const found = [...own.items, ...all.items.filter((one) => one.part_of), ...older.flatMap((one) => one.items)];
+        const items = [...new Map(found.map((one) => [one.id, one])).values()];
         if (!over) setState({ jobs: items.sort(byNumber), error: null, waiting: own.waiting });
       } catch (error) {
         if (!over) setState((now) => ({ ...now, error }));
@@ -255,7 +259,7 @@ function Evaluation({ job, ...rest }) {
   const rows = job.result?.results ?? [];
   return html`<${JobFrame} job=${job} ...${rest}>
     <${Facts} entries=${[["Checkpoint", checkpoint?.length === SHA_256 ? format.short(checkpoint) : checkpoint ?? "–"],
-      ["Episodes", format.number(episodes)]]} />
+      ["Episodes", fieldValue(episodes)]]} />
     ${rows.length === 0 && !job.error && html`<p class="empty">${job.state === "queued"
       ? "Waiting for its turn; one job runs at a time."
       : isActive(job) ? "The rows are shown once all are known."

@@ -49,8 +49,12 @@ export function measuresOf(row) {
     if (unit === "%") return [[label, hasEnds ? format.interval(found) : format.percent(mean)]];
     const ends = hasEnds ? ` (${format.number(found.low)} to ${format.number(found.high)})` : "";
     const average = hasEnds ? ", mean" : "";
-    return [[label + average, (unit ? format.quantity(mean, unit) : format.number(mean)) + ends]];
+    return [[label + average, (unit ? format.quantity(mean, unit) : counted(mean)) + ends]];
   });
+}
+
+function counted(n) {
+  return Number.isInteger(n) ? format.grouped(n) : format.number(n);
 }
 
 /** Observed rate of an outcome, its predicted probability, and their difference over the bins. */

@@ -42,7 +42,7 @@ function TrialTable({ found, presets, preset, onOpen }) {
 }
 
 function shown(v) {
-  return typeof v === "number" ? format.number(v, 4) : fieldValue(v);
+  return typeof v === "number" && !Number.isInteger(v) ? format.number(v, 4) : fieldValue(v);
 }
 
 function stateOf(one) {

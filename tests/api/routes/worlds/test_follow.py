@@ -1,8 +1,11 @@
 from typing import Any
 
+import pytest
 from fastapi.testclient import TestClient
 
+from app.api import following
 from app.live.commands import SetPolicy
+from app.storage_errors import StorageUnavailable
 from app.store.checkpoints import drop_job_checkpoints
 from tests.api.answers import problem_of
 from tests.api.conftest import services_of
@@ -83,6 +86,23 @@ def test_own_policy_acts_again_where_a_restarted_training_lost_its_checkpoints(
     assert ended["reason"] == f"job {job['number']} is cancelled: it has no checkpoint"
     own = client.get("/v1/checkpoints/pick").json()["sha256"]
     until(client, lambda world: world["checkpoint"] == own)
+
+
+def test_follow_outlives_a_database_that_does_not_answer_for_now(
+    client: TestClient, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    job = client.post("/v1/jobs", json={**TRAIN, "priority": -100}).json()
+    assert client.put(f"{WORLD}/follow", json={"job": job["id"]}).json()["active"]
+
+    def away(*_: object, **__: object) -> None:
+        raise StorageUnavailable("tandem.db", "database is locked")
+
+    with monkeypatch.context() as patched:
+        patched.setattr(following, "list_checkpoints", away)
+        assert following.deploy_newest(services_of(client))
+    assert follow_of(client)["active"]
+    assert client.delete(f"{WORLD}/follow").status_code == 204
+    client.post(f"/v1/jobs/{job['id']}/cancel")
 
 
 def test_evaluation_and_unknown_job_are_not_followed(client: TestClient) -> None:
