@@ -100,3 +100,41 @@ def test_ages_are_by_the_clock_of_the_server(
     expect(shown).to_contain_text(re.compile("ago|just now"))
     expect(shown).not_to_contain_text("days")
     patient_http.delete(f"{server}/v1/checkpoints/{sha256}").raise_for_status()
+
+
+def test_page_asks_for_the_token_when_its_session_has_ended(
+    open_page: Callable[..., Page],
+) -> None:
+    page = open_page(scene=False)
+    ended = {"title": "Unauthorized", "detail": "This server needs its token."}
+    page.route("**/v1/jobs*", lambda route: route.fulfill(status=401, json=ended))
+    expect(page.locator("#token")).to_be_visible()
+
+
+def test_part_of_the_page_that_fails_leaves_the_others(open_page: Callable[..., Page]) -> None:
+    page = open_page(scene=False)
+    bad = {"id": "x", "number": 1, "kind": "evaluate", "state": "running", "spec": None}
+    answer = {"items": [bad], "next_cursor": None, "waiting": None}
+    page.route("**/v1/jobs*", lambda route: route.fulfill(json=answer))
+    page.wait_for_timeout(2500)  # the list is asked for again
+    page.click("#tab-training")
+    failed = page.locator("#panel-training [role=alert]")
+    expect(failed).to_contain_text("This part of the page has failed")
+    page.click("#tab-cell")
+    expect(page.locator("[data-chosen=true]")).to_be_visible()
+    page.unroute("**/v1/jobs*")
+    page.click("#tab-training")
+    page.wait_for_timeout(2500)
+    failed.get_by_role("button", name="Show it again").click()
+    expect(page.locator("#jobs-title")).to_be_visible()
+
+
+def test_change_of_the_protective_distance_is_nothing_else(
+    open_page: Callable[..., Page],
+) -> None:
+    page = open_page(scene=False)
+    for distance in (0.3, 0):
+        with page.expect_request("**/commands") as sent:
+            page.click(f'[data-choice="distance:{distance}"]')
+        command = {"tag": "set-safety", "protective_distance": distance}
+        assert sent.value.post_data_json == command
