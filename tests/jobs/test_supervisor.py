@@ -1,8 +1,10 @@
 import os
 import signal
+import time
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
+from threading import Thread
 
 import pytest
 
@@ -255,6 +257,27 @@ def test_server_paused_beyond_its_lease_stops_its_worker_and_waits(
         job = wait_until_final(store, job_id)  # the first server takes the lease again
     assert (job.state, job.attempt, job.failures) == ("succeeded", 3, 0)
     assert_counted_once(store, job_id, steps=100, seed=4)
+
+
+@POSTGRESQL_ONLY
+def test_stopping_server_keeps_its_lease_until_its_workers_have_ended(
+    store: Store, tmp_path: Path, executor: LocalProcess
+) -> None:
+    timeouts = replace(PATIENCE, lease_s=1.0, shutdown_s=4.0)
+    job_id = queue(store, steps=100, hold_at=[7], deaf=True)
+    lock = ServerLock(store, tmp_path / "b")
+    lock.acquire()
+    with supervised(store, tmp_path / "a", executor=executor, timeouts=timeouts) as first:
+        wait_for(store, job_id, lambda job: job.step == 5)
+        stop = Thread(target=first.stop)
+        stop.start()
+        time.sleep(2.5)
+        with pytest.raises(Conflict, match="holds the lease"):
+            Lease(store, lock).check()
+        stop.join()
+        Lease(store, lock).check()
+    lock.release()
+    assert jobs.get_job(store, job_id).state == "queued"
 
 
 @POSTGRESQL_ONLY
