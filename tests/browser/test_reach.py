@@ -68,6 +68,18 @@ def test_visitor_opens_the_cell_sees_it_reach_and_obstructs_it(
     page.wait_for_selector("[data-candidate]")
 
 
+def test_two_quick_changes_of_the_policy_both_hold(
+    open_page: Callable[..., Page], reaching: str
+) -> None:
+    page = open_page(scene=False)
+    page.locator('[data-choice="ahead:true"][aria-checked=true]').wait_for()
+    page.evaluate(
+        """() => ["between:false", "ahead:false"].forEach((one) =>
+             document.querySelector(`[data-choice="${one}"]`).click())"""
+    )
+    until(reaching, lambda one: one["reach"]["inference_mode"] == "direct", LIMIT_S)
+
+
 def test_goal_is_dragged_by_its_arrow(open_page: Callable[..., Page], reaching: str) -> None:
     tell(
         reaching,

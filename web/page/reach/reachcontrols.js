@@ -1,5 +1,5 @@
 // Controls of a reach cell: goal, safety layer, inference mode.
-import { html } from "../vendor/htm-preact-standalone.module.js";
+import { html, useRef } from "../vendor/htm-preact-standalone.module.js";
 import { Segmented } from "../choice.js";
 import { Icon } from "../icons.js";
 import { SafetyControls } from "../live/safetycontrols.js";
@@ -22,13 +22,14 @@ const AHEAD = [
 ];
 
 export function ReachControls({ world, send }) {
-  const { goal_mode: mode, inference_mode: current, inference_modes: modes } = world.reach;
-  const between = current.includes("interpolated");
-  const weighted = current.includes("distance-weighted");
-  const ahead = current.endsWith("-rollout");
-  const ask = (all, mixed, played) => {
-    const asked = [all && "distance-weighted", mixed && "interpolated"].filter(Boolean).join("-") || "direct";
-    send({ tag: "set-inference-mode", inference_mode: played ? `${asked}-rollout` : asked });
+  const { goal_mode: mode, inference_mode: shown, inference_modes: modes } = world.reach;
+  const clicked = useRef(null); // the mode of a click that the cell has not shown yet
+  const { between, weighted, ahead } = switchesOf(clicked.current ?? shown);
+  const ask = async (change) => {
+    const name = modeOf({ ...switchesOf(clicked.current ?? shown), ...change });
+    clicked.current = name;
+    await send({ tag: "set-inference-mode", inference_mode: name });
+    if (clicked.current === name) clicked.current = null;
   };
   return html`<div class="dock-row dock-wrap">
     <span class="dock-label" id="goal-label">Goal</span>
@@ -41,15 +42,26 @@ export function ReachControls({ world, send }) {
     ${modes.includes("interpolated") && html`<span class="dock-pair">
       <span class="dock-label dock-label-free" id="between-label">Target interpolation</span>
       <${Segmented} labelledby="between-label" mark=${marked("between")} value=${between} items=${BETWEEN}
-        onPick=${(one) => ask(weighted, one, ahead)} /></span>`}
+        onPick=${(one) => ask({ between: one })} /></span>`}
     ${modes.includes("direct-rollout") && html`<span class="dock-pair">
       <span class="dock-label dock-label-free" id="ahead-label">Rollout check (1 s)</span>
       <${Segmented} labelledby="ahead-label" mark=${marked("ahead")} value=${ahead} items=${AHEAD}
-        onPick=${(one) => ask(weighted, between, one)} /></span>`}
+        onPick=${(one) => ask({ ahead: one })} /></span>`}
     ${modes.includes("distance-weighted") && world.people.length > 1 && html`<span class="dock-pair">
       <span class="dock-label dock-label-free" id="beside-label">Policy sees</span>
       <${Segmented} labelledby="beside-label" mark=${marked("beside")} value=${weighted} items=${BESIDE}
-        onPick=${(one) => ask(one, between, ahead)} /></span>`}</div>`}`;
+        onPick=${(one) => ask({ weighted: one })} /></span>`}</div>`}`;
+}
+
+/** The switches of an inference mode. */
+function switchesOf(mode) {
+  return { between: mode.includes("interpolated"), weighted: mode.includes("distance-weighted"),
+    ahead: mode.endsWith("-rollout") };
+}
+
+function modeOf({ between, weighted, ahead }) {
+  const parts = [weighted && "distance-weighted", between && "interpolated"].filter(Boolean);
+  return (parts.join("-") || "direct") + (ahead ? "-rollout" : "");
 }
 
 function marked(name) {
