@@ -291,7 +291,8 @@ class Supervisor:
         if time.monotonic() >= self._retain_at:
             self._retain_at = time.monotonic() + self._timeouts.retain_s
             if self._retention is not None and self._retention.apply():
-                self._retain_at = -math.inf
+                self._retain_at = -math.inf  # the files in the last turn
+                return
             remove_unneeded(self._store, self._data_dir)
 
     def _settle(self, claim: Claim, worker: _Worker, ended: Exit) -> None:

@@ -120,6 +120,12 @@ def wait_until_ready(address: str, process: subprocess.Popen[bytes], log: Path) 
     pytest.fail(f"the server did not become ready:\n{log.read_text()[-4000:]}")
 
 
+def show(server: str, cell: str) -> None:
+    """Let the live world of a server be that of another cell."""
+    answer = patient_http.put(f"{server}/v1/worlds/main/cell", json={"cell": cell})
+    assert answer.status_code == 200, answer.text
+
+
 def free_port() -> int:
     """Return a port nobody listens on."""
     with socket.socket() as probe:

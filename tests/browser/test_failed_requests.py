@@ -79,7 +79,9 @@ def test_list_of_jobs_says_that_it_is_old_or_not_complete(
     page = open_page(scene=False)
     page.route("**/v1/jobs?*", lambda route: route.fulfill(json=listed))
     page.click("#tab-training")
-    expect(page.locator(".training")).to_contain_text("The newest 50 are shown.")
+    expect(page.locator(".training")).to_contain_text(
+        "The newest 50 are shown, and older ones that have not ended."
+    )
     page.unroute("**/v1/jobs?*")
     page.route("**/v1/jobs?*", lambda route: route.fulfill(status=500, body=""))
     alert = page.locator(".training .notice.bad").first

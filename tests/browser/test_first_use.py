@@ -6,8 +6,8 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from app.sim.cells.cell import load_cell
+from tests.browser.conftest import show
 from tests.browser.test_drag import state, tell, until
-from tests.support import patient_http
 
 pytestmark = pytest.mark.browser
 
@@ -19,14 +19,8 @@ LIMIT_S = 60.0
 def clean(server: str) -> Iterator[str]:
     """The server, in its first cell with a person at work afterwards."""
     yield server
-    world = f"{server}/v1/worlds/main/cell"
-    patient_http.put(world, json={"cell": load_cell().name}).raise_for_status()
+    show(server, load_cell().name)
     tell(server, {"tag": "set-mode", "mode": "auto"})
-
-
-def show(server: str, cell: str) -> None:
-    world = f"{server}/v1/worlds/main/cell"
-    patient_http.put(world, json={"cell": cell}).raise_for_status()
 
 
 def test_hint_places_a_hand_before_the_robot_and_stays_dismissed(

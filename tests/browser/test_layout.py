@@ -6,9 +6,9 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from app.sim.cells.cell import cell_names, load_cell
+from tests.browser.conftest import show
 from tests.browser.contrast import faint_text
 from tests.browser.test_drag import state, tell, until
-from tests.support import patient_http
 
 pytestmark = pytest.mark.browser
 
@@ -29,10 +29,9 @@ BARE_BUTTONS = """() => {
 @pytest.fixture(params=cell_names())
 def shown(request: pytest.FixtureRequest, server: str) -> Iterator[str]:
     """The server with one of the shipped cells."""
-    world = f"{server}/v1/worlds/main/cell"
-    patient_http.put(world, json={"cell": request.param}).raise_for_status()
+    show(server, request.param)
     yield server
-    patient_http.put(world, json={"cell": load_cell().name}).raise_for_status()
+    show(server, load_cell().name)
 
 
 def size_of(page: Page) -> tuple[int, int]:

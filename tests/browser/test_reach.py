@@ -7,9 +7,9 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from app.sim.cells.cell import load_cell
+from tests.browser.conftest import show
 from tests.browser.scene import drag_along
 from tests.browser.test_drag import state, tell, until
-from tests.support import patient_http
 
 pytestmark = pytest.mark.browser
 
@@ -23,11 +23,9 @@ GRIP_M = 0.15
 @pytest.fixture
 def reaching(server: str) -> Iterator[str]:
     """The server with the reach cell, one person, the clock running."""
-    world = f"{server}/v1/worlds/main/cell"
-    shown = patient_http.put(world, json={"cell": CELL.name})
-    assert shown.status_code == 200, shown.text
+    show(server, CELL.name)
     yield server
-    patient_http.put(world, json={"cell": load_cell().name}).raise_for_status()
+    show(server, load_cell().name)
 
 
 def goal(server: str) -> np.ndarray:

@@ -6,8 +6,8 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from app.sim.cells.cell import load_cell
+from tests.browser.conftest import show
 from tests.browser.test_drag import state, tell, until
-from tests.support import patient_http
 
 pytestmark = pytest.mark.browser
 
@@ -22,11 +22,6 @@ BLOCKS = {
 SPEED = "8"
 """The clock runs as fast as the machine holds it."""
 STEP_MS = 150_000
-
-
-def show(server: str, cell: str) -> None:
-    answer = patient_http.put(f"{server}/v1/worlds/main/cell", json={"cell": cell})
-    assert answer.status_code == 200, answer.text
 
 
 @pytest.fixture

@@ -9,9 +9,9 @@ import pytest
 from playwright.sync_api import Page, Route, expect
 
 from app.sim.cells.cell import load_cell
-from tests.browser.conftest import free_port, serving
+from tests.browser.conftest import free_port, serving, show
 from tests.browser.scene import VIEWER, expect_drawing
-from tests.browser.scenes.conftest import LIMIT_S, REACH, SORT, show
+from tests.browser.scenes.conftest import LIMIT_S, REACH, SORT
 from tests.browser.test_drag import state, tell, until
 
 pytestmark = pytest.mark.browser

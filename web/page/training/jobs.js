@@ -115,7 +115,7 @@ export function JobList({ jobs, error, onNew, ...rest }) {
       open=${rest.open === job.id} />`)}
   </ul>
   ${jobs.filter((job) => !job.part_of).length >= PAGE && html`<p class="faint">
-    ${`The newest ${PAGE} are shown.`}</p>`}`;
+    ${`The newest ${PAGE} are shown, and older ones that have not ended.`}</p>`}`;
 }
 
 function Job({ job, jobs, open, chosen, onChoose, ...rest }) {
