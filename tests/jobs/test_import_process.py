@@ -42,27 +42,31 @@ def test_import_that_takes_too_long_is_ended_and_named(monkeypatch: pytest.Monke
 
 LIMITED = """
 import sys
+import time
 from jobs import import_process
 import_process.MAX_CPU_S, import_process.MAX_MEMORY_BYTES = int(sys.argv[1]), int(sys.argv[2])
+while time.process_time() < float(sys.argv[3]):
+    pass
 import_process.main()
 """
 
 
 @pytest.mark.parametrize(
-    ("cpu_s", "memory", "error", "text"),
+    ("cpu_s", "memory", "spent_s", "error", "text"),
     [
-        (100, 1 << 24, BadRecording, "takes more than 16 MiB of memory to import"),
-        (1, 1 << 30, InvalidInput, r"takes more than 120 s of processor time .*cut it"),
+        (100, 1 << 24, 0.0, BadRecording, "takes more than 16 MiB of memory to import"),
+        (2, 1 << 30, 1.98, InvalidInput, r"takes more than 120 s of processor time .*cut it"),
     ],
 )
 def test_import_beyond_a_limit_is_ended_and_named(
     monkeypatch: pytest.MonkeyPatch,
     cpu_s: int,
     memory: int,
+    spent_s: float,
     error: type[InvalidInput],
     text: str,
 ) -> None:
-    command = (sys.executable, "-c", LIMITED, str(cpu_s), str(memory))
+    command = (sys.executable, "-c", LIMITED, *map(str, (cpu_s, memory, spent_s)))
     monkeypatch.setattr(import_process, "child_command", lambda _module: command)
     clip = csv_text(working(20_000)).encode()
     with pytest.raises(error, match=text):
