@@ -75,6 +75,10 @@ def test_shipped_checkpoints_are_choices_behind_a_page_of_newer_ones(
     expect(options).to_contain_text(
         ["pick · Pick and place (TD3)", "pick-monitored · Pick and place under SSM (TD3)"]
     )
+    page.click("#tab-training")
+    page.click('[data-kind="evaluate"]')
+    page.select_option("#evaluate-protocol", "pick-single")
+    expect(page.locator("#evaluate-checkpoint")).to_contain_text("pick-monitored · ")
 
 
 def test_active_policy_that_is_no_longer_stored_says_so(open_page: Callable[..., Page]) -> None:

@@ -26,7 +26,8 @@ class RandomActor:
         self.goals, self.view, self.action = goals, view, action or ActionSettings()
         self.cell, self.cell_sha256 = cell.name, cell.sha256
         region = cell.goal_region
-        known = {"grid": region.targets, "halton": lambda: halton_targets(region)}
+        known = dict.fromkeys(("grid", "in-turn"), region.targets)
+        known["halton"] = lambda: halton_targets(region)
         self.targets = known[goals]() if goals in known else None
         self.trained_range = trained_range or {}
         rng = np.random.default_rng(12)

@@ -9,7 +9,7 @@ from pydantic import Field
 from app.api.schemas.examples import MOTION, shows
 from app.api.schemas.numbers import Answer, Body, Data, Vector3, Vector6
 from app.api.schemas.people import PersonInput, PersonUse
-from app.api.schemas.robot_state import ROS_NAMES, RobotState
+from app.api.schemas.robot_state import ROS_NAMES, ArmState
 from app.api.schemas.separation import Override, SafetyInput
 from app.api.schemas.task_selection import FRAME_TEXT, FrameName, OutOfRangeInput, Stamp
 from app.sim.core.arrays import Vec
@@ -24,16 +24,6 @@ from app.sim.reach.motion_types import (
 from app.sim.robot.trajectory_segment import TrajectorySegment
 from app.sim.safety.decision import SafetyDecision, powers_of_time
 from app.sim.safety.layer import SafetySettings
-
-
-class ArmState(RobotState):
-    """Measured state of the robot, with accelerations."""
-
-    qdd: Vector6 | None = Field(
-        None,
-        description="joint accelerations [rad/s^2], in the same order; required by policies "
-        "with jerk limits",
-    )
 
 
 class MotionRequest(Body):

@@ -9,7 +9,7 @@ from app.api.schemas.examples import PLAN, shows
 from app.api.schemas.motion import SegmentPublic
 from app.api.schemas.numbers import Answer, Data, Vector3
 from app.api.schemas.people import PersonInput, PersonUse
-from app.api.schemas.robot_state import RobotState
+from app.api.schemas.robot_state import ArmState
 from app.api.schemas.sorting import SortingFields, SortingMove, Word, move_of
 from app.api.schemas.task_selection import (
     FRAME_TEXT,
@@ -46,7 +46,7 @@ class PlanRequest(SortingFields):
     cell: str = Field(max_length=64, description="name of a sorting cell")
     frame: FrameName = Field("robot-base", description=FRAME_TEXT)
     stamp: Stamp = Field(None, description="your time of the state; returned unchanged")
-    robot: RobotState
+    robot: ArmState
     people: Sequence[PersonInput] = Field(
         max_length=MAX_SKELETONS, description="people in the cell, as in `/v1/task-selection`"
     )
@@ -99,6 +99,7 @@ class PlanRequest(SortingFields):
         return PlanQuery(
             q=self.robot.joints(self.robot.q),
             qd=self.robot.joints(self.robot.qd),
+            qdd=None if self.robot.qdd is None else self.robot.joints(self.robot.qdd),
             people=people,
             state=state,
             held=None if self.held is None else self._held(self.held, names, state),

@@ -67,6 +67,16 @@ class RobotState(Body):
         return _FaultsInPlace(self)
 
 
+class ArmState(RobotState):
+    """Measured state of the robot, with accelerations."""
+
+    qdd: Vector6 | None = Field(
+        None,
+        description="joint accelerations [rad/s^2], in the same order; required by policies "
+        "with jerk limits",
+    )
+
+
 @dataclass(frozen=True, slots=True)
 class _FaultsInPlace:
     """Context of a decision; without a generator, which takes five times as long."""

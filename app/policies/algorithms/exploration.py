@@ -66,9 +66,9 @@ class PerEnvAR1Noise(Stateful):
         rng: np.random.Generator,
     ) -> None:
         n_envs = shape[0]
-        self.n_greedy = max(1, round(config.greedy_share * n_envs))
-        scales = np.geomspace(0.1, 1.0, max(1, n_envs - self.n_greedy)) * config.sigma_max
-        self._sigma = np.concatenate([np.zeros(self.n_greedy), scales])[:n_envs, None]
+        self.n_greedy = config.n_greedy(n_envs)
+        scales = np.geomspace(0.1, 1.0, n_envs - self.n_greedy) * config.sigma_max
+        self._sigma = np.concatenate([np.zeros(self.n_greedy), scales])[:, None]
         self._memory = math.exp(-dt / config.noise_time_s)
         self._noise, self._rng = np.zeros(shape), rng
 

@@ -248,11 +248,18 @@ class PickPreset(TrainingConfig):
         if (actor == "plain") != (episode.observation == "state"):
             rule = "must be plain with observation = state, and residual with features"
             raise InvalidInput("networks.actor", actor, rule)
+        if self.action.meaning == "coefficient" and (
+            actor == "residual" or self.action.degree == 3
+        ):
+            rule = "must be speed with actor = residual, or with degree = 3"
+            raise InvalidInput("action.meaning", self.action.meaning, rule)
         if self.exploration.noise == "parameters" and (
             actor != "plain" or self.learning.progress_episodes == 0
         ):
             rule = "needs actor = plain and progress_episodes above 0"
             raise InvalidInput("exploration.noise", self.exploration.noise, rule)
+        if self.exploration.noise == "ar1":
+            self.exploration.check_noise(self.learning.n_envs)
         return self
 
 

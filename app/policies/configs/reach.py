@@ -10,7 +10,6 @@ from typing import Literal, Self
 from pydantic import model_validator
 
 from app.errors import InvalidInput
-from app.policies.checkpoints.checkpoint import MAX_BYTES
 from app.policies.configs.fields import (
     CellName,
     FieldGroup,
@@ -27,9 +26,6 @@ from app.policies.configs.td3 import (
 )
 from app.sim.reach.batch import GoalRule, LimitRule, StartRule, ViewName
 from app.sim.reach.goal_sets import MOST_HALTON, N_HALTON
-
-MOST_SEEN = 256
-"""Upper bound of the inputs of a network, its smaller parts included."""
 
 
 class ReachLearning(TD3Learning):
@@ -56,22 +52,17 @@ class ReachNetworks(ActorCriticNetworks):
 
     @model_validator(mode="after")
     def _check(self) -> Self:
-        """Check the normalisation, and that the networks fit into a checkpoint.
+        """Check the kinds of network against each other.
 
         Raises:
-            InvalidInput: The normalisation has no user, or the networks are too large.
+            InvalidInput: The normalisation has no user, or a critic has no layer for actions.
         """
         if self.normalisation == "running" and (self.actor, self.critic) != ("ddpg", "ddpg"):
             rule = "needs actor = ddpg and critic = ddpg"
             raise InvalidInput("networks.normalisation", self.normalisation, rule)
-        per_network = self.width * ((self.layers - 1) * self.width + MOST_SEEN)
-        size = 4 * (1 + self.n_critics) * per_network
-        if size > MAX_BYTES:
-            rule = (
-                f"makes networks of {size / 2**20:.0f} MB with layers = {self.layers} and "
-                f"n_critics = {self.n_critics}; must stay below {MAX_BYTES // 2**20} MB"
-            )
-            raise InvalidInput("networks.width", self.width, rule)
+        if self.critic == "ddpg" and self.layers < 2:
+            rule = "must be at least 2 with critic = ddpg, whose second layer takes the action"
+            raise InvalidInput("networks.layers", self.layers, rule)
         return self
 
 
@@ -162,16 +153,24 @@ class ReachPreset(TrainingConfig):
         Raises:
             InvalidInput: Two fields contradict each other.
         """
-        episode, people = self.episode, self.people
-        if self.networks.actor == "residual" and episode.observation == "state":
-            rule = "must be plain with observation = state"
-            raise InvalidInput("networks.actor", self.networks.actor, rule)
+        episode, people, actor = self.episode, self.people, self.networks.actor
+        if actor == "residual" and episode.observation == "state":
+            rule = "must be plain or ddpg with observation = state"
+            raise InvalidInput("networks.actor", actor, rule)
+        if actor == "ddpg" and episode.observation == "people-set":
+            rule = "must be residual or plain with observation = people-set"
+            raise InvalidInput("networks.actor", actor, rule)
+        if actor == "residual" and self.action.meaning == "coefficient":
+            rule = "must be speed with actor = residual, which adds to a joint speed"
+            raise InvalidInput("action.meaning", self.action.meaning, rule)
         if episode.safety == "ssm" and (
             episode.collision != "terminates" or people.n_people == 0
         ):
             rule = "needs n_people above 0 and collision = terminates"
             raise InvalidInput("episode.safety", episode.safety, rule)
         self._check_blocked()
+        if self.exploration.noise == "ar1":
+            self.exploration.check_noise(self.learning.n_envs)
         if people.count == "up-to" and (
             not 1 <= people.n_people <= self.learning.n_envs or episode.safety != "none"
         ):
@@ -188,6 +187,8 @@ class ReachPreset(TrainingConfig):
             raise InvalidInput("episode.collision", episode.collision, rule)
         if blocks and self.people.count == "up-to":
             raise InvalidInput("people.count", "up-to", "needs another collision than blocks")
+        if reward.c_o > 0.0 and episode.safety == "none":
+            raise InvalidInput("reward.c_o", reward.c_o, "needs safety = ssm")
         if not blocks and reward.c_u > 0.0:
             raise InvalidInput("reward.c_u", reward.c_u, "needs collision = blocks")
         if not blocks and reward.bonus != "added":

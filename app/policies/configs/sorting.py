@@ -45,7 +45,7 @@ class QNetworks(FieldGroup):
         "Network: weights shared between towers with an action mask, or two plain layers, "
         "without or with the failure probabilities",
     )
-    width: Whole = number(128, 16, 1024, "units", "Width of the hidden layers")
+    width: Whole = number(128, 16, 512, "units", "Width of the hidden layers")
 
 
 class EpsilonGreedy(FieldGroup):

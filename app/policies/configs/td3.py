@@ -5,8 +5,14 @@ from typing import Literal, Self
 from pydantic import model_validator
 
 from app.errors import InvalidInput
+from app.policies.checkpoints.checkpoint import MAX_BYTES
 from app.policies.configs.fields import FieldGroup, Learning, Whole, choice, number
 from app.sim.robot.actions import ActionSettings
+
+MOST_SEEN = 256
+"""Upper bound of the inputs of a network, its smaller parts included."""
+SPARE_BYTES = 1 << 18
+"""Bound of what a checkpoint has beside actor and critics: outcome probabilities, ranges."""
 
 
 class TD3Learning(Learning):
@@ -59,6 +65,24 @@ class ActorCriticNetworks(FieldGroup):
             raise InvalidInput("networks.dropped_quantiles", self.dropped_quantiles, rule)
         return self
 
+    @model_validator(mode="after")
+    def _check_size(self) -> Self:
+        """Check that the networks fit into a checkpoint.
+
+        Raises:
+            InvalidInput: They are too large.
+        """
+        per_network = self.width * ((self.layers - 1) * self.width + MOST_SEEN)
+        values = self.n_critics * self.n_quantiles * self.width
+        size = 4 * ((1 + self.n_critics) * per_network + values)
+        if size + SPARE_BYTES > MAX_BYTES:
+            rule = (
+                f"makes networks of {size / 2**20:.0f} MB with layers = {self.layers} and "
+                f"n_critics = {self.n_critics}; must stay below {MAX_BYTES // 2**20} MB"
+            )
+            raise InvalidInput("networks.width", self.width, rule)
+        return self
+
 
 class NoiseExploration(FieldGroup):
     """AR(1) noise whose scale differs between the environments."""
@@ -68,6 +92,20 @@ class NoiseExploration(FieldGroup):
     greedy_share: float = number(
         0.05, 0.0, 1.0, "", "Greedy share: environments without noise, at least one"
     )
+
+    def n_greedy(self, n_envs: int) -> int:
+        """Return the number of environments without noise."""
+        return max(1, round(self.greedy_share * n_envs))
+
+    def check_noise(self, n_envs: int) -> None:
+        """Check that some environments explore with AR(1) noise.
+
+        Raises:
+            InvalidInput: All are greedy.
+        """
+        if self.n_greedy(n_envs) >= n_envs:
+            rule = f"must leave environments with noise, of n_envs = {n_envs}"
+            raise InvalidInput("exploration.greedy_share", self.greedy_share, rule)
 
 
 class ActionConfig(FieldGroup):

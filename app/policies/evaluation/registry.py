@@ -31,6 +31,7 @@ from app.policies.evaluation.sorting.cycle_time import run_cycle_time
 from app.policies.evaluation.sorting.people import run_sorting_people
 from app.policies.evaluation.sorting.runs import run_grid, run_tests
 from app.sim.mocap.importer import Motion
+from app.sim.pick.cases import CASES_CELL
 
 Protocol = Callable[[Any, EvaluationRequest], Json]
 
@@ -74,6 +75,8 @@ WITHOUT_CHECKPOINT = frozenset({"safety-ssm"})
 """Protocols without a policy."""
 OF_SORTING = frozenset({"sorting-grid", "sorting-tests"})
 """Protocols of sorting policies; the pick policy executes full tasks."""
+OF_CASES = frozenset({"pick-cases", "pick-case-variants"})
+"""Protocols of the case studies, which are laid out for one cell."""
 OF_REACHING = frozenset(name for name in PROTOCOLS if name.startswith("reach-"))
 """Protocols of reach policies; all others are of pick policies."""
 MAX_EPISODES = 100_000
@@ -188,7 +191,8 @@ def check_task(name: str, manifest: Mapping[str, Any], found: str) -> None:
         found: Name of the checkpoint in the error.
 
     Raises:
-        InvalidInput: It is of another scenario; the rule lists the protocols of its own.
+        InvalidInput: It is of another scenario; the rule lists the protocols of its own. Or it
+            is of another cell than that of the case studies, or of an arm that contacts block.
     """
     wanted, actual = task_measured(name), purpose_of(manifest)
     if wanted != actual:
@@ -196,6 +200,12 @@ def check_task(name: str, manifest: Mapping[str, Any], found: str) -> None:
         known = sorted(one for one in fitting if task_measured(one) == actual)
         rule = f"must be {_POLICIES[wanted]} for {name}; protocols of this one"
         raise InvalidInput("checkpoint", found, f"{rule}: {', '.join(known)}")
+    if name in OF_CASES and manifest["cell"] != CASES_CELL:
+        rule = f"must be of the cell {CASES_CELL!r} for {name}, not of {manifest['cell']!r}"
+        raise InvalidInput("checkpoint", found, rule)
+    if name == "reach-oracle" and manifest["preset"]["episode"]["collision"] == "blocks":
+        rule = f"must be of a policy whose episodes end at contacts for {name}"
+        raise InvalidInput("checkpoint", found, rule)
 
 
 def check_motions(

@@ -189,9 +189,6 @@ class MotionDecider:
 
     def _numbers(self, query: MotionQuery) -> tuple[MeasuredState, Vec]:
         """Return the checked state of the robot and the checked goal."""
-        if query.qdd is None and self.actor.action.degree == 3:
-            rule = "must be given: this policy limits jerk, which needs the accelerations"
-            raise InvalidInput("robot.qdd", None, rule)
         robot = self._limits.take(query.q, query.qd, query.qdd)
         goal = checked_vector("goal", query.goal, 3, -_FAR, _FAR, "m")
         if not math.isfinite(query.time_left_s):

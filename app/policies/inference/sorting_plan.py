@@ -34,6 +34,7 @@ from app.sim.pick.task_policy import (
     PickProgress,
     TaskPolicy,
 )
+from app.sim.robot.measured_state import StateLimits
 from app.sim.robot.trajectory_segment import TrajectorySegment
 from app.sim.scene.scene import arm_of
 from app.sim.sorting.layout import APPROACH_M, above
@@ -59,6 +60,8 @@ class PlanQuery:
     """People in the cell."""
     state: SortingState
     """The sorting task; a held object counts where it was picked."""
+    qdd: Vec | None = None
+    """Joint accelerations [rad/s^2], shape (6,); required by policies with jerk limits."""
     held: int | None = None
     """Position from which the held object was picked; None: the gripper is empty."""
     previous: str | None = None
@@ -139,6 +142,7 @@ class SortingPlanner:
 
     def __init__(self, policy: TaskPolicy, cell: Cell) -> None:
         self._policy, self._cell, self._arm = policy, cell, arm_of(cell)
+        self._limits = StateLimits(self._arm, limits_jerk=policy.action.degree == 3)
         self._names = names_of(cell)
 
     def plan(self, query: PlanQuery) -> SortingPlan:
@@ -149,6 +153,7 @@ class SortingPlanner:
                 query is invalid.
         """
         started, held = time.perf_counter(), query.held
+        qdd = self._limits.take(query.q, query.qd, query.qdd).clamped.qdd
         near = self._near(query)
 
         def planned(**motion: Any) -> SortingPlan:
@@ -188,7 +193,7 @@ class SortingPlanner:
                 self._arm,
                 query.q,
                 query.qd,
-                np.zeros(6),
+                qdd,
                 decision.actions[at],
                 self._policy.action,
             ),

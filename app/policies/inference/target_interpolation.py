@@ -15,7 +15,7 @@ from app.sim.core.arrays import Vec
 from app.sim.reach.goal_sets import InterpolationWeights, TargetInterpolation, interpolation_of
 from app.sim.reach.reach_actor import ReachActor
 
-INTERPOLATING = ("grid", "halton")
+INTERPOLATING = ("grid", "in-turn", "halton")
 """Sets of training goals with targets to interpolate between."""
 
 

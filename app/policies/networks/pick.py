@@ -81,9 +81,11 @@ def critics_for(preset: PickPreset, n_obs: int) -> Critics:
     quantiles = sizes.critic == "quantiles"
     n_values = sizes.n_quantiles if quantiles else 1
     networks = [QNetwork(*shape, n_values) for _ in range(sizes.n_critics)]
+    critics: Critics
     if quantiles:
-        return QuantileCritics(*networks, dropped=sizes.dropped_quantiles)
-    critics = (MeanCritics if sizes.target_value == "mean" else Critics)(*networks)
+        critics = QuantileCritics(*networks, dropped=sizes.dropped_quantiles)
+    else:
+        critics = (MeanCritics if sizes.target_value == "mean" else Critics)(*networks)
     if sizes.actor == "plain":
         initialise_glorot(critics)
     return critics

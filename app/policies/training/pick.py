@@ -127,9 +127,13 @@ def values_of(actor: torch.nn.Module, critics: Critics) -> Values:
 
 
 def curve_batch(preset: PickPreset, cell: Cell) -> PickBatch:
-    """Return the environments of a point of the curve; robots start at the sampled starts."""
-    n = preset.learning.progress_episodes
-    return PickBatch(cell, n, CURVE_SEED, settings_of(preset))
+    """Return the environments of a point of the curve; robots start at the sampled starts.
+
+    Targets are drawn uniformly. The safety layer acts where it does in the training.
+    """
+    sampled = {"curriculum_steps": 0, "target_choice": "uniform"}
+    plain = preset.model_copy(update={"episode": preset.episode.model_copy(update=sampled)})
+    return batch_of(plain, cell, preset.learning.progress_episodes, CURVE_SEED)
 
 
 def exploration_of(preset: PickPreset, batch: PickBatch, seed: int) -> Exploration:

@@ -229,13 +229,14 @@ class DelaunayInterpolation:
 
 
 def interpolation_of(targets: Vec, rule: str) -> TargetInterpolation:
-    """Return the interpolation between targets [m], (n, 3), of ``"grid"`` or ``"halton"``.
+    """Return the interpolation between targets [m], (n, 3), of a grid or of a Halton set.
 
     Raises:
         InvalidInput: The rule has no targets.
     """
-    if rule == "grid":
+    if rule in ("grid", "in-turn"):
         return GridInterpolation(targets)
     if rule == "halton":
         return DelaunayInterpolation(targets)
-    raise InvalidInput("goals", rule, "has no targets to interpolate", ("grid", "halton"))
+    choices = ("grid", "in-turn", "halton")
+    raise InvalidInput("goals", rule, "has no targets to interpolate", choices)

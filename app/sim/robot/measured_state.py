@@ -73,11 +73,12 @@ class StateLimits:
 
     Args:
         arm: From :func:`~app.sim.scene.scene.arm_of`.
-        limits_jerk: Whether the policy needs accelerations. Where it does not, they are clamped
-            and flagged however far outside they are.
+        limits_jerk: Whether the policy limits jerk, and thus needs accelerations. Where it does
+            not, they are clamped and flagged however far outside they are.
     """
 
-    def __init__(self, arm: Arm, *, limits_jerk: bool = True) -> None:
+    def __init__(self, arm: Arm, *, limits_jerk: bool) -> None:
+        self._limits_jerk = limits_jerk
         stop_s = stop_time((1.0 + RATE_TOLERANCE) * arm.limits.qd_max, arm.limits.qdd_max)
         overrun = 0.5 * (1.0 + RATE_TOLERANCE) * arm.limits.qd_max * stop_s
         self._low = np.stack([arm.limits.q_min, -arm.limits.qd_max, -arm.limits.qdd_max])
@@ -99,12 +100,16 @@ class StateLimits:
         Args:
             q: Joint positions [rad], shape (6,).
             qd: Joint speeds [rad/s], shape (6,).
-            qdd: Joint accelerations [rad/s^2], shape (6,); zeros where None.
+            qdd: Joint accelerations [rad/s^2], shape (6,); zeros where None, which only a
+                policy takes that does not limit jerk.
 
         Raises:
             InvalidInput: Another number of joints, a number that is not finite, or one whose
-                excess over its limits is above the tolerance.
+                excess over its limits is above the tolerance; or no accelerations.
         """
+        if qdd is None and self._limits_jerk:
+            rule = "must be given: this policy limits jerk, which needs the accelerations"
+            raise InvalidInput("robot.qdd", None, rule)
         given = (q, qd, _AT_REST if qdd is None else qdd)
         values = np.concatenate(
             [_six(name, one) for (name, _), one in zip(PARTS, given, strict=True)]

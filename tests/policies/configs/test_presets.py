@@ -68,7 +68,11 @@ def test_an_unknown_preset_names_the_known_ones():
         ({"action": {"meaning": 1}}, "overrides.action.meaning"),
         ({"action": {"degree": 3, "bounds": "one-step"}}, "overrides.action.bounds"),
         ({"networks": {"actor": "plain"}}, "overrides.networks.actor"),
+        ({"action": {"meaning": "coefficient"}}, "overrides.action.meaning"),
+        ({"networks": {"width": 1024, "layers": 3}}, "overrides.networks.width"),
+        ({"networks": {"width": 512, "n_critics": 10}}, "overrides.networks.width"),
         ({"exploration": {"noise": "parameters"}}, "overrides.exploration.noise"),
+        ({"exploration": {"greedy_share": 1.0}}, "overrides.exploration.greedy_share"),
         ({"episode": {"curriculum_steps": 1000}}, "overrides.episode.curriculum_steps"),
         (
             {"learning": {"total_steps": 12_800, "progress_steps": 12_800}},
@@ -81,6 +85,35 @@ def test_a_bad_override_is_refused_by_name(overrides, field):
         presets.resolve("pick-td3", overrides)
     assert refused.value.field == field
     assert refused.value.rule
+
+
+@pytest.mark.parametrize(
+    ("preset", "overrides", "field"),
+    [
+        (
+            "reach-td3-people-set",
+            {"networks": {"actor": "ddpg"}},
+            "overrides.networks.actor",
+        ),
+        (
+            "reach-td3",
+            {"networks": {"critic": "ddpg", "layers": 1}},
+            "overrides.networks.layers",
+        ),
+        ("reach-td3", {"reward": {"c_o": 0.02}}, "overrides.reward.c_o"),
+        ("reach-td3", {"action": {"meaning": "coefficient"}}, "overrides.action.meaning"),
+        (
+            "reach-td3",
+            {"exploration": {"greedy_share": 1.0}},
+            "overrides.exploration.greedy_share",
+        ),
+        ("sorting-e0-dqn", {"networks": {"width": 1024}}, "overrides.networks.width"),
+    ],
+)
+def test_what_would_fail_late_or_have_no_effect_is_refused(preset, overrides, field):
+    with pytest.raises(InvalidInput) as refused:
+        presets.resolve(preset, overrides)
+    assert refused.value.field == field
 
 
 def test_presets_load_no_learning_library():
@@ -96,7 +129,7 @@ def test_default_action_is_the_viable_speed_of_degree_two():
 
 
 def test_overrides_choose_the_action():
-    chosen = {"action": {"bounds": "one-step", "meaning": "coefficient"}}
-    action = presets.resolve("pick-td3", chosen).action.settings
+    chosen = {"action": {"bounds": "one-step"}}
+    action = presets.resolve("pick-td3-thesis", chosen).action.settings
     assert action == ActionSettings(bounds="one-step", meaning="coefficient")
     assert presets.resolve("pick-td3", {"action": {"degree": 3}}).action.degree == 3

@@ -4,6 +4,8 @@ import pytest
 
 from app.errors import InvalidInput
 from app.policies.checkpoints import pretrained
+from app.policies.checkpoints.checkpoint import Checkpoint
+from app.policies.configs.reach import AUTHORS
 from app.policies.evaluation.registry import (
     MAX_SORTING_EPISODES,
     OF_REACHING,
@@ -11,6 +13,7 @@ from app.policies.evaluation.registry import (
     PROTOCOLS,
     WITH_MOTIONS,
     WITH_OR_WITHOUT_MOTIONS,
+    check_task,
     default_checkpoint,
     evaluate,
     most_episodes,
@@ -80,6 +83,21 @@ def test_full_sorting_tasks_are_executed_by_a_policy_that_picks():
     assert default_checkpoint("sorting-people") == "pick"
     with pytest.raises(InvalidInput, match="must be a policy that picks for sorting-people"):
         evaluate("sorting-people", untrained(), episodes=1)
+
+
+@pytest.mark.parametrize("name", ["pick-cases", "pick-case-variants"])
+def test_case_studies_are_of_one_cell(name):
+    shipped = pretrained.load("pick")
+    elsewhere = Checkpoint({**shipped.manifest, "cell": "another"}, shipped.tensors)
+    with pytest.raises(InvalidInput, match=f"of the cell 'pick-and-place' for {name}"):
+        evaluate(name, elsewhere, episodes=1)
+
+
+def test_search_of_avoidable_contacts_is_of_policies_that_contacts_end():
+    manifest = {**untrained_reach(width=16).manifest, "preset": AUTHORS.model_dump()}
+    with pytest.raises(InvalidInput, match="whose episodes end at contacts"):
+        check_task("reach-oracle", manifest, "authors")
+    check_task("reach-smoothness", manifest, "authors")
 
 
 @pytest.mark.parametrize("name", ["pick-single", "sorting-grid"])

@@ -14,6 +14,7 @@ from app.sim.human.person import Person
 from app.sim.pick.batch import step_robot
 from app.sim.pick.kernels.grasp import LIFT
 from app.sim.pick.task_policy import NOT_BEGUN, Decision, Objective, PickProgress
+from app.sim.robot.actions import ActionSettings
 from app.sim.scene.scene import arm_of
 from app.sim.sorting.names import names_of
 from app.sim.sorting.state import Move, SortingState, empty_state
@@ -82,6 +83,23 @@ def test_segment_is_the_first_control_cycle_of_the_policy_s_motion() -> None:
     wanted = step_robot(arm_of(CELL), HOME, np.zeros(6), np.zeros(6), act)
     np.testing.assert_array_equal(found.segment.c, wanted.c)
     assert np.abs(found.segment.qd).max() > 0.0
+
+
+def test_segment_of_limited_jerk_starts_at_the_measured_accelerations() -> None:
+    policy = StraightPolicy(CELL)
+    policy.action = ActionSettings(degree=3)
+    smooth = SortingPlanner(policy, CELL)
+    with pytest.raises(InvalidInput, match=r"robot\.qdd = None must be given"):
+        smooth.plan(query(task(5)))
+    qdd = np.array([0.3, -0.2, 0.1, 0.0, 0.2, 0.0])
+    found = smooth.plan(query(task(5), qdd=qdd))
+    assert found.segment is not None and found.decision is not None
+    act, rest = found.decision.actions[0], np.zeros(6)
+    wanted, from_rest = (
+        step_robot(arm_of(CELL), HOME, rest, start, act, policy.action) for start in (qdd, rest)
+    )
+    np.testing.assert_array_equal(found.segment.qd, wanted.qd)
+    assert np.abs(wanted.qd - from_rest.qd).max() > 1e-3
 
 
 def test_targets_lie_over_the_top_of_a_tower_and_over_its_next_level() -> None:

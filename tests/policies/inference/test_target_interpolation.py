@@ -10,7 +10,7 @@ from app.sim.reach.kernels.observation import N_FEATURES
 from tests.policies.reach_actor import RandomActor
 
 
-@pytest.mark.parametrize(("goals", "n_corners"), [("grid", 8), ("halton", 4)])
+@pytest.mark.parametrize(("goals", "n_corners"), [("grid", 8), ("in-turn", 8), ("halton", 4)])
 def test_targets_around_a_goal_come_with_their_positions(goals: str, n_corners: int) -> None:
     between = Interpolation(RandomActor(goals))
     mix, places = between.around(np.array([[0.02, 0.71, 0.33], [0.4, 0.9, 0.2]]))
@@ -30,7 +30,7 @@ def test_targets_without_weight_are_not_asked_for() -> None:
 
 
 def test_only_policies_with_targets_interpolate() -> None:
-    assert interpolates(RandomActor("grid")) and interpolates(RandomActor("halton"))
+    assert all(interpolates(RandomActor(one)) for one in ("grid", "in-turn", "halton"))
     assert not interpolates(RandomActor("box"))
     with pytest.raises(InvalidInput, match="no targets"):
         Interpolation(RandomActor("box"))

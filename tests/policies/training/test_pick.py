@@ -2,12 +2,20 @@
 
 import numpy as np
 import pytest
+import torch
 
-from app.policies.configs.pick import MONITORED, REACH_ONLY, THESIS, PickPreset
+from app.policies.configs.pick import MONITORED, REACH_ONLY, THESIS, PickNetworks, PickPreset
 from app.policies.inference.value_networks import ValueNetworks
 from app.policies.networks.pick import actor_of, critics_for
 from app.policies.training.outcome import collect
-from app.policies.training.pick import batch_of, collision_cost, settings_of, start, start_range
+from app.policies.training.pick import (
+    batch_of,
+    collision_cost,
+    curve_batch,
+    settings_of,
+    start,
+    start_range,
+)
 from app.sim.cells.cell import load_cell
 from app.sim.pick.batch import DEFAULT_WEIGHTS, PickBatch
 from app.sim.pick.curriculum_batch import CurriculumPickBatch
@@ -68,6 +76,25 @@ def test_monitored_preset_steps_under_the_layer_with_the_settings_of_the_cell():
     ended = batch.episode > 0
     assert (runs.override[ended] <= 1.0 + 1e-9).all()
     assert not isinstance(batch_of(PickPreset(), CELL, 2, 3), MonitoredPickBatch)
+
+
+def test_curve_is_measured_in_uniform_episodes_under_the_layer_of_the_training():
+    monitored = MONITORED.model_copy(
+        update={"learning": MONITORED.learning.model_copy(update={"progress_episodes": 4})}
+    )
+    assert isinstance(curve_batch(monitored, CELL), MonitoredPickBatch)
+    batch = curve_batch(THESIS, CELL)
+    assert type(batch) is PickBatch and batch.n_envs == THESIS.learning.progress_episodes
+
+
+def test_plain_actors_have_glorot_initialised_critics_of_either_kind():
+    for kind in ("mean", "quantiles"):
+        networks = PickNetworks(actor="plain", critic=kind, width=16)
+        critics = critics_for(THESIS.model_copy(update={"networks": networks}), 45)
+        biases = [
+            layer.bias for layer in critics.modules() if isinstance(layer, torch.nn.Linear)
+        ]
+        assert biases and all((bias == 0.0).all() for bias in biases)
 
 
 def test_the_recipe_is_tables_5_1_and_5_2():

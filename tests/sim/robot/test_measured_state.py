@@ -28,7 +28,8 @@ def at(joint: int, value: float, base: np.ndarray = NONE) -> np.ndarray:
 def test_a_state_at_its_limits_is_taken_as_it_is(cell: str) -> None:
     arm = arm_of(load_cell(cell))
     for q, sign in ((arm.limits.q_min, -1.0), (arm.limits.q_max, 1.0)):
-        state = StateLimits(arm).take(q, sign * arm.limits.qd_max, sign * arm.limits.qdd_max)
+        qd, qdd = sign * arm.limits.qd_max, sign * arm.limits.qdd_max
+        state = StateLimits(arm, limits_jerk=True).take(q, qd, qdd)
         assert state.outside == () and state.clamped is state.measured
 
 
@@ -37,7 +38,7 @@ def test_a_state_at_its_limits_is_taken_as_it_is(cell: str) -> None:
 def test_all_joints_over_every_limit_are_clamped_and_named(cell: str, side: float) -> None:
     arm = arm_of(load_cell(cell))
     q = (arm.limits.q_max if side > 0 else arm.limits.q_min) + side * 0.04
-    state = StateLimits(arm).take(
+    state = StateLimits(arm, limits_jerk=True).take(
         q, side * 1.04 * arm.limits.qd_max, side * 1.04 * arm.limits.qdd_max
     )
     assert len(state.outside) == 18 and {one.of for one in state.outside} == {"limits"}
@@ -61,7 +62,7 @@ def test_all_joints_over_every_limit_are_clamped_and_named(cell: str, side: floa
 def test_one_joint_over_one_limit_is_named_with_value_and_limit(
     q: np.ndarray, qd: np.ndarray, field: str, value: float, limit: float
 ) -> None:
-    (one,) = StateLimits(ARM).take(q, qd).outside
+    (one,) = StateLimits(ARM, limits_jerk=False).take(q, qd).outside
     assert (one.field, one.value, one.high) == (field, value, limit)
 
 
@@ -85,7 +86,14 @@ def test_numbers_that_are_no_state_are_refused_with_a_hint(
     q: np.ndarray, qd: np.ndarray, field: str, text: str
 ) -> None:
     with pytest.raises(InvalidInput, match=f"{field} = .*({text})"):
-        StateLimits(ARM).take(q, qd)
+        StateLimits(ARM, limits_jerk=False).take(q, qd)
+
+
+def test_accelerations_are_required_where_jerk_is_limited() -> None:
+    with pytest.raises(InvalidInput, match=r"robot\.qdd = None must be given"):
+        StateLimits(ARM, limits_jerk=True).take(HOME, NONE)
+    state = StateLimits(ARM, limits_jerk=False).take(HOME, NONE)
+    assert (state.clamped.qdd == 0.0).all()
 
 
 def test_joints_outside_their_limits_are_sent_inward_and_others_as_asked() -> None:

@@ -2,13 +2,14 @@
 import { html } from "../vendor/htm-preact-standalone.module.js";
 import { post } from "../api.js";
 import * as format from "../format.js";
+import { storedCheckpoints } from "./checkpoints.js";
 import { presetTitle } from "./fieldnames.js";
-import { Loading, OWN, parsed, protocolField, StartForm, useForm, useItems } from "./formfields.js";
+import { Loading, OWN, parsed, protocolField, StartForm, useForm, useItems, useLoaded } from "./formfields.js";
 
 const SEED = { ...OWN[0], default: 11 };
 
 export function EvaluateForm({ link, presets, protocols, onStarted, onClose }) {
-  const checkpoints = useItems(link, "v1/checkpoints?limit=200");
+  const checkpoints = useLoaded(link, storedCheckpoints);
   const recordings = useItems(link, "v1/recordings");
   const form = useForm({
     names: ["protocol", "checkpoint", "episodes", "seed", "name", "recordings"],

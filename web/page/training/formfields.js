@@ -48,13 +48,18 @@ export function useForm({ typed: first = {}, names, onDone, prefix = "train" }) 
 
 /** The items of a route, asked for while the server is there until it answers; or the error. */
 export function useItems(link, path) {
+  return useLoaded(link, (options) => get(path, options).then(({ items }) => items));
+}
+
+/** The items that `load` promises, asked for as those of a route are. */
+export function useLoaded(link, load) {
   const [state, setState] = useState({ items: null, error: null });
   useEffect(() => {
     if (!answers(link) || state.items) return undefined;
     const stop = new AbortController();
     let timer = null;
-    const ask = () => get(path, { signal: stop.signal }).then(
-      (answer) => setState({ items: answer.items, error: null }),
+    const ask = () => load({ signal: stop.signal }).then(
+      (items) => stop.signal.aborted || setState({ items, error: null }),
       (error) => {
         if (stop.signal.aborted) return;
         setState({ items: null, error });

@@ -167,9 +167,11 @@ def run_ssm(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
         without = None if condition.against is None else runs[condition.against]
         rows.append(row_of(name, runs[name], without))
     stated = {name: one.safety.describe() for name, one in CONDITIONS.items() if one.active}
+    started = picks.evaluator(CONDITIONS["ssm"], 0)
+    started.batch.reset()  # the first states of at most CHUNK episodes are stated
     return {
         "settings": {
-            **settings_of(picks.evaluator(CONDITIONS["ssm"], 0)),
+            **settings_of(started),
             "hysteresis": HYSTERESIS,
             "safety": stated,
         },

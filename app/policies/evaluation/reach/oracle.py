@@ -84,7 +84,12 @@ def soonest_arrivals(cell: Cell, settings: ReachSettings, goals: Vec, seed: int)
         goals: Goal of each episode [m], shape (n, 3).
     """
     different, which = np.unique(goals, axis=0, return_inverse=True)
-    rules = ReachSettings(people=(), action=settings.action, time_limit_s=settings.time_limit_s)
+    rules = ReachSettings(
+        people=(),
+        action=settings.action,
+        limits=settings.limits,
+        time_limit_s=settings.time_limit_s,
+    )
     alone = ReachBatch(cell, len(different), seed, rules)
     alone.reset()
     alone.set_goals(np.arange(len(different)), different)

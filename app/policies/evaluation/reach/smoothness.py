@@ -28,6 +28,7 @@ from app.policies.evaluation.statistics import wilson
 from app.policies.inference.controllers import Controller, controller_of
 from app.sim.core.arrays import Vec
 from app.sim.reach.batch import ReachBatch
+from app.sim.reach.blocked_batch import new_reach_batch
 from app.sim.robot.kernels.arm import Arm
 from app.sim.scenario.kernels import episode as kernel
 
@@ -182,7 +183,8 @@ def run_smoothness(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
     """Measure the smoothness of a policy's joint trajectories."""
     bench = ReachBench(checkpoint, request.seed, request.on_row)
     settings, n = bench.usual, request.episodes or DEFAULT_EPISODES
-    batch, goals = ReachBatch(bench.cell, n, request.seed, settings), bench.target_goals(n)
+    batch = new_reach_batch(bench.cell, n, request.seed, settings)
+    goals = bench.target_goals(n)
     paths = record_paths(batch, controller_of(bench.actor, "direct"), goals)
     row = {
         "name": f"degree-{settings.action.degree}",
