@@ -16,6 +16,7 @@ from app.sim.perception.keypoint_sensor_model import (
 )
 from app.sim.perception.keypoints import keypoints_of
 from app.sim.perception.person_estimator import PersonEstimate, PersonEstimator
+from tests.sim.perception.cylinder_contents import holds
 from tests.sim.tracked_person import RATE_HZ, cell_of, motion, work
 
 SECONDS = 12.0
@@ -106,7 +107,7 @@ def compare(
     body = human.joint_points(q, cell.body)
     fitted = human.joint_points(estimate.person.q, taken_for.body)
     found.center.append(float(np.linalg.norm(estimate.cylinder.center - center)))
-    found.contains.append(estimate.cylinder.contains(np.array(list(body.values()))))
+    found.contains.append(holds(estimate.cylinder, np.array(list(body.values()))))
     found.surface.append(holds_surface(estimate.cylinder, cell, q))
     found.wrist.extend(
         float(np.linalg.norm(body[name] - fitted[name])) for name in ("wrist_r", "wrist_l")

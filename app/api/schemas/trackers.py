@@ -62,8 +62,11 @@ class CylinderPublic(Answer):
 
     center: Listed = Field(description="x, y of the axis [m]")
     radius: float = Field(description="radius with factor and flesh margin [m]")
-    bottom: float = Field(description="lowest observed point [m]")
-    top: float = Field(description="highest observed point plus flesh margin [m]")
+    bottom: float = Field(description="lowest corner of the box of the observed body [m]")
+    top: float = Field(
+        description="highest corner of this box with the flesh margin, or the height that "
+        "unseen points may reach [m]"
+    )
     velocity: Listed = Field(description="velocity of the axis [m/s]")
 
 

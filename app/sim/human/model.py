@@ -84,6 +84,8 @@ Q_MAX.setflags(write=False)
 
 REST_ARM = (0.15, 0.18, 0.0, 0.6)
 """Arm hanging relaxed: flexion, abduction, rotation, elbow [rad]."""
+NEAREST_PALM = 0.16
+"""Least distance of a palm and its shoulder [m]."""
 EASY_REACH = 0.92
 """Share of an arm's length beyond which the torso helps."""
 
@@ -281,7 +283,8 @@ def _solve_arm(q: Vec, size: Vec, hand: str, target: Vec, swivel: float) -> Vec:
     offset = target - shoulder
     distance = float(np.linalg.norm(offset))
     line = offset / distance if distance > 1e-6 else -torso[:, 2]
-    span = min(max(distance, 0.16), upper + fore - 1e-4)
+    least = max(NEAREST_PALM, abs(upper - fore) + 0.01)  # the elbow is never quite folded
+    span = min(max(distance, least), upper + fore - 1e-4)
     along = (upper**2 - fore**2 + span**2) / (2.0 * span)
     across = math.sqrt(max(upper**2 - along**2, 0.0))
     pole = _elbow_pole(torso, line, side, swivel)

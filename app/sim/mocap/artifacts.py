@@ -23,7 +23,7 @@ MARGIN = 0.05
 MIN_RUN = 1.0
 """Shortest clean run [s]."""
 MAX_GAP = 0.1
-"""Longest time between two frames [s]."""
+"""Longest time between two frames [s], or three times the usual one where that is longer."""
 
 WATCHED = ("pelvis", "elbow_r", "wrist_r", "elbow_l", "wrist_l")
 """Points whose speed is checked: hips, forearms and hands."""

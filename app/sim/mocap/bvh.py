@@ -30,6 +30,8 @@ MAX_NUMBER = 1e9
 """Largest number in a file, in any unit."""
 MIN_DT, MAX_DT = 1e-3, 0.1
 """Range of the time between two frames in motion capture [s]."""
+ROUNDED = 0.01
+"""Share of these by which a rounded time may be outside."""
 
 _CHANNELS = ("Xposition", "Yposition", "Zposition", "Xrotation", "Yrotation", "Zrotation")
 _WORDS = ("HIERARCHY", "ROOT", "JOINT", "End", "OFFSET", "CHANNELS", "{", "}")
@@ -180,20 +182,17 @@ def read_rows(lines: Sequence[tuple[int, str]], n_columns: int, n_rows: int) -> 
         value = f"<{most} frames>"
         raise bad("frames", value, f"must be at most {MAX_FRAMES}", "cut the file into parts")
     faults: list[Fault] = []
-    values = np.zeros((len(lines), n_columns))
-    for k, (number, line) in enumerate(lines):
+    rows: list[Vec] = []  # grows with the text, however many channels the head states
+    for number, line in lines:
         words = line.split()
         if len(words) != n_columns:
             rule = f"must hold {n_columns} numbers, a number per channel of the skeleton"
             place, hint = f"line {number}", _comma_hint(line)
             faults.append(Fault(place=place, value=f"<{len(words)}>", rule=rule, hint=hint))
         else:
-            try:
-                values[k] = np.nan if "_" in line else list(map(float, words))
-            except ValueError:
-                values[k] = np.nan
-        if not (np.abs(values[k]) <= MAX_NUMBER).all():
-            faults.extend(_bad_words(words, number))
+            rows.append(_row(line, words))
+            if not (np.abs(rows[-1]) <= MAX_NUMBER).all():
+                faults.extend(_bad_words(words, number))
         if len(faults) >= MAX_FAULTS:
             break
     if not faults and len(lines) != n_rows:
@@ -203,9 +202,17 @@ def read_rows(lines: Sequence[tuple[int, str]], n_columns: int, n_rows: int) -> 
         faults.append(Fault(place=place, value=f"<{len(lines)}>", rule=rule, hint=hint))
     if faults:
         raise BadRecording(faults[:MAX_FAULTS])
-    if len(values) < 2:
-        raise bad("frames", f"<{len(values)}>", "must be at least 2", "one frame is no motion")
-    return values
+    if len(rows) < 2:
+        raise bad("frames", f"<{len(rows)}>", "must be at least 2", "one frame is no motion")
+    return np.array(rows)
+
+
+def _row(line: str, words: Sequence[str]) -> Vec:
+    """Return the numbers of a line; NaN if one is none."""
+    try:
+        return np.array([np.nan] if "_" in line else list(map(float, words)))
+    except ValueError:
+        return np.array([np.nan])
 
 
 def _bad_words(words: Sequence[str], line: int) -> Iterator[Fault]:
@@ -238,9 +245,9 @@ def check_dt(dt: float, place: str) -> float:
     """Return the time between two frames [s], validated.
 
     Raises:
-        BadRecording: The time is outside [MIN_DT, MAX_DT].
+        BadRecording: The time is outside [MIN_DT, MAX_DT], by more than rounding in a file.
     """
-    if MIN_DT <= dt <= MAX_DT:
+    if (1.0 - ROUNDED) * MIN_DT <= dt <= (1.0 + ROUNDED) * MAX_DT:
         return dt
     guesses = []
     for unit, per_second in (("milli", 1e3), ("micro", 1e6), ("nano", 1e9)):

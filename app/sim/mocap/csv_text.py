@@ -22,6 +22,9 @@ INDEX_NAMES = frozenset(("index", "idx", "frame", "frameno", "framenumber", "row
 _ERRORS = tuple(word for word in MISSING if word.startswith("#"))
 """Error values of spreadsheets, which begin like a comment."""
 
+_NUMBER = re.compile(r"\s*[+-]?[\d.,'\s]*\d(?:[eE][+-]?\d+)?\s*")
+"""A number with either decimal sign, and with any thousands separators."""
+
 DECLARED = ("angles", "rate_hz")
 """Declarations that are read."""
 
@@ -171,6 +174,6 @@ def _decimal(rows: Iterable[Sequence[str]]) -> str:
     for cells in rows:
         for cell in cells:
             is_whole = "." not in cell and "," not in cell
-            if not is_whole and re.fullmatch(r"\s*[+-]?[\d.,'\s]*\d\s*", cell[:60]):
+            if not is_whole and _NUMBER.fullmatch(cell[:60]):
                 return max(".,", key=cell.rfind)
     return "."

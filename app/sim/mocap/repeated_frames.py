@@ -5,6 +5,7 @@ three times and four times too high once. Repeated frames are found by the regul
 changes, which may be fractional (24 Hz at 60 Hz: 2, 3, 2, 3).
 """
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -30,7 +31,8 @@ def without_repeats(bvh: Bvh) -> tuple[Bvh, str]:
     changes = np.flatnonzero((np.diff(bvh.values, axis=0) != 0.0).any(axis=1)) + 1
     if len(changes) < MIN_CHANGES:
         return bvh, ""
-    found = _whole_step(changes, len(bvh.values)) or _fractional_step(changes)
+    n = len(bvh.values)
+    found = _whole_step(changes, n) or _fractional_step(changes, n)
     if found is None:
         return bvh, ""
     step, kept = found
@@ -59,13 +61,27 @@ def _whole_step(changes: Frames, n: int) -> tuple[float, Frames] | None:
     return float(step), np.arange(start, n, step).clip(min=0)
 
 
-def _fractional_step(changes: Frames) -> tuple[float, Frames] | None:
+def _fractional_step(changes: Frames, n: int) -> tuple[float, Frames] | None:
     """Return the interval between new frames and their numbers, by a line through them.
 
-    None where they are not evenly spaced, or hardly any repeat.
+    None where they are not evenly spaced, or hardly any repeat. People at rest repeat frames
+    before, between and after the changes; these are kept at the same interval.
+
+    Args:
+        changes: Frames that differ from the previous one, increasing.
+        n: Number of frames in the file.
     """
-    count = np.arange(len(changes))
+    gaps = np.diff(changes)
+    moving = gaps <= 2.0 * np.median(gaps)
+    passed = np.where(moving, 1, np.rint(gaps / gaps[moving].mean()).astype(np.int64))
+    count = np.concatenate([[0], np.cumsum(passed)])
     step, start = np.polyfit(count, changes, 1)
     if step < MIN_STEP or np.ptp(changes - start - step * count) > 1.1:
         return None
-    return float(step), np.concatenate([[0], changes])
+    before, after = (
+        1 + max(0, round((span - math.ceil(step)) / step))
+        for span in (int(changes[0]), n - int(changes[-1]))
+    )
+    kept = np.rint(start + step * np.arange(-before, count[-1] + after)).astype(np.int64)
+    kept[before + count] = changes
+    return float(step), kept.clip(0, n - 1)

@@ -35,6 +35,7 @@ from app.sim.mocap.length_units import (
 )
 from app.sim.mocap.read_options import NOTHING_STATED, Reading, ReadOptions, metres
 from app.sim.mocap.repeated_frames import without_repeats
+from app.sim.mocap.tables import MAX_NAME
 from app.sim.mocap.up_axis import (
     BodyDirections,
     find_up_axis,
@@ -94,7 +95,7 @@ def body_track(bvh: Bvh, options: ReadOptions = NOTHING_STATED) -> tuple[BodyTra
         unit=found,
         root_unit=root_unit,
         up=up,
-        names={role: " + ".join(names[k] for k in joints[role]) for role in joints},
+        names={role: " + ".join(names[k][:MAX_NAME] for k in joints[role]) for role in joints},
         rate_hz=1.0 / bvh.dt,
         stature=metres(found) * stature.value,
         notes=tuple(one for one in (repeated, floor) if one),
@@ -193,7 +194,7 @@ def _hips(placed: Centres) -> Vec | None:
     shoulders = placed["shoulder_l"] - placed["shoulder_r"]
     along = float(np.median(np.einsum("ni,ni->n", unit(hips), unit(shoulders))))
     if along < 0.0:
-        value = f"{np.degrees(np.arccos(along)):.0f} degrees apart"
+        value = f"{np.degrees(np.arccos(max(along, -1.0))):.0f} degrees apart"
         rule = "must point to the same side, right to left, in most frames"
         hint = "left and right of the legs, or of the arms, are mixed up"
         raise bad("hips and shoulders", value, rule, hint)
@@ -208,7 +209,9 @@ def _require_degrees(bvh: Bvh, joints: Joints) -> None:
         for k, (joint, name) in enumerate(bvh.channels)
         if name.endswith("rotation") and joint not in root
     ]
-    largest = float(np.abs(bvh.values[:, turns]).max()) if turns else 0.0
+    if not turns:
+        return  # positions alone
+    largest = float(np.abs(bvh.values[:, turns]).max())
     if largest > MAX_DEGREES_IN_RADIANS:
         return
     rule = (

@@ -83,6 +83,8 @@ class TextTable:
         keys = [plain(label) for label in self.labels]
         found = {own: self._mapped(theirs, keys) for theirs, own in names.items()}
         taken = set(found.values())
+        if len(taken) < len(found):
+            raise bad("map", shown(str(dict(names))), "must map each column once")
         for own in ours:
             here = [k for k, key in enumerate(keys) if key == plain(own) and k not in taken]
             if own in found or not here:
@@ -187,7 +189,7 @@ class TextTable:
             if np.isnan(value) or abs(value) <= _most(name):
                 continue
             rule, hint = "must be a number", ""
-            if _number(cell) is not None:
+            if _number(cell.replace(self.decimal, ".")) is not None:
                 rule = f"must be a finite number of at most {digits(_most(name))}"
             if _THOUSANDS.fullmatch(cell.strip()[:MAX_NAME]) or (
                 self.decimal == "," and "." in cell

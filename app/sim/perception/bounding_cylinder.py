@@ -62,11 +62,6 @@ class SafetyCylinder:
     velocity: Vec
     """Velocity of the axis [m/s], shape (2,)."""
 
-    def contains(self, points: Vec) -> bool:
-        """Return whether no point [m], shape (n, 3), is beyond the radius or above the top."""
-        away = np.linalg.norm(points[:, :2] - self.center, axis=1)
-        return bool((away <= self.radius).all() and (points[:, 2] <= self.top).all())
-
     def after(self, seconds: float, growth: float) -> "SafetyCylinder":
         """Return the cylinder after a time at its velocity, with an increased radius [m]."""
         center = self.center + seconds * self.velocity

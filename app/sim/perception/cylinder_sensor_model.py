@@ -24,7 +24,7 @@ TURN = 4.0
 EXACT = 1e-4
 """Smallest noise assumed by the filter [m]."""
 MAX_RATE_HZ = 50.0
-"""Highest frame rate [Hz]: one frame per control period."""
+"""Highest frame rate [Hz]."""
 N_STATE = 3
 """Number of measured values per person: x, y, radius [m]."""
 
@@ -109,7 +109,7 @@ class CylinderSensorModel:
             self.observe(rows, np.full(len(rows), t), people + t * velocity)
 
     def observe(self, rows: NDArray[np.int64], t: Vec, people: Vec) -> None:
-        """Advance the time of some environments, by at most one frame.
+        """Advance the time of some environments.
 
         Args:
             rows: Environments, shape (k,).
@@ -117,16 +117,19 @@ class CylinderSensorModel:
             people: Present x, y and radius of all people [m], shape (k, n_people, 3);
                 interpolated linearly since the last call.
         """
-        noise = self._settings.noise * self._rng.standard_normal((len(rows), *self._shape))
-        span = np.maximum(t - self._now[rows], 1e-12)
-        part = (self._next[rows] - self._now[rows]) / span
-        before = self._true[rows]
-        measured = before + part[:, None, None] * (people - before) + noise
-        taken = self._next[rows] <= t + 1e-9
-        self._push(rows[taken], self._next[rows[taken]], measured[taken])
-        self._next[rows[taken]] += self._period
+        since, before = self._now[rows], self._true[rows]
+        span = np.maximum(t - since, 1e-12)
+        while True:
+            noise = self._settings.noise * self._rng.standard_normal(before.shape)
+            part = (self._next[rows] - since) / span
+            measured = before + part[:, None, None] * (people - before) + noise
+            taken = self._next[rows] <= t + 1e-9
+            self._push(rows[taken], self._next[rows[taken]], measured[taken])
+            self._next[rows[taken]] += self._period
+            self._deliver(rows, t)
+            if not (self._next[rows] <= t + 1e-9).any():
+                break
         self._now[rows], self._true[rows] = t, people
-        self._deliver(rows, t)
 
     def _push(self, rows: NDArray[np.int64], stamps: Vec, measured: Vec) -> None:
         place = np.argmax(np.isinf(self._stamps[rows]), axis=1)

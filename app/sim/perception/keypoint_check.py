@@ -191,7 +191,7 @@ def _names(indices: NDArray[np.intp]) -> tuple[str, ...]:
 def _numbers(field: str, values: ArrayLike, shape: tuple[int, ...]) -> Vec:
     try:
         array = np.array(values, dtype=np.float64)
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         raise InvalidInput(field, type(values).__name__, "must be numbers") from error
     if array.shape != shape:
         raise InvalidInput(field, array.shape, f"must have the shape {shape}")

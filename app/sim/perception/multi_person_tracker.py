@@ -54,6 +54,11 @@ class UnassignedDetection:
     """Reason why the key-points cannot be in the cell's frame; None otherwise."""
 
 
+def _by_distance(one: UnassignedDetection) -> float:
+    """Return the sort key: unknown distances last."""
+    return np.inf if one.distance_m is None else one.distance_m
+
+
 def match_people(
     expected: Sequence[Vec], seen: Sequence[Vec], gates: Sequence[float]
 ) -> list[int | None]:
@@ -247,7 +252,7 @@ class MultiPersonTracker:
             for j, frame in enumerate(frames)
             if frame.implausible or (frame.seen.any() and (j in jumps or j not in order))
         ]
-        self.unassigned = tuple(sorted(unassigned, key=lambda one: one.distance_m or np.inf))
+        self.unassigned = tuple(sorted(unassigned, key=_by_distance))
         self._waiting_since = t
         self._waiting = [frames[one.index].points for one in unassigned if not one.detail]
         self._foreign = next((frame.implausible for frame in frames if frame.implausible), None)

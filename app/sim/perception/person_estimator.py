@@ -181,7 +181,7 @@ class PersonEstimator:
         self._flags: tuple[Flag, ...] = ()
         self._frame: Keypoints | None = None
         self._unfit = False
-        self._mirrored_at = math.inf
+        self._mirrored_at, self._mirror_seen_at = math.inf, -math.inf
 
     def update(
         self, t: float, keypoints: ArrayLike, confidences: ArrayLike | None = None
@@ -227,11 +227,10 @@ class PersonEstimator:
         flags: list[Flag] = []
         if all(faces_backward(frame.points, group) for group in _SWAPPED):
             flags.append("mirrored")
-            self._mirrored_at = min(self._mirrored_at, t)
-            if t - self._mirrored_at > self.settings.swap_s:
+            if self._mirrored_for(t) > self.settings.swap_s:
                 frame = replace(UNSEEN, implausible=_MIRRORED)
         elif frame.seen.any():
-            self._mirrored_at = math.inf
+            self._mirror_seen_at = -math.inf
         if frame.implausible is not None:
             flags.append("foreign-frame")
         given = frame.points.copy(), frame.confidences.copy()
@@ -253,11 +252,19 @@ class PersonEstimator:
         self._t, self._flags, self._frame = t, tuple(flags), frame
         self._remember(t)
 
+    def _mirrored_for(self, t: float) -> float:
+        """Count a mirrored frame; return the time since the first of them in a row [s]."""
+        if t - self._mirror_seen_at > self.settings.filter.hold_s:
+            self._mirrored_at = t
+        self._mirror_seen_at = t
+        return t - self._mirrored_at
+
     def _forget(self) -> None:
         """Reset to the initial state."""
         self._points.forget(list(range(N_KEYPOINTS)))
         self._center.forget([0])
         self._seen_at, self._unfit = -math.inf, False
+        self._mirror_seen_at = -math.inf
         self._swapped_at.clear()
         self._q = self.last_points = None
 

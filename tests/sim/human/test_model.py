@@ -6,6 +6,7 @@ import pytest
 from app.sim.cells.cell import load_cell
 from app.sim.human import model as human
 from app.sim.human.anthropometry import MEDIAN
+from app.sim.human.kernels import kinematics as body
 
 SIZE = load_cell().body
 FLOOR_Z = load_cell().floor_z
@@ -127,6 +128,20 @@ def test_impossible_targets_give_a_posture_inside_the_limits(target: list[float]
     posture = human.reach("r", np.array(target), rest, SIZE)
     assert np.isfinite(posture.q).all()
     assert (posture.q >= human.Q_MIN).all() and (posture.q <= human.Q_MAX).all()
+
+
+@pytest.mark.parametrize(("upper", "fore"), [(0.25, 0.325), (0.26, 0.345), (0.34, 0.2)])
+def test_hand_beside_the_shoulder_of_an_uneven_arm_is_a_posture(
+    upper: float, fore: float
+) -> None:
+    size, rng = SIZE.copy(), np.random.default_rng(4)
+    size[[body.UPPER_ARM_R, body.UPPER_ARM_R + 1]] = upper
+    size[[body.FOREARM_R, body.FOREARM_R + 1]] = fore
+    start = human.rest_posture(0.0, 1.2, -np.pi / 2.0)
+    shoulder = human.joint_points(start, size)["shoulder_r"]
+    for offset in rng.uniform(-0.12, 0.12, (100, 3)):
+        q = human.solve_hands(start, size, right=shoulder + offset).q
+        assert np.isfinite(q).all() and (q[10:14] <= human.Q_MAX[10:14] + 1e-9).all()
 
 
 def test_dragging_both_hands_moves_the_person_without_jumps() -> None:

@@ -179,5 +179,7 @@ def test_skeleton_without_end_is_refused() -> None:
 
 def test_rate_is_what_motion_capture_delivers() -> None:
     assert check_dt(0.01, "dt") == 0.01
+    for rounded in (0.1 + 1e-15, 6 * 0.0166667, 1.001 - 1.0):
+        assert check_dt(rounded, "dt") == rounded
     with pytest.raises(BadRecording, match="or frames per second: in s that is 0.0166667"):
         check_dt(60.0, "dt")

@@ -78,6 +78,21 @@ def test_table_is_read_however_it_is_written(text: str) -> None:
     assert track.missing == () and track.n_frames == 30
 
 
+def test_decimal_commas_may_have_exponents() -> None:
+    def exponents(line: str) -> str:
+        cells = line.split(",")
+        if cells[0] == "time":
+            return ";".join(cells)
+        return ";".join(f"{float(cell):.9e}".replace(".", ",") for cell in cells)
+
+    np.testing.assert_allclose(read_csv(each_row(exponents)).q, Q, atol=1e-8)
+    text = each_row(exponents).splitlines()
+    cells = text[5].split(";")
+    cells[4] = "1,5e99"
+    text[5] = ";".join(cells)
+    assert "must be a finite number of at most" in fault("\n".join(text))
+
+
 def test_decimal_sign_is_found_behind_rows_at_rest() -> None:
     rest = "# rate_hz = 50\n" + ";".join(JOINT_NAMES) + 60 * ("\n" + ";".join(18 * "0"))
     rows = [";".join(f"{one:.4f}".replace(".", ",") for one in row) for row in Q]

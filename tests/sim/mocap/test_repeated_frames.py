@@ -44,6 +44,18 @@ def test_person_who_stands_still_repeats_frames_too() -> None:
     assert without_repeats(still) == (still, "")
 
 
+@pytest.mark.parametrize("rate_hz", [50.0, 75.0, 100.0])
+def test_person_at_rest_before_between_and_after_keeps_the_time(rate_hz: float) -> None:
+    rest, pause = [0] * 60, [49] * 45
+    frames = [*rest, *range(50), *pause, *range(50, 100), *[99] * 60]
+    long = replace(CLIP, values=CLIP.values[frames])
+    found, message = without_repeats(rewritten(rate_hz, recorded=long))
+    assert 1.0 / found.dt == pytest.approx(30.0, rel=1e-2) and message
+    assert abs(len(found.values) - len(long.values)) <= 3
+    moved = np.flatnonzero((np.diff(found.values, axis=0) != 0.0).any(axis=1))
+    assert len(moved) == 99
+
+
 def test_camera_that_hung_now_and_then_is_no_other_rate() -> None:
     values = CLIP.values.copy()
     for k in (7, 8, 31, 50, 51, 77):

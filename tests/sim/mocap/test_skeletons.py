@@ -1,9 +1,11 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from app.errors import BadRecording
 from app.sim.human.anthropometry import BodySize
-from app.sim.mocap.bvh import read_bvh
+from app.sim.mocap.bvh import forward, read_bvh
 from app.sim.mocap.inverse_kinematics import body_angles
 from app.sim.mocap.joint_centres import model_points
 from app.sim.mocap.joint_names import find_joints
@@ -70,6 +72,19 @@ def test_angles_in_radians_are_refused(n_turns: float) -> None:
     message = fault("\n".join(lines))
     assert message.startswith(f"frames from line {start + 1}")
     assert "looks like radians" in message
+
+
+def test_positions_alone_have_no_unit_of_angles() -> None:
+    whole = read_bvh(bvh_text(working(10)))
+    points = forward(whole, range(len(whole.joints)))
+    joints = tuple(
+        replace(one, channels=("Xposition", "Yposition", "Zposition")) for one in whole.joints
+    )
+    parents = np.array([one.parent for one in joints])
+    moved = points - np.where(parents[:, None] >= 0, points[:, parents], 0.0)
+    bare = replace(whole, joints=joints, values=moved.reshape(len(points), -1))
+    track, _ = body_track(bare)
+    np.testing.assert_allclose(track.points, TRUTH, atol=1e-6)
 
 
 def test_positions_in_another_unit_than_the_skeleton_are_refused() -> None:

@@ -48,6 +48,12 @@ def test_name_map_goes_before_what_a_name_says() -> None:
     np.testing.assert_allclose(track.q, Q, atol=1e-8)
 
 
+def test_name_map_gives_a_column_once() -> None:
+    head = TEXT.replace("elbow_l", "other")
+    stated = {"elbow_r": "elbow_r", "Elbow R": "elbow_l"}
+    assert "must map each column once" in fault(head, stated)
+
+
 def test_name_map_finds_names_in_other_case_and_by_their_paths() -> None:
     angles = {name: np.linspace(0.1, 0.4, 20) for name in COORDINATES}
     text = opensim_text(angles)

@@ -13,6 +13,7 @@ from app.sim.perception.keypoint_sensor_model import (
 from app.sim.perception.keypoints import K, swap_sides
 from app.sim.perception.person_estimator import EstimatorSettings, PersonEstimator
 from app.sim.scene.scene import capsule_speeds_of, people_geometry_of, people_of
+from tests.sim.perception.cylinder_contents import holds
 from tests.sim.postures import POSTURES, posture
 from tests.sim.tracked_person import CELL, seen, work
 from tests.sim.tracker_errors import errors, follow
@@ -147,7 +148,7 @@ def test_a_limb_unseen_for_long_is_held_and_the_cylinder_widens() -> None:
         estimate = estimator.update(k * DT, points)
         arm = human.joint_points(q[k], CELL.body)
         assert estimate.cylinder is not None
-        assert estimate.cylinder.contains(np.array([arm["wrist_r"], arm["elbow_r"]]))
+        assert holds(estimate.cylinder, np.array([arm["wrist_r"], arm["elbow_r"]]))
     assert estimate.missing == ("elbow_r", "wrist_r")
     assert {"elbow_r", "shoulder_r_flex"} <= set(estimate.held)
     assert "elbow_l" not in estimate.held
@@ -253,7 +254,7 @@ def test_joint_angles_are_given_only_where_the_model_fits(name: str) -> None:
     points = posture(name, CELL.floor_z)
     estimator = PersonEstimator(CELL.body, floor_z=CELL.floor_z)
     estimate = estimator.update(0.0, points)
-    assert estimate.cylinder is not None and estimate.cylinder.contains(points)
+    assert estimate.cylinder is not None and holds(estimate.cylinder, points)
     assert "foreign-frame" not in estimate.flags
     if estimate.person is None:
         later = estimator.at(1.0)  # nothing is known any more, and the last fit was bad
@@ -308,6 +309,15 @@ def test_a_mirrored_person_is_named() -> None:
     for flipped in (points * [-1.0, 1.0, 1.0], points * [1.0, -1.0, 1.0]):
         assert "mirrored" in PersonEstimator(CELL.body).update(0.0, flipped).flags
     assert PersonEstimator(CELL.body).update(0.0, points).flags == ()
+
+
+def test_single_mirrored_frame_counts_long_after_another_one() -> None:
+    mirrored = seen(human.rest_posture(0.0, 1.2, -1.5)) * [-1.0, 1.0, 1.0]
+    estimator = PersonEstimator(CELL.body)
+    first = estimator.update(0.0, mirrored)
+    again = estimator.update(10.0, mirrored)
+    assert first.flags == ("mirrored", "arms-swapped", "legs-swapped")
+    assert "mirrored" in again.flags and "foreign-frame" not in again.flags
 
 
 @pytest.mark.parametrize("t", [np.nan, np.inf, 29 * DT, 0.0])

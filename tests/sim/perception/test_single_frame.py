@@ -8,6 +8,7 @@ from app.sim.human import model as human
 from app.sim.perception.keypoints import BODY_25, K, keypoints_of, swap_sides
 from app.sim.perception.observed_people import person_from_estimate
 from app.sim.perception.single_frame import estimate_once
+from tests.sim.perception.cylinder_contents import holds
 from tests.sim.postures import FRAMES, POSTURES, posture
 from tests.sim.tracked_person import CELL, seen, work
 
@@ -52,7 +53,7 @@ def test_a_missing_arm_rests_and_is_named() -> None:
     np.testing.assert_allclose(estimate.person.q[10:14], human.REST_ARM)
     assert estimate.cylinder is not None
     arm = human.joint_points(Q, CELL.body)
-    assert estimate.cylinder.contains(np.array([arm["elbow_r"], arm["wrist_r"]]))
+    assert holds(estimate.cylinder, np.array([arm["elbow_r"], arm["wrist_r"]]))
 
 
 def test_without_a_trunk_the_person_is_as_good_as_the_cylinder() -> None:
@@ -109,7 +110,7 @@ def test_velocities_that_cannot_be_are_named_and_count_as_zero() -> None:
 def test_a_persons_cylinder_holds_every_posture(name: str) -> None:
     points = posture(name, CELL.floor_z)
     estimate = estimate_once(points, CELL.body, floor_z=CELL.floor_z)
-    assert estimate.cylinder is not None and estimate.cylinder.contains(points)
+    assert estimate.cylinder is not None and holds(estimate.cylinder, points)
     assert estimate.implausible is None and estimate.cylinder.radius < 2.0
 
 

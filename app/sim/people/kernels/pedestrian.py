@@ -245,6 +245,8 @@ def advance_pedestrian(
 def remember(rows: Vec, e: int, p: int, dt: float) -> None:
     """Age the history of a walker and add a sample when due.
 
+    Samples are PAST_S apart, rounded up to whole control periods.
+
     Args:
         rows: State of all walkers, shape (n_envs, W, N_STATE).
         e: Environment.
