@@ -20,6 +20,8 @@ from app.sim.cells.cell import LIMITS, MAX_TARGETS, Cell
 from app.sim.cells.parts import GoalRegion, RobotMount, Station
 from app.sim.cells.people import Worker
 from app.sim.collision.fcl_reference import obstacle_box, touch
+from app.sim.core.pick_depth import PICK_DEPTH_M
+from app.sim.robot.capsules import MOST_ELBOW
 
 MIN_SPACING = 0.05
 """Least distance of two stations [m]; a cluster counts from its lowest to its top level."""
@@ -110,6 +112,14 @@ def _robot(robot: RobotMount) -> Iterator[Fault]:
                 place=f"robot.home_q[{joint}]",
                 value=shown(home),
                 rule=f"must lie inside the joint's limits ({digits(low)}, {digits(high)}) rad",
+            )
+    for name, limit in (("q_min", robot.q_min[2]), ("q_max", robot.q_max[2])):
+        if abs(limit) > MOST_ELBOW + 1e-9:
+            yield Fault(
+                place=f"robot.{name}[2]",
+                value=shown(limit),
+                rule=f"must lie in [-{MOST_ELBOW}, {MOST_ELBOW}] rad",
+                hint="an elbow that bends more folds the arm into itself",
             )
     if robot.tool_radius > robot.tool_length:
         rule = f"must not exceed tool_length = {digits(robot.tool_length)} m"
@@ -240,9 +250,10 @@ def _home_contacts(cell: Cell, found: list[ContactPair]) -> Iterator[Fault]:
 def _station_reach(reach: Reach, station: Station) -> Iterator[Fault]:
     tries = [reach.tool_down(point) for point in station.points()]
     missed = [(level, one.reason) for level, one in enumerate(tries) if one.q is None]
-    if not missed:
-        return
     place = f"stations.{station.id}.position"
+    if not missed:
+        yield from _pick_reach(reach, station, place)
+        return
     rule = "must be reachable by the robot with its tool pointing down"
     hint = missed[0][1]
     if station.kind == "cluster" and len(missed) < len(tries):
@@ -254,6 +265,16 @@ def _station_reach(reach: Reach, station: Station) -> Iterator[Fault]:
         yield Fault(place=place, value=shown(station.levels), rule=rule, hint=hint)
         return
     yield Fault(place=place, value=shown(station.position), rule=rule, hint=hint)
+
+
+def _pick_reach(reach: Reach, station: Station, place: str) -> Iterator[Fault]:
+    """Check that the gripper gets down to the object at a cube or dock."""
+    if station.kind not in ("cube", "dock"):
+        return
+    found = reach.tool_down(np.array(station.position) - (0.0, 0.0, PICK_DEPTH_M))
+    if found.q is None:
+        rule = f"must leave room to grasp: the tool goes down by {digits(PICK_DEPTH_M)} m"
+        yield Fault(place=place, value=shown(station.position), rule=rule, hint=found.reason)
 
 
 def _region_reach(reach: Reach, region: GoalRegion) -> Iterator[Fault]:

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterator, Sequence
 
-from app.errors import Fault
+from app.errors import Fault, digits
 from app.sim.cell_validation.units import shown
 from app.sim.cells.cell import Cell
 from app.sim.cells.parts import Obstacle, Station
@@ -120,6 +120,14 @@ def _standing(parts: FaultlessParts) -> Iterator[Fault]:
             or person.y_min >= table.y_max - 1e-9
             or person.y_max <= table.y_min + 1e-9
         )
+        if parts.table and apart and person.y_min < table.y_max - 1e-9:
+            yield Fault(
+                place=f"{place}.y_min",
+                value=shown(person.y_min),
+                rule="must keep a worker beside the edge of the table with the greatest y: at "
+                f"least y_max = {digits(table.y_max)} m",
+                hint="turn the cell: x to the right, y from the robot toward the person",
+            )
         if parts.table and not apart:
             yield Fault(
                 place=f"{place}.y_min",

@@ -11,6 +11,7 @@ import json
 import re
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import islice
 from typing import Any
 
 from pydantic import BaseModel, ValidationError
@@ -18,6 +19,7 @@ from pydantic import BaseModel, ValidationError
 from app.errors import BadCell, Fault
 from app.one_line import ONE_LINE
 from app.sim.cell_validation.checks import check_cell
+from app.sim.cell_validation.units import MAX_SHOWN, cut
 from app.sim.cells.cell import LIMITS, Cell, load_cell
 from app.sim.cells.parts import (
     CellSafety,
@@ -36,8 +38,8 @@ MAX_DEPTH = 16
 """Deepest nesting that is read; a cell needs five levels."""
 MAX_FAULTS = 200
 """Most faults that one answer lists."""
-MAX_SHOWN = 60
-"""Longest value that a message repeats [characters]."""
+MAX_PLACE = 200
+"""Longest place that a fault names [characters]."""
 
 _PARTS: Mapping[str, type[BaseModel]] = {
     "table": TableGeometry,
@@ -81,7 +83,7 @@ def read_cell(content: bytes) -> Cell:
         BadCell: It is no cell; the error lists every fault.
     """
     raw = _parse(content)
-    faults = [*_tree_faults(raw, ""), *_cut(raw)]
+    faults = [*islice(_tree_faults(raw, ""), MAX_FAULTS), *_cut(raw)]
     cell, found = _validate(raw)
     faults += found
     if cell is not None:
@@ -154,14 +156,14 @@ def _tree_faults(node: object, place: str) -> Iterator[Fault]:
         yield Fault(place=place, value=ascii(node)[:MAX_SHOWN], rule=_TEXT_RULE)
     if isinstance(node, _Object):
         for name in node.repeated_keys:
-            path = f"{place}.{name}".lstrip(".")
+            path = f"{place}.{name}".lstrip(".")[:MAX_PLACE]
             hint = "only the last one would count"
             yield Fault(place=path, value="", rule="is given twice in one object", hint=hint)
         for name, value in node.items():
-            yield from _tree_faults(value, f"{place}.{name}".lstrip("."))
+            yield from _tree_faults(value, f"{place}.{name}".lstrip(".")[:MAX_PLACE])
     elif isinstance(node, list):
         for index, value in enumerate(node):
-            yield from _tree_faults(value, place + _item(value, index))
+            yield from _tree_faults(value, (place + _item(value, index))[:MAX_PLACE])
 
 
 def _is_text(text: str) -> bool:
@@ -288,7 +290,7 @@ def _place(raw: object, loc: Sequence[Any]) -> tuple[str, tuple[Any, ...]]:
         else:
             place += f".{part}" if place else str(part)
         node = inner
-    return place[:200] or "file", tuple(clean)
+    return place[:MAX_PLACE] or "file", tuple(clean)
 
 
 def _owner(raw: Mapping[str, Any], loc: tuple[Any, ...]) -> type[BaseModel] | None:
@@ -329,4 +331,4 @@ def _shown(value: object) -> str:
         return "<a very long number>"
     if not _is_text(text):
         text = ascii(text)
-    return text if len(text) <= MAX_SHOWN else f"{text[: MAX_SHOWN - 3]}..."
+    return cut(text)

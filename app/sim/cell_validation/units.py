@@ -12,14 +12,22 @@ from pydantic import BaseModel
 from app.errors import Fault, digits, interval
 from app.sim.cells.parts import Each, Within
 
+MAX_SHOWN = 60
+"""Longest value that a message repeats [characters]."""
+
 
 def shown(value: object) -> str:
-    """Write a value as a user would."""
+    """Write a value as a user would, cut where it is long."""
     if isinstance(value, float):
         return digits(value)
     if isinstance(value, tuple | list):
         return f"[{', '.join(shown(one) for one in value)}]"
-    return str(value)
+    return cut(str(value))
+
+
+def cut(text: str) -> str:
+    """Return a text of at most MAX_SHOWN characters."""
+    return text if len(text) <= MAX_SHOWN else f"{text[: MAX_SHOWN - 3]}..."
 
 
 def unit_hint(value: float, within: Within) -> str:

@@ -58,7 +58,6 @@ TURN = 6.2842
 Length = Annotated[float, Within(-10.0, 10.0, "m")]
 Place = Annotated[Position, Within(-3.0, 3.0, "m")]
 Angles = Annotated[Six, Within(-TURN, TURN, "rad")]
-Size = Annotated[float, Within(0.001, 5.0, "m")]
 Speed = Annotated[float, Within(0.0, 5.0, "m/s")]
 Radius = Annotated[float, Within(0.05, 1.0, "m")]
 Share = Annotated[float, Within(0.0, 1.0, "")]
@@ -199,7 +198,9 @@ class CellSafety(CellData):
         default=0.3, description="least distance to people, added to the rule [m]"
     )
     human_speed: Speed = Field(default=1.6, description="assumed speed of a person, v_h [m/s]")
-    reaction_time: Seconds = Field(default=0.1, description="reaction time, T_r [s]")
+    reaction_time: Seconds = Field(
+        default=0.1, description="reaction time [s]; T_r adds control period, delay and age"
+    )
     tracker_delay: Seconds = Field(default=0.0, description="age of the tracker's data [s]")
     intrusion_distance: Uncertainty = Field(default=0.0, description="intrusion, C [m]")
     person_uncertainty: Uncertainty = Field(

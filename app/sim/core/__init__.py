@@ -6,6 +6,7 @@ jit                 Compilation of kernels: cached on disk, and without referenc
 kernel_cache        Cache of compiled kernels between runs
 observation_layout  Slices of the groups of features in an observation
 out_of_range        An input outside the training range or the joint limits
+pick_depth          Depth of the descent at an object
 policy_identity     Interface common to all trained policies: their identity
 kernels/            Compiled bounds, random numbers and trigonometry
 """

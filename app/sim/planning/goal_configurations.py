@@ -44,8 +44,8 @@ def goal_configurations(
     for k in range(N_STARTS):
         q = np.array(arm.home)
         if k > 0:
-            low, high = arm.limits.q_min[:CONTROLLED], arm.limits.q_max[:CONTROLLED]
-            q[:CONTROLLED] = rng.uniform(np.maximum(low, -np.pi), np.minimum(high, np.pi))
+            low, high = arm.limits.within_half_turn()
+            q[:CONTROLLED] = rng.uniform(low[:CONTROLLED], high[:CONTROLLED])
         point = np.array(target, dtype=np.float64)
         if k > 0 and spread > 0.0:
             offset = rng.normal(size=3)

@@ -5,7 +5,8 @@ Planners: RRT-Connect (the first path found), RRT* (Karaman and Frazzoli 2011; s
 within the time, as in the thesis' comparison) and AORRTC (Wilson et al. 2025; almost-surely
 optimal RRT-Connect). Path length is Euclidean in joint space [rad]. OMPL is used only if the
 straight motion to the nearest goal, the shortest path, is not free (AORRTC of 2.0.1 returns
-paths that do not begin at the start in that case). The result is a :class:`MotionPlan` with a
+paths that do not begin at the start in that case), and with RRT-Connect only if no goal has
+such a motion. The result is a :class:`MotionPlan` with a
 named ``outcome``; only malformed numbers raise.
 
 The search ends before its budget of wall time, so that the path can be checked once more; a
@@ -62,6 +63,10 @@ RANGE_RAD = 0.5
 """Longest motion of a tree's branch [rad]."""
 MOST_KEPT = 6
 """Paths kept from while a planner runs."""
+LONGEST_S = 3600.0
+"""Greatest budget of a plan [s]."""
+MOST_DETOUR_RAD = 100.0
+"""Greatest range beyond start and goals [rad]: more than any joint has."""
 _SEEDING = threading.Lock()
 
 
@@ -93,8 +98,6 @@ class MotionPlan:
     """Configurations joined by straight motions [rad], shape (n, 6); n = 0 without a path."""
     goal: int
     """Index of the reached goal; -1 where none is reached."""
-    planning_s: float
-    """Wall time spent [s]."""
     n_poses: int
     """Number of configurations checked."""
 
@@ -132,7 +135,8 @@ def plan(
     goals = goals.copy()
     goals[:, settings.n_joints :] = start[settings.n_joints :]
     low, high = planning_limits(checker, start)
-    if np.any(start < checker.arm.limits.q_min) or np.any(start > checker.arm.limits.q_max):
+    limits = checker.arm.limits
+    if np.any(start < limits.q_min - SAME) or np.any(start > limits.q_max + SAME):
         return clock.answer("start-outside-limits")
     inside = np.flatnonzero(np.all((goals >= low) & (goals <= high), axis=1))
     if len(inside) == 0:
@@ -148,10 +152,15 @@ def plan(
         straight = np.stack([start, goals[order[direct]]])
         if direct == 0 or settings.planner == "rrt-connect":
             return clock.answer("solved", straight, goals)
-    with _SEEDING:
-        ou.RNG.setSeed(seed)
-        nearer = goals[order[:direct]]
-        found = _Query(checker, start, nearer, (low, high), settings, clock).solve()
+    if not _SEEDING.acquire(timeout=clock.left_s()):
+        found = clock.answer("out-of-time")
+    else:
+        try:
+            ou.RNG.setSeed(seed)
+            nearer = goals[order[:direct]]
+            found = _Query(checker, start, nearer, (low, high), settings, clock).solve()
+        finally:
+            _SEEDING.release()
     if direct is not None and (
         found.outcome != "solved" or path_length(found.path) > path_length(straight)
     ):
@@ -183,14 +192,19 @@ class _Clock:
     def __init__(self, checker: Checker, settings: PlanSettings) -> None:
         self._checker, self._settings = checker, settings
         self._start, self._n0 = time.perf_counter(), checker.n_poses
+        self._search_s = settings.budget_s - min(LAST_LOOK_S, 0.25 * settings.budget_s)
 
     def over(self, share: float = 1.0) -> bool:
         """Return whether this share of the budget is spent."""
         if self._settings.max_poses is not None:
             return self._checker.n_poses - self._n0 >= share * self._settings.max_poses
-        budget = self._settings.budget_s
-        search = budget - min(LAST_LOOK_S, 0.25 * budget)
-        return time.perf_counter() - self._start >= share * search
+        return time.perf_counter() - self._start >= share * self._search_s
+
+    def left_s(self) -> float:
+        """Return the wall time left to search [s], at least 0; no limit with ``max_poses``."""
+        if self._settings.max_poses is not None:
+            return threading.TIMEOUT_MAX
+        return max(0.0, self._search_s - (time.perf_counter() - self._start))
 
     def answer(
         self, outcome: str, path: Vec | None = None, goals: Vec | None = None
@@ -211,7 +225,6 @@ class _Clock:
             planner=self._settings.planner,
             path=path,
             goal=goal,
-            planning_s=time.perf_counter() - self._start,
             n_poses=self._checker.n_poses - self._n0,
         )
 
@@ -362,8 +375,14 @@ def _require(settings: PlanSettings, seed: int) -> None:
         raise MissingPackage("ompl", "planning", "pip install ompl (Linux, macOS 15 or later)")
     if settings.planner not in PLANNERS:
         raise InvalidInput("planner", settings.planner, "is not known", PLANNERS)
-    if not settings.budget_s >= 0.0:
-        raise InvalidInput("budget_s", settings.budget_s, "must be at least 0 s")
+    if not 0.0 <= settings.budget_s <= LONGEST_S:
+        rule = f"must lie in [0, {LONGEST_S:g}] s"
+        raise InvalidInput("budget_s", settings.budget_s, rule)
+    if settings.max_poses is not None and settings.max_poses < 1:
+        raise InvalidInput("max_poses", settings.max_poses, "must be at least 1")
+    if not 0.0 <= settings.detour_rad <= MOST_DETOUR_RAD:
+        rule = f"must lie in [0, {MOST_DETOUR_RAD:g}] rad"
+        raise InvalidInput("detour_rad", settings.detour_rad, rule)
     if not 1 <= settings.n_joints <= 6:
         raise InvalidInput("n_joints", settings.n_joints, "must be between 1 and 6")
     if seed < 1:

@@ -66,7 +66,7 @@ class TimedPath:
         """
         if t >= self.duration:
             return self.q[-1], self.qd[-1]
-        k = max(0, int(t / self.dt))
+        k = min(max(0, int(t / self.dt)), self.n_periods - 1)
         x = max(0.0, t - k * self.dt)
         double_c = (self.qd[k + 1] - self.qd[k]) / self.dt
         speed = self.qd[k] + double_c * x

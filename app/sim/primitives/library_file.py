@@ -23,7 +23,7 @@ from app.sim.core.arrays import Vec
 from app.sim.human.model import HANDS, Hand
 
 FILE = Path(str(resources.files("app.sim.primitives"))) / "data" / "task_primitives.npz"
-"""Order of the hands in arrays."""
+"""File of the primitives."""
 HOME = "home"
 """Name of the resting place."""
 

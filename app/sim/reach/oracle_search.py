@@ -88,8 +88,7 @@ def sample_detours(
     """Sample first configurations [rad], shape (k, 6), and their end times [s], shape (k,)."""
     kind, home = rng.uniform(size=k), np.repeat(np.array(arm.home)[None], k, axis=0)
     near = home + rng.uniform(-1.0, 1.0, (k, 6)) * NEARBY
-    low, high = np.maximum(arm.limits.q_min, -np.pi), np.minimum(arm.limits.q_max, np.pi)
-    anywhere = rng.uniform(low, high, (k, 6))
+    anywhere = rng.uniform(*arm.limits.within_half_turn(), (k, 6))
     anywhere[:, 5] = near[:, 5] = home[:, 5]
     first = np.where((kind < AT_HOME + NEAR_HOME)[:, None], near, anywhere)
     first = np.where((kind < AT_HOME)[:, None], home, first)

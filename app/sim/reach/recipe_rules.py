@@ -11,8 +11,9 @@ AUTHORS_LIMITS = {
     "q_max": (_TURN, _TURN, _TURN, _HALF, _HALF, _HALF),
     "qdd_max": (100.0,) * 6,
 }
-"""Joint ranges of the authors' code [rad]; no limit of acceleration: at 1 rad/s and 50 Hz any
-speed is reached within a period [rad/s^2]."""
+"""Joint ranges of the authors' code [rad], with an elbow that folds further than the tested
+pairs of capsules cover (``robot/capsules.py``); no limit of acceleration: at 1 rad/s and 50 Hz
+any speed is reached within a period [rad/s^2]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

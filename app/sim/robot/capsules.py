@@ -89,17 +89,28 @@ SELF_PAIRS = (
 )
 """Capsules that can touch although their links are not neighbours.
 
-All other pairs of non-adjacent links have a clearance in every configuration within the cells'
-joint ranges (at least 4 mm, by search). Two pairs are excluded: base and upper arm, whose
-capsules overlap although the meshes do not, and wrist_2 and the tool, which only wrist_3
-separates.
+All other pairs of non-adjacent links have a clearance in every configuration with the elbow
+within MOST_ELBOW and the tool within SMALL_TOOL (at least 4 mm, by search). Pairs that only a
+wrist separates are excluded, wrist_1 or wrist_2 and the tool, and base and upper arm, whose
+capsules overlap although the meshes do not.
 """
+SMALL_TOOL = (0.12, 0.04)
+"""Length and radius of a tool [m]; a longer or thicker one also reaches the capsules of
+LARGE_TOOL_PAIRS."""
+LARGE_TOOL_PAIRS = ("upper_arm_high", "forearm_low", "forearm_high")
+"""Capsules that such a tool can touch."""
+MOST_ELBOW = 2.8
+"""Elbow angle beyond which other capsules touch [rad]."""
 
 
 def self_pairs(capsules: RobotCapsules) -> Index:
     """Return the pairs of capsules to check for self-collision, shape (m, 2)."""
     place = {name: index for index, name in enumerate(capsules.name)}
     pairs = [(place[a], place[b]) for a, partners in SELF_PAIRS for b in partners]
+    radius = float(capsules.radius[-1])
+    length = float(np.linalg.norm(capsules.p1[-1] - capsules.p0[-1])) + radius
+    if length > SMALL_TOOL[0] + 1e-9 or radius > SMALL_TOOL[1]:
+        pairs += [(place[name], place[TOOL]) for name in LARGE_TOOL_PAIRS]
     return np.array(pairs, dtype=np.int64)
 
 

@@ -95,7 +95,7 @@ class SafetySettings:
         for name in UNITS:
             value = getattr(self, name)
             if not 0.0 <= value < 1e6:
-                raise InvalidInput(name, value, "must be finite and not negative")
+                raise InvalidInput(name, value, "must lie in [0, 1e6)")
         if self.moving_mass <= 0.0 or self.contact_area <= 0.0:
             value = [self.moving_mass, self.contact_area]
             raise InvalidInput("moving_mass, contact_area", value, "must be above 0")
@@ -205,7 +205,7 @@ class SafetyLayer:
             InvalidInput: The age is negative.
         """
         require_finite("q, qd, c, d", np.concatenate([q, qd, c, d]))
-        require_finite("people", np.concatenate([people.columns[:3].ravel(), [age]]))
+        require_finite("people", np.append(people.columns.ravel(), age))
         require_finite("people", people.cylinders.ravel())
         if age < 0.0:
             raise InvalidInput("age", age, "must not be negative")

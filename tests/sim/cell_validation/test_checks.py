@@ -72,6 +72,7 @@ def test_cell_that_passes_can_be_sorted_in(chance: float) -> None:
         (robot(home_q=[0, -2.3, -3.0, 0, 0, 0]), "robot.home_q[2]", "limits (-2.8, 2.8)"),
         (robot(home_q=[1, -0.1, 0.3, 0, -1.57, 0]), "robot.home_q", "collision-free"),
         (robot(q_max=[3.1, -3.4, 2.8, 6.2, 6.2, 6.2]), "robot.q_min[1]", "q_max[1] = -3.4"),
+        (robot(q_max=[3.1, 0.2, 6.2, 6.2, 6.2, 6.2]), "robot.q_max[2]", "[-2.8, 2.8] rad"),
         (robot(qd_max=[2.2, 1, 1, 1, 1, 1]), "robot.qd_max[0]", "[0.01, 2.16] rad/s"),
         (robot(q_max=[180, 0.2, 2.8, 6.2, 6.2, 6.2]), "robot.q_max[0]", "degrees"),
         (robot(tool_length=120.0), "robot.tool_length", "millimetres"),
@@ -82,6 +83,12 @@ def test_cell_that_passes_can_be_sorted_in(chance: float) -> None:
         (person(home=[0.0, 1.45, 0.0]), "people[0].home[2]", "must look at the table"),
         (person(home=[0.0, 1.45, 3.1416]), "people[0].home[2]", "must look at the table"),
         (station(position=[-0.5, 0.7, 0.45]), "stations.cube0.position", "0.45 m below it"),
+        (
+            person(x_min=1.1, x_max=1.6, y_min=0.2, y_max=0.9, home=[1.3, 0.5, 3.1]),
+            "people[0].y_min",
+            "edge of the table with the greatest y",
+        ),
+        (station(position=[-0.5, 0.7, 0.05]), "stations.cube0.position", "room to grasp"),
         (person(x_min=0.8), "people[0].x_min", "less than x_max = 0.7"),
         (
             obstacle(box([0.0, 0.0, 0.2], [0.1, 0.1, 0.2])),

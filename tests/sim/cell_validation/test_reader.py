@@ -143,6 +143,16 @@ def test_endless_lists_give_an_answer_of_bounded_length() -> None:
     assert len(places) <= MAX_FAULTS
 
 
+def test_long_names_and_numbers_give_an_answer_of_bounded_length() -> None:
+    strings = {"n" * 100_000: ["\x01"] * 5_000}
+    with pytest.raises(BadCell) as caught:
+        read_cell(text_of(lambda cell: cell.update(strings)))
+    assert len(str(caught.value.problem())) < 200_000
+    with pytest.raises(BadCell) as caught:
+        read_cell(text_of(lambda cell: cell["stations"][0].update(levels=10**4000)))
+    assert len(str(caught.value.problem())) < 2_000
+
+
 def test_error_carries_all_faults_as_data() -> None:
     with pytest.raises(BadCell, match="and 1 more") as caught:
         read_cell(text_of(lambda cell: cell["robot"].update(dt=50.0, tool_length=120.0)))

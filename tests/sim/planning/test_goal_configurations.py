@@ -31,6 +31,16 @@ def test_a_spread_stays_within_its_radius_and_is_used() -> None:
     assert np.mean(misses) > 0.02
 
 
+def test_ranges_beyond_half_a_turn_are_searched() -> None:
+    low, high = ARM.limits.q_min.copy(), ARM.limits.q_max.copy()
+    low[3], high[3] = 3.3, 6.28
+    home = np.array(ARM.home)
+    home[3] = 5.0
+    turned = ARM._replace(limits=ARM.limits._replace(q_min=low, q_max=high), home=home)
+    found = goal_configurations(turned, TARGET, np.random.default_rng(0))
+    assert len(found) and ((found >= low) & (found <= high)).all()
+
+
 def test_out_of_reach_gives_no_posture() -> None:
     far = np.array([0.0, 2.5, 0.3])
     assert goal_configurations(ARM, far, np.random.default_rng(0)).shape == (0, 6)

@@ -1,6 +1,7 @@
 """Every planner finds free paths, says when it does not, and repeats itself by seed."""
 
 import threading
+import time
 
 import numpy as np
 import pytest
@@ -160,6 +161,21 @@ def test_outside_limits_and_no_goal_have_names() -> None:
     assert outcome == "start-outside-limits"
 
 
+def test_start_that_rounding_put_beyond_a_limit_is_planned_from() -> None:
+    checker, start = Checker(ARM, no_people()), station("cube5")
+    start[1] = ARM.limits.q_min[1] - 4e-16
+    goal = station("cube0")
+    found = plan(checker, start, goal[None], PlanSettings())
+    assert found.outcome != "start-outside-limits"
+
+
+def test_plan_that_waits_for_another_one_keeps_its_budget() -> None:
+    with planners._SEEDING:
+        began = time.perf_counter()
+        found = ask(blocking_people(), PlanSettings(budget_s=0.1))
+    assert found.outcome == "out-of-time" and time.perf_counter() - began < 5.0
+
+
 def test_one_of_several_goals_is_reached_and_named() -> None:
     goals = goal_configurations(
         ARM, np.array(CELL.station("cube0").position), np.random.default_rng(0)
@@ -211,6 +227,10 @@ def test_six_joints_can_be_planned() -> None:
         (PlanSettings(planner="rrt"), "planner"),
         (PlanSettings(budget_s=-1.0), "budget_s"),
         (PlanSettings(budget_s=float("nan")), "budget_s"),
+        (PlanSettings(budget_s=float("inf")), "budget_s"),
+        (PlanSettings(max_poses=-1), "max_poses"),
+        (PlanSettings(detour_rad=float("nan")), "detour_rad"),
+        (PlanSettings(detour_rad=-0.1), "detour_rad"),
         (PlanSettings(n_joints=7), "n_joints"),
     ],
 )

@@ -137,6 +137,15 @@ def test_at_interpolates_the_segments_and_holds_the_ends() -> None:
     np.testing.assert_array_equal(timed.at(-1.0)[0], timed.q[0])
 
 
+@pytest.mark.parametrize("dt", [0.02, 0.05])
+def test_at_takes_every_time_before_the_end(dt: float) -> None:
+    for n in range(1, 300):
+        q = np.linspace(np.zeros(6), np.ones(6), n + 1)
+        timed = TimedPath(dt=dt, q=q, qd=np.zeros((n + 1, 6)), corner_rad=0.0, n_stops=0)
+        last = timed.at(np.nextafter(timed.duration, 0.0))[0]
+        np.testing.assert_allclose(last, q[-2], atol=1e-9)
+
+
 def test_a_stop_takes_the_time_of_the_slowest_joint() -> None:
     qd = np.array([0.3, -0.1, 0.0, 0.0, 0.0, 0.0])
     assert stop_periods(qd, LIMITS) == 2

@@ -82,11 +82,17 @@ def test_clipped_slab_has_corners_on_both_planes() -> None:
     assert len(points) == 4
 
 
-def test_capsule_pairs_report_every_self_collision_of_the_meshes() -> None:
+@pytest.mark.parametrize("tool", [(0.12, 0.04), (0.12, 0.08), (0.2, 0.08), (0.6, 0.05)])
+def test_capsule_pairs_report_every_self_collision_of_the_meshes(
+    tool: tuple[float, float],
+) -> None:
     cell = load_cell()
-    reference, robot = CollisionReference(cell), Robot()
-    capsules = shapes.load_robot_capsules()
-    q = np.random.default_rng(7).uniform(cell.robot.q_min, cell.robot.q_max, (6000, 6))
+    mount = cell.robot.model_copy(update={"tool_length": tool[0], "tool_radius": tool[1]})
+    cell = cell.model_copy(update={"robot": mount})
+    reference, robot = CollisionReference(cell), Robot(tool[0])
+    capsules = shapes.load_robot_capsules(*tool)
+    n = 6000 if tool == shapes.SMALL_TOOL else 2000
+    q = np.random.default_rng(7).uniform(cell.robot.q_min, cell.robot.q_max, (n, 6))
     p0, p1 = robot_ends(robot, capsules, q)
     i, j = shapes.self_pairs(capsules).T
     gap = segment_distances(p0[:, i], p1[:, i], p0[:, j], p1[:, j])
@@ -94,7 +100,7 @@ def test_capsule_pairs_report_every_self_collision_of_the_meshes() -> None:
     collides = np.array([reference.self_collision(row) for row in q])
     assert collides.mean() > 0.08
     assert not (collides & ~reported).any()
-    assert (reported & ~collides).mean() < 0.03
+    assert (reported & ~collides).mean() < (0.03 if tool == shapes.SMALL_TOOL else 0.12)
 
 
 def test_capsules_are_free_of_each_other_in_all_working_postures() -> None:

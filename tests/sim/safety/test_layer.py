@@ -212,9 +212,13 @@ def test_an_assumption_that_is_no_size_is_refused(value):
         SafetySettings(tracker_delay=value)
 
 
-def test_people_at_nan_are_refused():
-    with pytest.raises(SimulationError, match="people"):
-        SafetyLayer(ARM, NO_MARGINS).decide(REST, NONE, NONE, NONE, ball(np.full(3, np.nan)))
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+def test_people_whose_numbers_are_not_finite_are_refused(value):
+    for row in range(9):
+        people = ball(np.array([0.5, 0.5, 0.5]))
+        people.columns[row, 0] = value
+        with pytest.raises(SimulationError, match="people"):
+            SafetyLayer(ARM, NO_MARGINS).decide(REST, NONE, NONE, NONE, people)
 
 
 def test_scaled_motion_written_out_in_time_is_the_motion():

@@ -20,6 +20,7 @@ from typing import NamedTuple
 
 from app.sim.core.arrays import Vec
 from app.sim.core.jit import kernel
+from app.sim.core.pick_depth import PICK_DEPTH_M
 
 APPROACH, DESCEND, LIFT = range(3)
 """Phases of a pick."""
@@ -28,8 +29,8 @@ APPROACH, DESCEND, LIFT = range(3)
 class GraspRules(NamedTuple):
     """Geometry and times of a grasp; ``depth`` 0 asks for the approach only."""
 
-    depth: float = 0.055
-    """Descent from the target to the object [m]: from 0.12 to 0.065 m over the table."""
+    depth: float = PICK_DEPTH_M
+    """Descent from the target to the object [m]."""
     close_s: float = 1.25
     """Time for which the tool is held at the object while the gripper closes [s]."""
     start_distance: float = 0.03

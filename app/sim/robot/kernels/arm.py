@@ -24,6 +24,8 @@ from app.sim.robot.kernels.joints import JointLimits, JointPath
 
 CONTROLLED = 5
 """Joints that a policy moves; the sixth turns the tool about itself (thesis 5.3.1)."""
+FIRST_MOVING = 1
+"""The capsule before this one, the base, does not move."""
 FIRST_OVER_TABLE = 2
 """Capsules before this one (base, shoulder) stand on the table and never leave it."""
 
@@ -160,7 +162,7 @@ def cell_clearance(arm: Arm, robot: Vec) -> tuple[float, int, int]:
     best, link = table_clearance(robot)
     near = -1
     if arm.boxes.shape[0] > 0:
-        d, k, box = box_clearance(robot, FIRST_OVER_TABLE, arm.boxes)
+        d, k, box = box_clearance(robot, FIRST_MOVING, arm.boxes)
         if d < best:
             best, link, near = d, k, box
     return best, link, near

@@ -2,6 +2,8 @@
 
 from typing import NamedTuple
 
+import numpy as np
+
 from app.sim.core.arrays import Vec
 
 
@@ -46,6 +48,12 @@ class JointLimits(NamedTuple):
     """Acceleration limits [rad/s^2]."""
     jerk_max: Vec
     """Jerk limits [rad/s^3]."""
+
+    def within_half_turn(self) -> tuple[Vec, Vec]:
+        """Return position limits [rad] cut to half a turn either way, where that leaves any."""
+        low, high = np.maximum(self.q_min, -np.pi), np.minimum(self.q_max, np.pi)
+        left = low < high
+        return np.where(left, low, self.q_min), np.where(left, high, self.q_max)
 
 
 class JointState(NamedTuple):

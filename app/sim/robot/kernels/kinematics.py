@@ -162,6 +162,10 @@ def ik_vertical(lengths: LinkLengths, limits: JointLimits, target: Vec, out: Vec
     out[4] = -0.5 * math.pi
     out[5] = 0.0
     for j in range(6):
+        if out[j] < q_min[j] and out[j] + 2.0 * math.pi <= q_max[j]:
+            out[j] += 2.0 * math.pi
+        elif out[j] > q_max[j] and out[j] - 2.0 * math.pi >= q_min[j]:
+            out[j] -= 2.0 * math.pi
         if out[j] < q_min[j] or out[j] > q_max[j]:
             reached = False
             out[j] = min(q_max[j], max(q_min[j], out[j]))

@@ -34,7 +34,8 @@ RESOLUTION = 0.01
 NOW, REST, END, FIRST_BETWEEN = range(4)
 """Nodes of a path: its start, its end at rest, the end of the period, and those between."""
 N_NODES = 32
-"""Greatest number of robot poses per path; a path that needs more is not admitted."""
+"""Greatest number of robot poses on each of the two parts of a path; one that needs more is not
+admitted."""
 CAUSE_TIME, CAUSE_PART, CAUSE_SHORTFALL = range(3)
 """Cause of the override: time on the path [s], part of the people, missing distance [m]."""
 
