@@ -87,9 +87,11 @@ def deploy_newest(services: Services) -> bool:
 
 
 def _run(services: Services) -> None:
+    """Check the follows until none is active, or another thread took over."""
+    me = threading.current_thread()
     while not services.stopping.wait(PERIOD_S):
         try:
-            if not deploy_newest(services):
+            if services.follows.thread is not me or not deploy_newest(services):
                 return
         except Exception:
             logger.exception("a followed training could not be checked")

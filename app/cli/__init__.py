@@ -21,6 +21,7 @@ recordings      The command group ``recordings``: import, list, show and remove 
                 motion
 report          The command ``report``: tables and figures of the thesis beside the results
 serve           The commands ``serve`` and ``setup``
+socket_limits   Limits of WebSocket connections: time for a client that does not read
 train           The command ``train``: train a policy in this process, without a server
 uvicorn_server  The application on uvicorn: one process, one worker, a quick end
 """

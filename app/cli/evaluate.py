@@ -55,7 +55,7 @@ def evaluate(
     with every_fault_printed("", as_json=as_json):
         motions = clean_runs(files, read_options(unit, root_unit, up, names))
     protocols.require_use(protocol, checkpoint)
-    reference = checkpoint or protocols.default_checkpoint(protocol)
+    reference = protocols.default_checkpoint(protocol) if checkpoint is None else checkpoint
     tested = None if reference is None else find_checkpoint(reference, settings)
     torch.set_num_threads(1)
     result = protocols.evaluate(protocol, tested, episodes=episodes, seed=seed, motions=motions)

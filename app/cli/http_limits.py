@@ -144,10 +144,26 @@ class LimitedHttp(HttpToolsProtocol):
         super().on_response_complete()
 
     def handle_websocket_upgrade(self) -> None:
-        """Pass the connection to the WebSocket protocol, which has its own limits."""
+        """Pass the connection to the WebSocket protocol, which has its own limits.
+
+        A handshake whose headers it cannot decode must leave no protocol behind: nothing would
+        remove it from the open connections.
+        """
         self._stop_timer()
         self._ended = True
-        super().handle_websocket_upgrade()
+        before = set(self.connections)
+        try:
+            if self.scope["method"] != "GET":
+                raise ValueError("a WebSocket handshake is a GET request")
+            super().handle_websocket_upgrade()
+        except ValueError as error:
+            self.connections.intersection_update(before)
+            self.connections.add(self)
+            wrong = "the headers of a WebSocket handshake must be ASCII"
+            detail = wrong if isinstance(error, UnicodeError) else str(error)
+            self.transport.write(_refusal(400, "bad-request", detail))
+            self.transport.close()
+            return
         if not getattr(self.transport.get_protocol(), "handshake_initiated", True):
             detail = "the headers of the handshake are too long or too many"
             self.transport.write(_refusal(431, "head-too-large", detail))

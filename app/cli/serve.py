@@ -1,7 +1,6 @@
 """The commands ``serve`` and ``setup``."""
 
 import time
-from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -14,7 +13,7 @@ def serve(
         str | None, typer.Option(help="Address to listen on (TANDEM_HOST).")
     ] = None,
     port: Annotated[int | None, typer.Option(help="Port (TANDEM_PORT).")] = None,
-    data: Annotated[Path | None, typer.Option(help="Data folder (TANDEM_DATA).")] = None,
+    data: Annotated[str | None, typer.Option(help="Data folder (TANDEM_DATA).")] = None,
 ) -> None:
     """Start the service."""
     from app.cli.preflight import check_database_unused, listen

@@ -184,7 +184,7 @@ def parse_overrides(sets: Sequence[str]) -> dict[str, Any]:
             raise InvalidInput("--set", pair, "must have the form FIELD=VALUE")
         try:
             overrides[name] = json.loads(text)
-        except ValueError:
+        except (ValueError, RecursionError):
             overrides[name] = text
     return overrides
 

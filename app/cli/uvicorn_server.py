@@ -18,6 +18,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from app.api.sockets import MAX_MESSAGE_BYTES
 from app.cli.http_limits import LimitedHttp
 from app.cli.preflight import address_of
+from app.cli.socket_limits import LimitedSocket
 from app.settings import Settings
 from app.traces import finish, provider_of_environment
 
@@ -69,6 +70,7 @@ def new_server(
     config = uvicorn.Config(
         _with_brief_failure(app),
         http=LimitedHttp,
+        ws=LimitedSocket,
         root_path=root_path,
         log_config=None,
         access_log=False,

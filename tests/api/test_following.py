@@ -1,3 +1,4 @@
+import threading
 from pathlib import Path
 
 import pytest
@@ -14,6 +15,7 @@ from app.store.records import Claim, JobRecord, NewJob, ResumeState
 from jobs.checkpoints import shipped
 from tests.support.databases import SQLITE_ONLY, claimed
 from tests.support.idle_service import add_world, idle_service, loading, own_policy
+from tests.support.waiting import wait_until
 
 pytestmark = SQLITE_ONLY
 
@@ -89,6 +91,23 @@ def test_world_takes_the_next_checkpoint_of_a_training_that_starts_at_step_0_aga
     attempts.record_checkpoint(services.store, claim, 5, new)
     assert followed(services) == (True, 5, new.sha256)
     assert queued(services) == [new.sha256, pretrained.SHA256["pick"], new.sha256]
+
+
+def test_follow_after_follow_leaves_one_thread(
+    services: Services, training: tuple[Claim, JobRecord], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(following, "PERIOD_S", 0.05)
+    claim, job = training
+    attempts.record_checkpoint(services.store, claim, 5, own_policy())
+
+    def n_threads() -> int:
+        return sum(one.name == "following" and one.is_alive() for one in threading.enumerate())
+
+    for _ in range(5):
+        following.start("main", job, services)
+        services.follows.thread = None  # as where another policy is chosen in between
+    following.start("main", job, services)
+    wait_until(lambda: n_threads() <= 1)
 
 
 def test_policy_chosen_while_a_newer_checkpoint_is_loaded_is_kept(

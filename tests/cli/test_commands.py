@@ -126,6 +126,10 @@ def test_setup_makes_the_database_and_compiles_every_part(tmp_path: Path) -> Non
         ["recordings", "import", "nobody.bvh"],
         ["recordings", "import", "/"],
         ["train", "pick-td3", "--set", "cell=kitchen"],
+        ["train", "pick-td3", "--set", "x=" + 100_000 * "["],
+        ["evaluate", "pick-single", "--episodes", "1", "--checkpoint", ""],
+        ["serve", "--data", ""],
+        ["serve", "--data", "~/tandem"],
     ],
 )
 def test_wrong_call_ends_with_status_2(
@@ -137,7 +141,7 @@ def test_wrong_call_ends_with_status_2(
     monkeypatch.chdir(tmp_path)
     assert main(arguments) == 2
     assert capsys.readouterr().err
-    assert not (tmp_path / "train.lock").exists()
+    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize(

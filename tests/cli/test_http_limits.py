@@ -335,6 +335,48 @@ def test_a_handshake_beyond_the_limits_of_websockets_is_refused(small: Small) ->
         assert refused.value.response.status_code == 431
 
 
+@pytest.mark.parametrize(
+    "more", [b"Sec-WebSocket-Protocol: \xc3\xa4\r\n", b"Connection: Upgrade, \xe4\r\n"]
+)
+def test_handshakes_that_cannot_be_decoded_are_refused_and_hold_no_connection(
+    more: bytes,
+) -> None:
+    handshake = b"GET /echo HTTP/1.1\r\nHost: here\r\n" + UPGRADE + more + b"\r\n"
+    with serving() as small:
+        for _ in range(http_limits.MAX_CONNECTIONS + 20):
+            answer = small.ask(handshake)
+        assert (status_of(answer), problem_of(answer)) == (400, "bad-request")
+        assert b"must be ASCII" in answer
+        assert status_of(small.ask(NAME + LAST)) == 200
+        small.process.terminate()
+        _, log = small.process.communicate(timeout=60.0)
+        assert "Traceback" not in log
+
+
+def test_handshake_is_a_get_request(small: Small) -> None:
+    answer = small.ask(b"POST /echo HTTP/1.1\r\n" + BEARER + UPGRADE + b"\r\n")
+    assert status_of(answer) == 400 and b"is a GET request" in answer
+
+
+def test_socket_whose_client_reads_nothing_is_ended() -> None:
+    with serving(DRAIN_S=1.0) as small, small.connect() as client:
+        client.sendall(b"GET /flood HTTP/1.1\r\n" + BEARER + UPGRADE + b"\r\n")
+        time.sleep(3.0)
+        n_bytes = len(rest_of(client))  # ends, although the service sends without end
+        assert 0 < n_bytes < 64 * MIB
+
+
+def test_pings_of_a_client_that_reads_nothing_are_not_kept() -> None:
+    ping = b"\x89\xfd" + bytes(4) + bytes(125)
+    with serving(DRAIN_S=600.0) as small, small.connect() as client:
+        client.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+        client.sendall(b"GET /echo HTTP/1.1\r\n" + BEARER + UPGRADE + b"\r\n")
+        before = small.peak_memory
+        for _ in range(64):
+            client.sendall(ping * 8192)
+        assert small.peak_memory - before < MAX_GROWTH
+
+
 def test_idle_connections_are_closed_for_new_ones() -> None:
     n_clients = http_limits.MAX_CONNECTIONS + 40
     with serving(HEAD_S=300.0) as small, ExitStack() as stack:  # none is closed for its age

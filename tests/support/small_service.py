@@ -65,6 +65,14 @@ async def echo(socket: WebSocket) -> None:
         await socket.send_text(text)
 
 
+@app.websocket("/flood")
+async def flood(socket: WebSocket) -> None:
+    """Send without end."""
+    await socket.accept()
+    while True:
+        await socket.send_bytes(bytes(65536))
+
+
 app.add_middleware(BodyMiddleware, files={"/length": 64 * 1024 * 1024})
 app.add_middleware(AccessMiddleware, token=TOKEN, open_paths=())
 

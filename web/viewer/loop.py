@@ -9,6 +9,7 @@ several steps are drawn as one frame. Without a viewer nothing is drawn.
 """
 
 import logging
+import math
 import threading
 import time
 from collections import deque
@@ -40,6 +41,8 @@ logger = logging.getLogger(__name__)
 
 MAX_BEHIND_S = 0.2
 """Greatest delay that is caught up [s]."""
+FAULT_LOG_S = 10.0
+"""Least time between two messages about a scene that cannot be drawn [s]."""
 ERROR_PAUSE_S = 1.0
 """Pause after an unexpected error [s]."""
 FRAME_S = 0.04
@@ -76,6 +79,7 @@ class LiveCell:
         """Lateness of its ticks."""
         self._speed = 1
         self._ticks, self._undrawn_s = 0, 0.0
+        self._fault_logged_at = -math.inf
         self._done = 0
         self._refused: deque[RefusedCommand] = deque(maxlen=MAX_REFUSED)
         self._risk = RiskWorker()
@@ -155,7 +159,19 @@ class LiveCell:
         self._ticks += 1
         self._undrawn_s += dt * self._speed
         if self._ticks % max(1, round(FRAME_S / dt)) == 0:
+            self._draw_safely(draw, snapshot)
+
+    def _draw_safely(
+        self, draw: Callable[[WorldSnapshot], None], snapshot: WorldSnapshot
+    ) -> None:
+        """Draw a snapshot; a fault of the viewer does not delay the world."""
+        try:
             draw(snapshot)
+        except Exception:
+            now = time.monotonic()
+            if now - self._fault_logged_at > FAULT_LOG_S:
+                self._fault_logged_at = now
+                logger.exception("the scene could not be drawn at tick %d", snapshot.tick)
 
     def _refuse(self, reason: str) -> None:
         """List the present command as refused in the next snapshots, with the reason."""

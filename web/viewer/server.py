@@ -48,6 +48,8 @@ class ViewerServer(viser.ViserServer):
         except BaseException:
             self._folder.close()
             raise
+        buffer = self._websock_server._broadcast_buffer
+        buffer.message_event = _LoopEvent(buffer.event_loop)
         self.is_current = threading.Event()
         """Whether the scene is the present one; a connecting viewer waits until it is."""
         self.is_current.set()
@@ -73,6 +75,30 @@ class ViewerServer(viser.ViserServer):
         """End the server and remove its socket."""
         super().stop()
         self._folder.close()
+
+
+class _LoopEvent(asyncio.Event):
+    """An event that a thread may set: it wakes waiters on its loop only.
+
+    viser (1.1.1) sets it from the thread that draws, and once more on the loop. The first call
+    changes the waiters beside the loop, which may iterate over them at that moment.
+    """
+
+    def __init__(self, loop: asyncio.AbstractEventLoop) -> None:
+        super().__init__()
+        self._owner = loop
+
+    def set(self) -> None:
+        """Set the event; on another thread, leave the waiters to the call on the loop."""
+        try:
+            is_on_loop = asyncio.get_running_loop() is self._owner
+        except RuntimeError:
+            is_on_loop = False
+        if is_on_loop:
+            self._value = False  # asyncio wakes nobody where it is set already
+            super().set()
+        else:
+            self._value = True
 
 
 @contextmanager

@@ -54,7 +54,7 @@ def _from_json(body: bytes) -> str:
     try:
         given = json.loads(body)["token"]
     except (ValueError, KeyError, TypeError, RecursionError) as error:
-        raise InvalidInput("token", "nothing", "must be given") from error
+        raise InvalidInput("token", None, "is required") from error
     if not isinstance(given, str):
         raise InvalidInput("token", "***", "must be a string")
     return given

@@ -10,6 +10,7 @@ import asyncio
 import gzip
 import hashlib
 import logging
+import math
 from functools import lru_cache
 from importlib import resources
 from typing import Annotated
@@ -42,6 +43,19 @@ TYPES = {
     "ViewerCameraMessage",
 }
 """Allowed messages of a browser: no uploads, no requests for a public tunnel."""
+VECTORS = {
+    "wxyz": 4,
+    "position": 3,
+    "look_at": 3,
+    "up_direction": 3,
+    "start_position": 3,
+    "end_position": 3,
+    "ray_origin": 3,
+    "ray_direction": 3,
+    "start_screen_pos": 2,
+    "end_screen_pos": 2,
+}
+"""Numbers of each vector of a message, which the viewer stores as they come."""
 SMALL_BYTES = 1024
 """Largest frame decoded on the event loop, in microseconds."""
 # The viewer's page is one inline script that unpacks itself, and its WebAssembly loader
@@ -186,11 +200,23 @@ def is_allowed(frame: bytes) -> bool:
     """Return whether a browser's frame may reach the viewer.
 
     A frame is one msgpack map with the name of the message in ``type``. It is decoded as the
-    viewer does, so that both see the same ``type``.
+    viewer does, so that both see the same ``type``. Its vectors have finite numbers.
     """
     try:
         message = msgspec.msgpack.decode(frame)
     except (msgspec.DecodeError, ValueError, RecursionError):
         return False
     kind = message.get("type") if isinstance(message, dict) else None
-    return isinstance(kind, str) and kind in TYPES
+    if not isinstance(kind, str) or kind not in TYPES:
+        return False
+    given = ((message[name], size) for name, size in VECTORS.items() if name in message)
+    return all(value is None or _is_vector(value, size) for value, size in given)
+
+
+def _is_vector(value: object, size: int) -> bool:
+    """Return whether a value is a list of finite numbers of a given length."""
+    return (
+        isinstance(value, list)
+        and len(value) == size
+        and all(type(one) in (int, float) and math.isfinite(one) for one in value)
+    )

@@ -32,7 +32,7 @@ from app.api.world_policies import (
     submit_loaded,
     task_policy_for,
 )
-from app.errors import InvalidInput, NotReady
+from app.errors import CheckpointMismatch, InvalidInput, NotReady
 from app.live.command_checks import CommandMessage
 from app.live.commands import LoadingCommand
 from app.live.factory import lacks_for_live
@@ -164,7 +164,7 @@ def _policies_of(
     if body.sorting_policy is None:
         sorting_policy = sorting_policy_for(cell, services)
     else:
-        sorting_policy = services.sorting_policies.load(body.sorting_policy)
+        sorting_policy = _named_sorting_policy(body.sorting_policy, services)
         require_sorting_policy(sorting_policy, cell, "sorting_policy")
     if is_reaching(cell):
         if body.checkpoint is None:
@@ -175,6 +175,18 @@ def _policies_of(
     policy = services.task_policies.load(body.checkpoint)
     require_task_policy(policy, cell, services)
     return policy, sorting_policy, None
+
+
+def _named_sorting_policy(name: str, services: Services) -> SortingValues:
+    """Return the sorting policy of that name; errors name the field of the request."""
+    try:
+        return services.sorting_policies.load(name)
+    except InvalidInput as error:
+        raise InvalidInput("sorting_policy", error.value, error.rule, error.choices) from None
+    except CheckpointMismatch as error:
+        raise CheckpointMismatch(
+            error.field, error.expected, error.actual, member="sorting_policy"
+        ) from None
 
 
 @router.put(

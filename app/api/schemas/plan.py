@@ -47,7 +47,7 @@ class PlanRequest(SortingFields):
     frame: FrameName = Field("robot-base", description=FRAME_TEXT)
     stamp: Stamp = Field(None, description="your time of the state; returned unchanged")
     robot: ArmState
-    people: Sequence[PersonInput] = Field(
+    people: list[PersonInput] = Field(
         max_length=MAX_SKELETONS, description="people in the cell, as in `/v1/task-selection`"
     )
     held: Word | None = Field(

@@ -153,7 +153,7 @@ def plan(
         if direct == 0 or settings.planner == "rrt-connect":
             return clock.answer("solved", straight, goals)
     if not _SEEDING.acquire(timeout=clock.left_s()):
-        found = clock.answer("out-of-time")
+        found = _Found("out-of-time", np.zeros((0, len(start))))
     else:
         try:
             ou.RNG.setSeed(seed)

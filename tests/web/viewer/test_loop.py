@@ -1,3 +1,4 @@
+import asyncio
 import stat
 import time
 from collections.abc import Iterator
@@ -18,6 +19,8 @@ from tests.support.straight_policy import StraightPolicy
 from tests.support.waiting import wait_until
 from tests.web.viewer_client import ViewerClient
 from web.viewer.loop import LiveCell
+from web.viewer.scene.cell_scene import CellScene
+from web.viewer.server import _LoopEvent
 
 
 @pytest.fixture(scope="module")
@@ -220,6 +223,38 @@ def test_nothing_is_drawn_without_a_viewer_but_the_first_one_sees_the_present() 
         assert "/gizmos/1" in {one.get("name") for one in at_first}
     wait_until(lambda: not server.has_viewers)
     live.stop()
+
+
+def test_scene_that_cannot_be_drawn_does_not_delay_the_world(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    live = LiveCell(load_cell(), None)
+
+    def fail(*_: object, **__: object) -> None:
+        raise ValueError("a gizmo of another shape")
+
+    live.start()
+    monkeypatch.setattr(CellScene, "draw", fail)
+    with ViewerClient(live.viewer_address):
+        wait_until(lambda: "could not be drawn" in caplog.text)
+        tick, began = live.handle.snapshot().tick, time.monotonic()
+        wait_until(lambda: live.handle.snapshot().tick >= tick + 60)
+        assert time.monotonic() - began < 40.0  # a pause at each picture would take longer
+        assert caplog.text.count("could not be drawn") <= 5
+    live.stop()
+
+
+def test_event_of_the_viewer_is_set_from_any_thread() -> None:
+    async def waited() -> bool:
+        event = _LoopEvent(asyncio.get_running_loop())
+        waiter = asyncio.create_task(event.wait())
+        await asyncio.sleep(0)
+        await asyncio.to_thread(event.set)
+        assert event.is_set() and not waiter.done()
+        event.set()
+        return await waiter
+
+    assert asyncio.run(waited())
 
 
 def test_stop_ends_thread_and_viewer() -> None:

@@ -81,6 +81,15 @@ def test_test_is_started(client: TestClient) -> None:
     assert len(blocks(world)) == 10
 
 
+@pytest.mark.parametrize(("name", "status"), [("nope", 422), ("reach", 409)])
+def test_wrong_sorting_policy_is_named_by_its_field(
+    client: TestClient, name: str, status: int
+) -> None:
+    body = {"cell": "sorting-e0", "sorting_policy": name}
+    refused = client.put("/v1/worlds/main/cell", json=body)
+    assert (refused.status_code, refused.json()["field"]) == (status, "sorting_policy")
+
+
 def test_planner_decides_alone_where_no_sorting_policy_is_set(client: TestClient) -> None:
     assert send(client, tag="set-sorting-policy", checkpoint=None).status_code == 202
     send(client, tag="toggle-goal", id=next(iter(blocks(client.get(WORLD).json()))))

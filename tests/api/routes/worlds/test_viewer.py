@@ -169,10 +169,23 @@ def test_frame_that_is_too_large_ends_its_own_connection_only(
         assert isinstance(other.recv(timeout=10.0), bytes)
 
 
+def moved(**vectors: object) -> bytes:
+    return msgspec.msgpack.encode({"type": "TransformControlsUpdateMessage", **vectors})
+
+
 @pytest.mark.parametrize(
     ("frame", "allowed"),
     [
         (msgspec.msgpack.encode({"type": "ViewerCameraMessage", "fov": 1.0}), True),
+        (moved(position=[0.1, 0.2, 3], wxyz=[1.0, 0.0, 0.0, 0.0]), True),
+        (moved(position=[0.1]), False),
+        (moved(position=0.1), False),
+        (moved(position=[0.1, 0.2, "3"]), False),
+        (moved(position=[0.1, 0.2, True]), False),
+        (moved(position=[0.1, 0.2, float("nan")]), False),
+        (moved(wxyz=[1.0, 0.0, 0.0, float("inf")]), False),
+        (moved(wxyz=[1.0, 0.0, 0.0]), False),
+        (moved(ray_origin=None), True),
         (msgspec.msgpack.encode({"type": "ShareUrlRequest"}), False),
         (msgspec.msgpack.encode({"x": 1}), False),
         (msgspec.msgpack.encode([{"type": "ViewerCameraMessage"}]), False),
