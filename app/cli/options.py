@@ -1,7 +1,6 @@
 """Options that several commands have, and the environment that every command prepares."""
 
 import os
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -44,7 +43,7 @@ def read_options(
 
 
 def prepared_settings(
-    *, host: str | None = None, port: int | None = None, data: Path | None = None
+    *, host: str | None = None, port: int | None = None, data: str | None = None
 ) -> "Settings":
     """Read the settings and keep compiled kernels in the data folder.
 

@@ -234,11 +234,6 @@ class CollisionReference:
             if self.touching(link, body)
         ]
 
-    def self_collision(self, q: Vec) -> bool:
-        """Return whether links that are not neighbours touch at ``q`` [rad], shape (6,)."""
-        self.place_robot(q)
-        return any(self.touching(link, body) for link, body, _ in self._self_pairs())
-
     def distance(self, q: Vec, human_q: Vec) -> Distance:
         """Return the least distance between robot and person [m]; use it with hulls.
 

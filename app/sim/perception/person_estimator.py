@@ -23,8 +23,6 @@ Degradations, named in the estimate:
 - arms and legs both contradict the facing direction: ``mirrored``. Either both are exchanged or
   the frame is mirrored, which displaces people: after ``swap_s`` without other frames, such
   frames count as ``foreign-frame``.
-
-Several people: ``multi_person_tracker.py``.
 """
 
 import math
@@ -166,8 +164,7 @@ class PersonEstimator:
         self, size: Vec, settings: EstimatorSettings | None = None, floor_z: float | None = None
     ) -> None:
         if np.shape(size) != (N_SIZE,) or not np.isfinite(size).all():
-            rule = f"must be {N_SIZE} finite numbers"
-            raise InvalidInput("size", np.asarray(size).tolist(), rule)
+            raise InvalidInput("size", np.asarray(size).tolist(), f"must be {N_SIZE} numbers")
         self.settings = settings or EstimatorSettings()
         self._size, self._floor_z = size, floor_z
         self._points = PointFilter(N_KEYPOINTS, self.settings.filter)
@@ -254,17 +251,15 @@ class PersonEstimator:
 
     def _mirrored_for(self, t: float) -> float:
         """Count a mirrored frame; return the time since the first of them in a row [s]."""
-        if t - self._mirror_seen_at > self.settings.filter.hold_s:
-            self._mirrored_at = t
-        self._mirror_seen_at = t
+        is_first = t - self._mirror_seen_at > self.settings.filter.hold_s
+        self._mirrored_at, self._mirror_seen_at = (t if is_first else self._mirrored_at), t
         return t - self._mirrored_at
 
     def _forget(self) -> None:
         """Reset to the initial state."""
         self._points.forget(list(range(N_KEYPOINTS)))
         self._center.forget([0])
-        self._seen_at, self._unfit = -math.inf, False
-        self._mirror_seen_at = -math.inf
+        self._seen_at, self._mirror_seen_at, self._unfit = -math.inf, -math.inf, False
         self._swapped_at.clear()
         self._q = self.last_points = None
 

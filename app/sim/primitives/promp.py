@@ -258,19 +258,11 @@ def observe(promp: ProMP, rows: Vec, values: Vec, noise: Vec) -> ProMP:
     return replace(promp, mean=mean.reshape(promp.mean.shape), cov=0.5 * (cov + cov.T))
 
 
-def draw_weights(promp: ProMP, n: int, rng: np.random.Generator) -> Vec:
-    """Draw weights without regard to joint limits, shape (n, n_joints, n_basis)."""
-    sizes, directions = np.linalg.eigh(promp.cov)
-    root = directions * np.sqrt(np.clip(sizes, 0.0, None))
-    away = rng.standard_normal((n, len(root))) @ root.T
-    return np.asarray(promp.mean + away.reshape(n, promp.n_joints, promp.n_basis))
-
-
 def draw_like(weights: Vec, n: int, rng: np.random.Generator, floor: float = FLOOR) -> Vec:
     """Draw weights from the primitive of given demonstrations, (n, n_joints, n_basis).
 
-    The same distribution as :func:`draw_weights` of :func:`of_weights`, without its covariance:
-    normal multiples of the demonstrations' differences from their mean, and of the floor.
+    The normal distribution of :func:`of_weights`, without its covariance: normal multiples of
+    the demonstrations' differences from their mean, and of the floor.
 
     Args:
         weights: Weights of each demonstration, shape (m, n_joints, n_basis).

@@ -12,7 +12,6 @@ from app.sim.primitives.promp import (
     ProMP,
     basis,
     draw_like,
-    draw_weights,
     fit,
     gain,
     gain_of_ends,
@@ -38,6 +37,14 @@ def peer() -> dict[str, Vec]:
     """What the package movement_primitives gives for the same primitive."""
     with np.load(reference.FILE, allow_pickle=False) as file:
         return dict(file)
+
+
+def draw_weights(promp: ProMP, n: int, rng: np.random.Generator) -> Vec:
+    """Draw weights without regard to joint limits, shape (n, n_joints, n_basis)."""
+    sizes, directions = np.linalg.eigh(promp.cov)
+    root = directions * np.sqrt(np.clip(sizes, 0.0, None))
+    away = rng.standard_normal((n, len(root))) @ root.T
+    return np.asarray(promp.mean + away.reshape(n, promp.n_joints, promp.n_basis))
 
 
 def test_basis_sums_to_one_and_peaks_at_its_centres() -> None:

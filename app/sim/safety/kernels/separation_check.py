@@ -36,8 +36,8 @@ NOW, REST, END, FIRST_BETWEEN = range(4)
 N_NODES = 32
 """Greatest number of robot poses on each of the two parts of a path; one that needs more is not
 admitted."""
-CAUSE_TIME, CAUSE_PART, CAUSE_SHORTFALL = range(3)
-"""Cause of the override: time on the path [s], part of the people, missing distance [m]."""
+CAUSE_PART, CAUSE_SHORTFALL = range(2)
+"""Cause of the override: part of the people, missing distance [m]."""
 
 
 class SeparationRule(NamedTuple):
@@ -123,7 +123,7 @@ class SsmWorkspace(NamedTuple):
     end: JointState
     """Decision: state after the period."""
     cause: Vec
-    """Cause of the override (CAUSE_TIME, CAUSE_PART, CAUSE_SHORTFALL); part -1 if none."""
+    """Cause of the override (CAUSE_PART, CAUSE_SHORTFALL); part -1 if none."""
 
 
 def new_ssm_workspace(arm: Arm, n_columns: int, n_cylinders: int) -> SsmWorkspace:
@@ -148,7 +148,7 @@ def new_ssm_workspace(arm: Arm, n_columns: int, n_cylinders: int) -> SsmWorkspac
         d=np.zeros(6),
         deceleration=np.zeros(1),
         end=JointState(np.zeros(6), np.zeros(6), np.zeros(6)),
-        cause=np.zeros(3),
+        cause=np.zeros(2),
     )
 
 
@@ -197,21 +197,20 @@ def person_reach(rule: SeparationRule, j: int, age: float, space: SsmWorkspace) 
 
 @kernel(error_model="numpy", inline="always")
 def violates_separation(
-    rule: SeparationRule, age: float, t: float, node: int, space: SsmWorkspace
+    rule: SeparationRule, age: float, node: int, space: SsmWorkspace
 ) -> bool:
     """Return whether a part that may not be touched could be in contact at a node.
 
     Args:
         rule: Assumptions.
         age: Time since people were observed [s].
-        t: Time of the node on the path [s].
     """
     gap = space.gap[node]
     for j in range(gap.shape[0]):
         reach = person_reach(rule, j, age, space)
         if rule.contact_speed[j] <= 0.0 and not gap[j] >= reach:
             cause = space.cause
-            cause[CAUSE_TIME], cause[CAUSE_PART], cause[CAUSE_SHORTFALL] = t, j, reach - gap[j]
+            cause[CAUSE_PART], cause[CAUSE_SHORTFALL] = j, reach - gap[j]
             return True
     return False
 
@@ -242,8 +241,8 @@ def _interval_clear(
     xa, xb = space.x[a], space.x[b]
     sa, path_speed = path_parameter(segment.deceleration, xa)
     sb, _ = path_parameter(segment.deceleration, xb)
-    t, length = segment.start + xb, sb - sa
-    span, age = xb - xa, latency + t
+    length = sb - sa
+    span, age = xb - xa, latency + (segment.start + xb)
     fastest = segment.speed
     if length > 0.0:
         chord = greatest_displacement(space.columns[a], space.columns[b])
@@ -256,7 +255,7 @@ def _interval_clear(
         reach = person_reach(rule, j, age, space)
         if not (least > reach or path_speed * fastest <= rule.contact_speed[j]):
             cause = space.cause
-            cause[CAUSE_TIME], cause[CAUSE_PART], cause[CAUSE_SHORTFALL] = t, j, reach - least
+            cause[CAUSE_PART], cause[CAUSE_SHORTFALL] = j, reach - least
             return False, both + max(rule.speed[j], space.observed_speed[j]) * span
     return True, w
 
@@ -293,10 +292,9 @@ def segment_clear(
             return False
         x = 0.5 * (space.x[left] + space.x[b])
         motion_at(segment.path, segment.deceleration, x, space.q_node, space.qd_node)
-        t = segment.start + x
         age = latency + segment.start + x
         place_node(arm, people, space.q_node, fresh, age, space)
-        if violates_separation(rule, age, t, fresh, space):
+        if violates_separation(rule, age, fresh, space):
             return False
         space.x[fresh] = x
         top += 1

@@ -75,7 +75,6 @@ from app.sim.robot.kernels.override import (
 from app.sim.safety.kernels.separation_check import (
     CAUSE_PART,
     CAUSE_SHORTFALL,
-    CAUSE_TIME,
     END,
     NOW,
     REST,
@@ -150,10 +149,10 @@ def admissible(
     if _trivially_separated(rule, distance, age, age - latency, space):
         return True
     place_node(arm, people, space.q_node, REST, age, space)
-    if violates_separation(rule, age, arm.dt + t_stop, REST, space):
+    if violates_separation(rule, age, REST, space):
         return False
     place_node(arm, people, q1, END, latency + arm.dt, space)
-    if violates_separation(rule, latency + arm.dt, arm.dt, END, space):
+    if violates_separation(rule, latency + arm.dt, END, space):
         return False
     space.x[NOW], space.x[END] = 0.0, arm.dt
     segment = PathSegment(path, deceleration, 0.0, speed, curvature, NOW, END)
@@ -208,14 +207,10 @@ def decide(
         space: Work space; filled with the executed motion and the cause of the override.
     """
     latency = rule.latency + age
-    space.cause[CAUSE_TIME], space.cause[CAUSE_PART], space.cause[CAUSE_SHORTFALL] = (
-        0.0,
-        -1.0,
-        0.0,
-    )
+    space.cause[CAUSE_PART], space.cause[CAUSE_SHORTFALL] = -1.0, 0.0
     place_node(arm, people, path.q, NOW, latency, space)
     override = 0.0
-    if not violates_separation(rule, latency, 0.0, NOW, space) and keeps_limits(
+    if not violates_separation(rule, latency, NOW, space) and keeps_limits(
         path, arm.limits, arm.dt
     ):
         override = _greatest_override(arm, rule, latency, people, path, space)

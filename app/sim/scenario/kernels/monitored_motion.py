@@ -61,7 +61,6 @@ from app.sim.scenario.kernels.monitored_state import (
     OVERRIDES,
     PERIODS,
     PERSON,
-    SLOWED,
     SPEED,
     STANDSTILL,
     STANDSTILL_STOPPED,
@@ -214,7 +213,6 @@ def _execute(
     account[OVERRIDES] += override
     account[STOPPED] += 1.0 if override <= 0.0 else 0.0
     account[BELOW_HALF] += 1.0 if override < 0.5 else 0.0
-    account[SLOWED] += 1.0 if override < 1.0 else 0.0
 
 
 @kernel(inline="always")

@@ -9,12 +9,11 @@ from app.sim.core.arrays import Vec
 from app.sim.safety.kernels.adversarial_people import TrialWorkspace
 from app.sim.safety.kernels.separation_check import SeparationRule
 
-N_ACCOUNT = 14
+N_ACCOUNT = 13
 (
     PERIODS,
     STOPPED,
     BELOW_HALF,
-    SLOWED,
     STANDSTILL,
     STANDSTILL_STOPPED,
     JOINT_PATH,
@@ -26,7 +25,7 @@ N_ACCOUNT = 14
     TOUCHED_AT_REST,
     ALLOWED,
 ) = range(N_ACCOUNT)
-"""Account of an episode: control periods; periods with override 0, below one half and below 1;
+"""Account of an episode: control periods; periods with override 0 and below one half;
 periods that end at standstill, and those of them with override 0; path length of the joints
 [rad] and of the tcp [m]; NO_TOUCH, PERSON or CELL; speed of the touching link [m/s]; greatest
 speed of any person [m/s]; sum of the overrides; periods in which a person touches the robot at
