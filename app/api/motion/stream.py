@@ -9,6 +9,7 @@ answered is the newest one and its waiting time is known.
 import asyncio
 import json
 import logging
+import re
 import time
 from collections import deque
 from collections.abc import Awaitable, Callable
@@ -30,6 +31,7 @@ from app.api.problems import (
     service_problem,
     validation_problem,
 )
+from app.api.registry import MAX_POLICIES
 from app.api.schemas.motion import LeftOut, MotionRequest, StreamUse
 from app.api.services import Services
 from app.api.sockets import MAX_MESSAGE, POLICY
@@ -49,6 +51,7 @@ CHECK_S = 0.2
 SHARES: tuple[tuple[LeftOut, float], ...] = (("search", 0.25), ("rollout", 0.5))
 """What is left out once a request has waited for more than this share of its deadline."""
 GOING_AWAY = 1001
+_CHECKPOINT = re.compile(r'"checkpoint"\s*:\s*"([^"\\]{1,64})"')
 
 Which = Literal["newest", "each"]
 
@@ -83,6 +86,7 @@ class MotionSocket:
         self._arrived, self._taken = asyncio.Event(), asyncio.Event()
         self._last_s = time.monotonic()
         self._close: tuple[int, str] | None = None
+        self._named: set[str] = set()
 
     async def serve(self) -> None:
         """Answer requests until the client leaves, the socket is idle or the server stops."""
@@ -136,6 +140,7 @@ class MotionSocket:
     async def _answer(self) -> None:
         while True:
             await self._arrived.wait()
+            await self._load_policy()
             async with self._load.turn:
                 await asyncio.sleep(0)  # messages are received between two decisions
                 request = self._waiting.popleft()
@@ -147,6 +152,17 @@ class MotionSocket:
                 whole = begin - request.at <= SHARES[0][1] * self._deadline_s
                 self._load.note(self._rate, time.perf_counter() - begin, whole=whole)
             await self._client.send_text(text)
+
+    async def _load_policy(self) -> None:
+        """Load a policy that a request names first, before its turn: others go on meanwhile."""
+        named = _CHECKPOINT.search(self._waiting[0].text or "")
+        if named is None or named[1] in self._named:
+            return
+        if len(self._named) >= MAX_POLICIES:
+            self._named.clear()
+        self._named.add(named[1])
+        with suppress(ServiceError):  # the answer to the request says so
+            await self._services.reach_policies.get(named[1])
 
     async def _reply(self, request: PendingMessage, begin: float) -> str:
         """Return the answer to a message as JSON: a :class:`MotionAnswer` or a problem."""

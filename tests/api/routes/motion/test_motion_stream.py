@@ -101,6 +101,28 @@ def test_answer_says_how_its_request_was_served(url: str) -> None:
     assert stream == {"missed_deadline": False, "superseded": 0, "left_out": []}
 
 
+def test_policy_that_one_client_names_first_is_loaded_beside_the_decisions_of_others(
+    services: Services, url: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    release, began, load = threading.Event(), threading.Event(), services.reach_policies.load
+
+    def slow(reference: str | None) -> Any:
+        if reference == "slow":
+            began.set()
+            assert release.wait(PATIENCE_S)
+        return load(reference)
+
+    monkeypatch.setattr(services.reach_policies, "load", slow)
+    with connect(url) as one, connect(url) as other:
+        send(one, checkpoint="slow")
+        assert began.wait(PATIENCE_S)
+        send(other, stamp="other")
+        assert received(other)["stamp"] == "other"
+        release.set()
+        refused = received(one)
+        assert (refused["status"], refused["field"]) == (422, "checkpoint")
+
+
 def test_only_the_newest_request_of_a_client_is_answered(services: Services, url: str) -> None:
     with connect(url) as socket, connect(url) as other:
         with decisions_held(services):
