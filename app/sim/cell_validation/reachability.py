@@ -16,6 +16,7 @@ from app.sim.cells.cell import Cell
 from app.sim.collision.fcl_reference import make_capsule, obstacle_box, place_capsule, touch
 from app.sim.core.arrays import Vec
 from app.sim.robot.capsules import load_robot_capsules, self_pairs
+from app.sim.robot.inverse_kinematics import configuration_at
 from app.sim.robot.ur10 import Robot
 
 SHOULDER_LINK = 1
@@ -24,10 +25,8 @@ LONGEST_REACH = 1.45
 """No point of the robot is farther from its base than this, with a tool of 0.12 m [m]."""
 SHOULDER = np.array([0.0, 0.0, 0.1273])
 """Centre of the reach [m]."""
-TOLERANCE = 1e-3
-"""Distance at which a target counts as reached [m]."""
-N_STARTS, N_STEPS = 16, 60
-DAMPING, LONGEST_STEP = 0.05, 0.4
+N_STARTS = 16
+"""Random starts of a search."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -127,7 +126,7 @@ class Reach:
         starts = [self._home, *rng.uniform(self._q_min, self._q_max, (N_STARTS, 6))]
         reason = "no configuration inside the joint limits was found"
         for start in starts:
-            q = self._solve(point, start)
+            q = configuration_at(self._robot, point, start, (self._q_min, self._q_max))
             if q is None:
                 continue
             found = next(self.contacts(q), None)
@@ -135,16 +134,3 @@ class Reach:
                 return ReachResult(q=q)
             reason = f"every configuration found is in contact: {found.text}"
         return ReachResult(q=None, reason=reason)
-
-    def _solve(self, point: Vec, start: Vec) -> Vec | None:
-        """Return the result of damped least squares from ``start``; None if it fails."""
-        q = start.copy()
-        for _ in range(N_STEPS):
-            error = point - self._robot.tcp_pose(q)[:3, 3]
-            if np.linalg.norm(error) < TOLERANCE:
-                return q
-            slope = self._robot.jacobian(q)[:3]
-            step = slope.T @ np.linalg.solve(slope @ slope.T + DAMPING**2 * np.eye(3), error)
-            step *= min(1.0, LONGEST_STEP / max(float(np.abs(step).max()), 1e-9))
-            q = np.clip(q + step, self._q_min, self._q_max)
-        return None

@@ -7,18 +7,12 @@ among which a planner may choose.
 import numpy as np
 
 from app.sim.core.arrays import Vec
+from app.sim.robot.inverse_kinematics import configuration_at
 from app.sim.robot.kernels.arm import CONTROLLED, Arm
 from app.sim.robot.ur10 import Robot
 
-DAMPING = 0.05
-"""Damping of the least squares [m/rad]: keeps steps short near singular configurations."""
-LONGEST_STEP = 0.3
-"""Longest step of a joint per iteration [rad]."""
-ITERATIONS = 60
 N_STARTS = 24
 """Starts of the search: the cell's home, then random ones."""
-CLOSE = 1e-4
-"""Distance of tcp and target at which the iteration ends [m]."""
 APART = 0.1
 """Configurations nearer than this count as one [rad]."""
 
@@ -50,26 +44,10 @@ def goal_configurations(
         if k > 0 and spread > 0.0:
             offset = rng.normal(size=3)
             point += spread * rng.uniform() ** (1.0 / 3.0) * offset / np.linalg.norm(offset)
-        reached = _descend(robot, arm, point, q)
+        limits = arm.limits.q_min, arm.limits.q_max
+        reached = configuration_at(robot, point, q, limits, CONTROLLED)
         if reached is None:
             continue
         if all(np.abs(reached - other).max() > APART for other in found):
             found.append(reached)
     return np.array(found).reshape(-1, 6)
-
-
-def _descend(robot: Robot, arm: Arm, point: Vec, q: Vec) -> Vec | None:
-    """Return the configuration found by damped least squares from ``q``; None if none."""
-    moving = slice(0, CONTROLLED)
-    for _ in range(ITERATIONS):
-        miss = point - robot.tcp_pose(q)[:3, 3]
-        if float(np.linalg.norm(miss)) <= CLOSE:
-            return q
-        jacobian = robot.jacobian(q)[:3, moving]
-        square = jacobian @ jacobian.T + DAMPING**2 * np.eye(3)
-        step = jacobian.T @ np.linalg.solve(square, miss)
-        step *= min(1.0, LONGEST_STEP / max(float(np.abs(step).max()), 1e-12))
-        q[moving] = np.clip(
-            q[moving] + step, arm.limits.q_min[moving], arm.limits.q_max[moving]
-        )
-    return None
