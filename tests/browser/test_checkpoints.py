@@ -9,6 +9,7 @@ import pytest
 from playwright.sync_api import Page, Route, expect
 
 from app.policies.checkpoints import pretrained
+from tests.browser.test_training import open_form
 from tests.support import patient_http
 
 pytestmark = pytest.mark.browser
@@ -75,7 +76,7 @@ def test_shipped_checkpoints_are_choices_behind_a_page_of_newer_ones(
     expect(options).to_contain_text(
         ["pick · Pick and place (TD3)", "pick-monitored · Pick and place under SSM (TD3)"]
     )
-    page.click("#tab-training")
+    open_form(page)
     page.click('[data-kind="evaluate"]')
     page.select_option("#evaluate-protocol", "pick-single")
     expect(page.locator("#evaluate-checkpoint")).to_contain_text("pick-monitored · ")
