@@ -97,11 +97,11 @@ def test_follow_after_follow_leaves_one_thread(
     services: Services, training: tuple[Claim, JobRecord], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(following, "PERIOD_S", 0.05)
-    claim, job = training
+    (claim, job), before = training, set(threading.enumerate())
     attempts.record_checkpoint(services.store, claim, 5, own_policy())
 
     def n_threads() -> int:
-        return sum(one.name == "following" and one.is_alive() for one in threading.enumerate())
+        return sum(one.name == "following" for one in set(threading.enumerate()) - before)
 
     for _ in range(5):
         following.start("main", job, services)

@@ -18,6 +18,7 @@ from tests.support.listening_ports import listening_ports
 from tests.support.straight_policy import StraightPolicy
 from tests.support.waiting import wait_until
 from tests.web.viewer_client import ViewerClient
+from web.viewer import loop
 from web.viewer.loop import LiveCell
 from web.viewer.scene.cell_scene import CellScene
 from web.viewer.server import _LoopEvent
@@ -233,15 +234,16 @@ def test_scene_that_cannot_be_drawn_does_not_delay_the_world(
     def fail(*_: object, **__: object) -> None:
         raise ValueError("a gizmo of another shape")
 
+    monkeypatch.setattr(loop, "FAULT_LOG_S", 1e9)
+    monkeypatch.setattr(loop, "ERROR_PAUSE_S", 1e5)  # would stop the world
     live.start()
     monkeypatch.setattr(CellScene, "draw", fail)
     with ViewerClient(live.viewer_address):
         wait_until(lambda: "could not be drawn" in caplog.text)
-        tick, began = live.handle.snapshot().tick, time.monotonic()
+        tick = live.handle.snapshot().tick
         wait_until(lambda: live.handle.snapshot().tick >= tick + 60)
-        assert time.monotonic() - began < 40.0  # a pause at each picture would take longer
-        assert caplog.text.count("could not be drawn") <= 5
     live.stop()
+    assert caplog.text.count("could not be drawn") == 1
 
 
 def test_event_of_the_viewer_is_set_from_any_thread() -> None:
