@@ -374,9 +374,11 @@ def test_pings_of_a_client_that_reads_nothing_are_not_kept() -> None:
     with serving(DRAIN_S=600.0) as small, small.connect() as client:
         client.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
         client.sendall(b"GET /echo HTTP/1.1\r\n" + BEARER + UPGRADE + b"\r\n")
+        assert client.recv(1024).startswith(b"HTTP/1.1 101")
         before = small.peak_memory
-        for _ in range(64):
-            client.sendall(ping * 8192)
+        with suppress(ConnectionError):  # it answers no ping of the server either
+            for _ in range(40):  # 42 MB of answers
+                client.sendall(ping * 8192)
         assert small.peak_memory - before < MAX_GROWTH
 
 
