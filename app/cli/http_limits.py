@@ -151,23 +151,21 @@ class LimitedHttp(HttpToolsProtocol):
         """
         self._stop_timer()
         self._ended = True
+        if self.scope["method"] != "GET":
+            self._end_with(400, "bad-request", "a WebSocket handshake is a GET request")
+            return
         before = set(self.connections)
         try:
-            if self.scope["method"] != "GET":
-                raise ValueError("a WebSocket handshake is a GET request")
             super().handle_websocket_upgrade()
-        except ValueError as error:
+        except ValueError:
             self.connections.intersection_update(before)
             self.connections.add(self)
-            wrong = "the headers of a WebSocket handshake must be ASCII"
-            detail = wrong if isinstance(error, UnicodeError) else str(error)
-            self.transport.write(_refusal(400, "bad-request", detail))
-            self.transport.close()
+            detail = "the headers of a WebSocket handshake must be ASCII"
+            self._end_with(400, "bad-request", detail)
             return
         if not getattr(self.transport.get_protocol(), "handshake_initiated", True):
             detail = "the headers of the handshake are too long or too many"
-            self.transport.write(_refusal(431, "head-too-large", detail))
-            self.transport.close()
+            self._end_with(431, "head-too-large", detail)
 
     def pause_writing(self) -> None:
         """Start the time limit of a client that does not read."""
@@ -184,6 +182,11 @@ class LimitedHttp(HttpToolsProtocol):
     def send_400_response(self, msg: str) -> None:
         """Answer an error of the parser, or of a limit in its callbacks."""
         self._refuse(*self._refusal)
+
+    def _end_with(self, status: int, kind: str, detail: str) -> None:
+        """Answer with a problem and close the connection."""
+        self.transport.write(_refusal(status, kind, detail))
+        self.transport.close()
 
     def _is_idle(self) -> bool:
         answered = self.cycle is None or self.cycle.response_complete

@@ -52,6 +52,7 @@ SHARES: tuple[tuple[LeftOut, float], ...] = (("search", 0.25), ("rollout", 0.5))
 """What is left out once a request has waited for more than this share of its deadline."""
 GOING_AWAY = 1001
 _CHECKPOINT = re.compile(r'"checkpoint"\s*:\s*"([^"\\]{1,64})"')
+"""The member that names a policy; found without reading the whole request."""
 
 Which = Literal["newest", "each"]
 

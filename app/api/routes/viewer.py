@@ -56,6 +56,8 @@ VECTORS = {
     "end_screen_pos": 2,
 }
 """Numbers of each vector of a message, which the viewer stores as they come."""
+OPTIONAL = {"ray_origin", "ray_direction"}
+"""Vectors that may be null: a rectangle that is drawn in the scene has no ray."""
 SMALL_BYTES = 1024
 """Largest frame decoded on the event loop, in microseconds."""
 # The viewer's page is one inline script that unpacks itself, and its WebAssembly loader
@@ -209,8 +211,12 @@ def is_allowed(frame: bytes) -> bool:
     kind = message.get("type") if isinstance(message, dict) else None
     if not isinstance(kind, str) or kind not in TYPES:
         return False
-    given = ((message[name], size) for name, size in VECTORS.items() if name in message)
-    return all(value is None or _is_vector(value, size) for value, size in given)
+    given = (
+        (message[name], size)
+        for name, size in VECTORS.items()
+        if name in message and not (message[name] is None and name in OPTIONAL)
+    )
+    return all(_is_vector(value, size) for value, size in given)
 
 
 def _is_vector(value: object, size: int) -> bool:

@@ -164,12 +164,13 @@ class PersonEstimator:
         self, size: Vec, settings: EstimatorSettings | None = None, floor_z: float | None = None
     ) -> None:
         if np.shape(size) != (N_SIZE,) or not np.isfinite(size).all():
-            raise InvalidInput("size", np.asarray(size).tolist(), f"must be {N_SIZE} numbers")
+            rule = f"must be {N_SIZE} finite numbers"
+            raise InvalidInput("size", np.asarray(size).tolist(), rule)
         self.settings = settings or EstimatorSettings()
         self._size, self._floor_z = size, floor_z
         self._points = PointFilter(N_KEYPOINTS, self.settings.filter)
         self._center = PointFilter(1, self.settings.filter)
-        self._t, self._seen_at = -math.inf, -math.inf
+        self._t = self._seen_at = self._mirrored_at = self._mirror_seen_at = -math.inf
         self._swapped_at: dict[Group, float] = {}
         self._q: Vec | None = None
         self.last_points: Vec | None = None
@@ -178,7 +179,6 @@ class PersonEstimator:
         self._flags: tuple[Flag, ...] = ()
         self._frame: Keypoints | None = None
         self._unfit = False
-        self._mirrored_at, self._mirror_seen_at = math.inf, -math.inf
 
     def update(
         self, t: float, keypoints: ArrayLike, confidences: ArrayLike | None = None

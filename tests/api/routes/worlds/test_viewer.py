@@ -186,6 +186,8 @@ def moved(**vectors: object) -> bytes:
         (moved(wxyz=[1.0, 0.0, 0.0, float("inf")]), False),
         (moved(wxyz=[1.0, 0.0, 0.0]), False),
         (moved(ray_origin=None), True),
+        (moved(position=None), False),
+        (moved(wxyz=None), False),
         (msgspec.msgpack.encode({"type": "ShareUrlRequest"}), False),
         (msgspec.msgpack.encode({"x": 1}), False),
         (msgspec.msgpack.encode([{"type": "ViewerCameraMessage"}]), False),
