@@ -188,6 +188,28 @@ def renumbered(
     )
 
 
+def require_all_tracked(entries: Sequence[PersonInput], trackers: TrackerSessions) -> None:
+    """Require that a request names every person of each tracker that it names.
+
+    A safety layer does not monitor people who are not named.
+
+    Raises:
+        InvalidInput: A person is missing.
+    """
+    named: dict[str, set[int]] = {}
+    for entry in entries:
+        if isinstance(entry, TrackedPerson):
+            named.setdefault(entry.tracker, set()).add(entry.person)
+    for session in trackers.all() if named else ():
+        people = named.get(session.id)
+        if people is not None and (missing := set(range(session.n_people)) - people):
+            rule = (
+                f"must name all {session.n_people} people of the tracker {session.id}, because "
+                f"others are not monitored; left out: {', '.join(map(str, sorted(missing)))}"
+            )
+            raise InvalidInput("people", sorted(people), rule)
+
+
 def is_slow_conversion(entries: Sequence[PersonInput]) -> bool:
     """Whether the conversion of people takes milliseconds."""
     return any(isinstance(entry, KeypointsPerson | TrackedPerson) for entry in entries)

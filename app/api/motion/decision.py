@@ -5,7 +5,13 @@ Source: docs/method.md 2.
 
 from starlette.concurrency import run_in_threadpool
 
-from app.api.known_people import is_slow_conversion, known_people, nearest_places, renumbered
+from app.api.known_people import (
+    is_slow_conversion,
+    known_people,
+    nearest_places,
+    renumbered,
+    require_all_tracked,
+)
 from app.api.schemas.motion import MotionAnswer, MotionRequest
 from app.api.schemas.numbers import Data
 from app.api.services import Services
@@ -55,6 +61,7 @@ def decide(
     Raises:
         ServiceError: The request cannot be answered.
     """
+    require_all_tracked(request.people, trackers)
     people = known_people(request.people, cell, trackers)
     as_seen = all(one.observed is one.person for one in people)
     present = {i: one.person for i, one in enumerate(people) if one.person is not None}

@@ -202,7 +202,7 @@ class CylinderPerson(Body):
 
 
 class TrackedPerson(Body):
-    """A track of `/v1/trackers`."""
+    """A track of `/v1/trackers`; a motion request names all tracks of a tracker."""
 
     tracker: str = Field(max_length=64, description="id of the tracker")
     person: Annotated[int, Field(ge=0, le=3)] = Field(description="index of the track")

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from fastapi.testclient import TestClient
 
+from app.sim.cells.cell import load_cell
 from app.sim.perception.keypoints import K
 from tests.api.conftest import services_of
 from tests.api.routes.test_task_selection import URL, refused
@@ -277,3 +278,19 @@ def test_a_tracker_that_cannot_be_is_refused(
 ) -> None:
     answer = client.post(TRACKERS, json={"cell": "pick-and-place", **change})
     assert answer.status_code == 422 and answer.json()["field"] == field
+
+
+def test_motion_names_all_people_of_a_tracker(client: TestClient) -> None:
+    place = client.post(TRACKERS, json={"cell": "shared-workspace", "n_people": 3}).headers
+    identity = place["location"].rpartition("/")[2]
+    people = [{"tracker": identity, "person": i} for i in range(3)]
+    robot = {"q": list(load_cell("shared-workspace").robot.home_q), "qd": [0.0] * 6}
+    task = {"cell": "shared-workspace", "robot": robot, "goal": [0.05, 0.75, 0.31]}
+    answers = [
+        client.post("/v1/motion", json={**task, "people": named})
+        for named in (people, [*people, people[0]], people[1:2])
+    ]
+    client.delete(place["location"])
+    assert [one.status_code for one in answers] == [200, 200, 422]
+    assert answers[2].json()["field"] == "people"
+    assert answers[2].json()["rule"].endswith("left out: 0, 2")
