@@ -1,7 +1,7 @@
 """Policies and recordings that commands to a live world name.
 
-A policy is valid in the cell it was trained in, and in sorting cells that differ from it only
-in their stations (``layout.require_workspace``).
+A policy that selects tasks is valid in the cell it was trained in, and in cells that differ
+from it only in stations and assumptions of the safety layer (``layout.require_workspace``).
 """
 
 import logging
@@ -90,7 +90,7 @@ def require_task_policy(policy: TaskPolicy, cell: Cell, services: Services) -> N
     Raises:
         CheckpointMismatch: It was trained elsewhere, or before a cell was changed.
     """
-    if policy.cell == cell.name or not is_sorting(cell):
+    if policy.cell == cell.name:
         require_cell(cell, policy.cell, policy.cell_sha256)
         return
     try:

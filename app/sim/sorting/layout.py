@@ -58,24 +58,22 @@ def lacks_for_sorting(cell: Cell) -> str | None:
     return None
 
 
-def same_workspace(one: Cell, other: Cell) -> bool:
-    """Return whether two cells differ only in their stations.
-
-    Robot, limits, tool, table, obstacles and people agree. A policy that goes to any point it
-    is given may then act in both; points outside what it was trained on are flagged.
-    """
-    parts = ("robot", "table", "obstacles", "people")
-    return all(getattr(one, part) == getattr(other, part) for part in parts)
+WORKSPACE = ("robot", "table", "obstacles", "people")
+"""Parts of a cell that a policy that goes to any point it is given depends on."""
 
 
 def require_workspace(cell: Cell, trained: Cell) -> None:
-    """Raise unless a policy of another cell may act in a sorting cell.
+    """Raise unless a policy of another cell may act in a cell.
+
+    Robot, limits, tool, table, obstacles and people must agree; points outside what the policy
+    was trained on are flagged.
 
     Raises:
-        CheckpointMismatch: The cells differ in more than their stations.
+        CheckpointMismatch: One of these parts differs.
     """
-    if cell != trained and not (is_sorting(cell) and same_workspace(cell, trained)):
-        found = f"{trained.name}, which differs in more than its stations"
+    differing = [part for part in WORKSPACE if getattr(cell, part) != getattr(trained, part)]
+    if differing:
+        found = f"{trained.name}, which has another {', '.join(differing)}"
         raise CheckpointMismatch("cell", cell.name, found)
 
 

@@ -43,16 +43,27 @@ def asked(state: dict[str, Any], checkpoint: str | None, cell: str) -> dict[str,
 
 
 @pytest.mark.usefixtures("own")
-def test_policy_decides_in_its_own_cell_and_in_no_other(
+def test_policy_decides_in_its_own_cell_and_where_only_the_stations_differ(
     client: TestClient, state: dict[str, Any], checkpoint: str
 ) -> None:
     answer = client.post("/v1/task-selection", json=asked(state, checkpoint, "workshop"))
     assert answer.status_code == 200
     assert (answer.json()["chosen"], answer.json()["checkpoint"]) == ("part2", checkpoint)
     for reference, cell in ((checkpoint, "pick-and-place"), (None, "workshop")):
-        refused = client.post("/v1/task-selection", json=asked(state, reference, cell))
-        assert refused.status_code == 409
-        assert refused.json()["property"] == "cell"
+        other = client.post("/v1/task-selection", json=asked(state, reference, cell))
+        assert (other.status_code, other.json()["chosen"]) == (200, "part2")
+
+
+def test_policy_refuses_a_cell_with_another_robot(
+    client: TestClient, state: dict[str, Any]
+) -> None:
+    other = workshop.definition(name="slow-workshop")
+    other["robot"]["qd_max"] = [0.4] * 6
+    client.post("/v1/cells", json=other).raise_for_status()
+    refused = client.post("/v1/task-selection", json=asked(state, None, "slow-workshop"))
+    client.delete("/v1/cells/slow-workshop")
+    assert (refused.status_code, refused.json()["property"]) == (409, "cell")
+    assert "pick-and-place, which has another robot" in refused.json()["detail"]
 
 
 def test_unknown_cell_of_a_request_names_the_known(
