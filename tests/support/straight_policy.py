@@ -103,5 +103,6 @@ class StraightPolicy:
             success=None,
             contact=None,
             clearance_m=np.ones(len(found)),
+            outside=np.zeros(len(found), dtype=np.bool_),
             elapsed_ms=0.0,
         )

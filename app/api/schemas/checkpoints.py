@@ -26,7 +26,9 @@ class CheckpointPublic(Answer):
     sha256: str
     number: int = Field(description="running number")
     aliases: list[str] = Field(description="its aliases")
-    job_id: str | None = Field(description="job that made it; null for a shipped one")
+    job_id: str | None = Field(
+        description="job that made it; null for one that was shipped, uploaded or recalibrated"
+    )
     step: int | None = Field(description="environment steps of that job")
     preset: str | None
     purpose: str = Field(

@@ -9,11 +9,11 @@ from pydantic import Field, model_validator
 from app.api.schemas.examples import RISK_MAP, shows
 from app.api.schemas.numbers import Answer, Body, Data, Finite
 from app.api.schemas.people import PersonUse
-from app.api.schemas.task_selection import Stamp, TaskSelectionRequest
+from app.api.schemas.task_selection import OutOfRangeInput, Stamp, TaskSelectionRequest
 from app.errors import InvalidInput
 from app.sim.perception.multi_person_tracker import MAX_SKELETONS
 from app.sim.pick.person_grid import NOT_REACHED, PersonGrid
-from app.sim.pick.task_policy import ChoiceTerms, RiskMap
+from app.sim.pick.task_policy import ChoiceTerms, Decision, RiskMap
 
 CONTACT = "contact"
 Reason = Literal["contact", "unreachable"]
@@ -105,7 +105,14 @@ class RiskMapAnswer(Answer):
         description="why a position has no values: `contact` of robot and person there, or "
         "`unreachable` by the hand"
     )
+    posture_outside: list[list[bool | None]] = Field(
+        description="whether the person's posture there is outside the training range"
+    )
     people: list[PersonUse] = Field(description="use of each person at the given position")
+    state_outside: list[OutOfRangeInput] = Field(
+        description="robot, people at the given positions and time left outside the training "
+        "range or the joint limits"
+    )
     checkpoint: str = Field(description="SHA-256 of the checkpoint")
     elapsed_ms: Finite = Field(description="time of the map [ms]")
     stamp: Stamp = None
@@ -117,14 +124,14 @@ class RiskMapAnswer(Answer):
         reached: NDArray[np.bool_],
         request: RiskMapRequest,
         people: list[Data],
-        checkpoint: str,
+        decision: Decision,
     ) -> Self:
         """Return the answer of a map.
 
         Args:
             reached: Whether the hand reaches each position, shape (m,).
             people: Use of each person.
-            checkpoint: SHA-256 of the checkpoint.
+            decision: Decision at the given positions.
         """
         grid = request.grid.to_domain()
         touched = found.clearance_m <= 0.0
@@ -146,8 +153,10 @@ class RiskMapAnswer(Answer):
             contact=None if found.contact is None else rows(found.contact),
             clearance_m=rows(found.clearance_m),
             reason=rows(reason, ~none),
+            posture_outside=rows(found.outside),
             people=[PersonUse(**one) for one in people],
-            checkpoint=checkpoint,
+            state_outside=[OutOfRangeInput.model_validate(one) for one in decision.outside],
+            checkpoint=decision.checkpoint,
             elapsed_ms=found.elapsed_ms,
             stamp=request.stamp,
         )

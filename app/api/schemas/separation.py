@@ -94,7 +94,8 @@ class Override(Answer):
         description="bound of the distance of any point of the robot in a stop [m]"
     )
     terms: Terms | None = Field(
-        description="S_p of that person, else of the nearest; null without people"
+        description="S_p of that person, else of the one with the least reserve; null without "
+        "people"
     )
 
     @staticmethod

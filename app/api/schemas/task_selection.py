@@ -13,6 +13,7 @@ from app.api.schemas.people import PersonState as PersonState
 from app.api.schemas.robot_state import RobotState
 from app.errors import InvalidInput
 from app.sim.core.arrays import Vec
+from app.sim.core.pick_depth import PICK_DEPTH_M
 from app.sim.perception.multi_person_tracker import MAX_SKELETONS
 from app.sim.pick.task_policy import (
     Candidate,
@@ -37,7 +38,10 @@ class CandidateState(Body):
     """A task of the robot."""
 
     id: str = Field(min_length=1, max_length=128, description="your name for it")
-    position: Vector3 = Field(description="point the tool must reach, in `frame` [m]")
+    position: Vector3 = Field(
+        description="point the tool must reach, in `frame` [m]; for a pick the point over the "
+        f"object, {PICK_DEPTH_M:g} m above the grasp"
+    )
 
 
 class TaskSelectionRequest(Body):
@@ -141,7 +145,10 @@ class OutOfRangeInput(Answer):
 class Action(Answer):
     """The policy's action for a candidate."""
 
-    qd_target: Vector6 = Field(description="target joint speeds [rad/s]")
+    qd_target: Vector6 = Field(
+        description="target joint speeds [rad/s]: not monitored, and without bounds on the "
+        "acceleration"
+    )
 
 
 class Probability(Answer):

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from app.policies.checkpoints.checkpoint import Checkpoint
 from app.policies.checkpoints.training_range import TOLERANCE
@@ -71,6 +72,15 @@ class PickTrainingRange:
             *self._outside("human_q", person.q, f"{path}.q", human.JOINT_NAMES),
             *self._outside("human_qd", person.qd, f"{path}.qd", human.JOINT_NAMES),
         )
+
+    def are_postures_outside(self, q: Vec) -> NDArray[np.bool_]:
+        """Return which postures of a person are outside the range, shape (m,).
+
+        Args:
+            q: Joint positions [m, rad], shape (m, 18).
+        """
+        low, high = (bound[: q.shape[1]] for bound in self._person)
+        return np.asarray(((q < low) | (q > high)).any(axis=1))
 
     def of_time(self, time_left_s: float) -> tuple[OutOfRangeValue, ...]:
         """Return the observed time left [s], where no episode of the training had it."""

@@ -38,6 +38,7 @@ from app.sim.perception.observed_people import (
     checked_vector,
     is_far,
     nearest_index,
+    with_known_yaw,
 )
 from app.sim.pick.batch import step_robot
 from app.sim.pick.candidate_observer import CandidateObserver
@@ -220,6 +221,7 @@ class TaskChooser(TrainedPolicy):
             success=None if risk is None else risk[:, 0].astype(np.float64),
             contact=None if risk is None else risk[:, 1].astype(np.float64),
             clearance_m=np.minimum(clearance, FARTHEST),
+            outside=self._ranges.are_postures_outside(with_known_yaw(moved.q)),
             elapsed_ms=1e3 * (time.perf_counter() - started),
         )
 

@@ -97,6 +97,8 @@ class RiskMap:
     """Its probability of a contact, shape (m,)."""
     clearance_m: Vec
     """Distance of the robot to people, at most 1.5 m, shape (m,) [m]; 0 or less in contact."""
+    outside: NDArray[np.bool_]
+    """Whether the posture is outside the training range, shape (m,)."""
     elapsed_ms: float
     """Duration [ms]."""
 

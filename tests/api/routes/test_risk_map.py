@@ -118,3 +118,11 @@ def test_errors_name_field_value_and_rule(
     answer = client.post(URL, json=RISK_MAP | {"grid": RISK_MAP["grid"] | change})
     assert answer.status_code == 422
     assert [word for word in words if word not in answer.text] == []
+
+
+def test_positions_and_times_outside_the_training_range_are_flagged(client: TestClient) -> None:
+    grid = {"x": [-2.0, 0.0], "y": [1.3, 1.4], "nx": 3, "ny": 1}
+    usual, late = (mapped(client, grid=grid, time_left_s=t) for t in (10.0, 50.0))
+    assert usual["posture_outside"] == late["posture_outside"] == [[True, True, False]]
+    assert [one["field"] for one in usual["state_outside"]] == []
+    assert [one["field"] for one in late["state_outside"]] == ["time_left_s"]

@@ -49,9 +49,12 @@ async def map_risk(request: RiskMapRequest, services: ServicesDep) -> RiskMapAns
             found = policy.risk_map(
                 q, qd, people.people, candidates, moved, terms=request.terms
             )
-        decision = people.in_request(policy.decide(q, qd, people.people, candidates))
+            chosen = policy.decide(
+                q, qd, people.people, candidates, time_left_s=request.time_left_s
+            )
+        decision = people.in_request(chosen)
         uses = people.uses(decision.nearest_person)
-        return RiskMapAnswer.from_domain(found, reached, request, uses, policy.checkpoint)
+        return RiskMapAnswer.from_domain(found, reached, request, uses, decision)
 
     n_rows = request.grid.nx * request.grid.ny * len(candidates)
     long = n_rows > MAX_INLINE_ROWS or is_slow_conversion(request.people)

@@ -18,6 +18,7 @@ def risk(contact: np.ndarray | None, clearance: np.ndarray) -> RiskMap:
         success=contact,
         contact=contact,
         clearance_m=clearance,
+        outside=np.zeros(N, dtype=np.bool_),
         elapsed_ms=1.0,
     )
 
