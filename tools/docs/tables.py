@@ -16,6 +16,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from app.policies.report.commands import command_of
 from tools.arguments import parser_of
 from tools.docs import headline, pick_seeds, pick_tables
 from tools.docs.reach import tables as reach_tables
@@ -123,12 +124,7 @@ def cell(value: object) -> str:
 def origin(result: Json, others: Sequence[Json] = ()) -> str:
     """Return the provenance of a result: command, seed, checkpoints, machine, commit."""
     machine: Json = result["machine"]
-    verb = "evaluate" if "protocol" in result else "bench"
-    usual = f"python -m app {verb} {result.get('protocol') or result.get('bench')}"
-    usual += " FILE ..." if result.get("settings", {}).get("motions") else ""
-    if (trained := result.get("settings", {}).get("cell", "")) == "sorting-e1":
-        usual += f" --checkpoint {trained}"
-    parts = [f"`{result.get('command', usual)}`"]
+    parts = [f"`{command_of(result)}`"]
     parts += [f"{key} {result[key]}" for key in ("episodes", "seed") if key in result]
     if "checkpoint" in result:
         parts.append(f"checkpoint `{result['checkpoint'][:12]}`")

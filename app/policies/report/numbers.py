@@ -40,7 +40,8 @@ def curve_end(found: Json, preset: str, key: str, unit: str = "", task: str = ""
     """Return the last point of learning curves, as the mean over seeds; None without one.
 
     Curves of different lengths are compared at the end of the shortest. A training that was
-    stopped because its policy had ceased to change counts as if it had gone on.
+    stopped because its policy had ceased to change counts as if it had gone on, but for the
+    processor time.
 
     Args:
         found: Content of the result file.
@@ -60,11 +61,13 @@ def curve_end(found: Json, preset: str, key: str, unit: str = "", task: str = ""
     points = [point for point in points if point and point[-1].get(key) is not None]
     if not points:
         return None
-    seeds, lengths = len(points), [point[-1]["step"] for point in points]
+    lengths = [point[-1]["step"] for point in points]
     learning = [n for n, point in zip(lengths, points, strict=True) if not _has_ceased(point)]
     steps = min(learning or lengths)
+    if key == "cpu_s":
+        points = [point for point in points if point[-1]["step"] >= steps]
     ends = [[one for one in point if one["step"] <= steps][-1] for point in points]
-    mean = sum(end[key] for end in ends) / seeds
+    seeds, mean = len(ends), sum(end[key] for end in ends) / len(ends)
     text = f"{mean:.2f}" if unit else f"{100.0 * mean:.1f} %"
     return f"{text} after {steps / 1e6:.2f} M steps, {seeds} seed{'s'[: seeds > 1]}"
 

@@ -21,6 +21,7 @@ from typing import Any
 
 from app.errors import InvalidInput
 from app.policies.evaluation.registry import PROTOCOLS, default_checkpoint
+from app.policies.report.commands import command_of, writing_command
 from app.policies.report.numbers import curve_end, preset_value, reach_setting, stored_value
 
 MISSING = "not measured"
@@ -129,15 +130,12 @@ def _find(results: Path, measured: Mapping[str, Json], file: str) -> Json | None
 
 def _origin(name: str, found: Json) -> str:
     """Return the provenance of a result file."""
-    verb = "evaluate" if "protocol" in found else "bench"
-    usual = f"python -m app {verb} {found.get('protocol') or found.get('bench')} --json"
-    if found.get("settings", {}).get("cell") == "sorting-e1":
-        usual += " --checkpoint sorting-e1"
-    if name.startswith("thesis-"):
-        usual += " --checkpoint FILE"
-    place = found.get("job") or f"`docs/results/{name}.json`"
-    parts = [f"{place}: `{found.get('command', usual)}`"]
-    parts += [f"{key} {found[key]}" for key in ("episodes", "seed") if key in found]
+    job = found.get("job")
+    if job is None:
+        parts = [f"`docs/results/{name}.json`: `{writing_command(name, found)}`"]
+    else:
+        parts = [f"{job}: `{command_of(found)}`"]
+        parts += [f"{key} {found[key]}" for key in ("episodes", "seed") if key in found]
     if "checkpoint" in found:
         parts.append(f"checkpoint `{found['checkpoint'][:12]}`")
     machine = found["machine"]
