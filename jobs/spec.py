@@ -159,7 +159,8 @@ class EvaluateSpec(_Spec):
     recordings: list[Name] = Field(
         default_factory=list,
         max_length=MAX_RECORDINGS,
-        description="names of GET /v1/recordings, for pick-mocap",
+        description="names of GET /v1/recordings: needed by pick-mocap, optional for "
+        "reach-ssm and risk-calibration",
     )
 
     def new_job(self) -> NewJob:

@@ -95,7 +95,8 @@ class MotionDecision(NamedTuple):
     safe: SafetyDecision | None
     """Executed part of the segment; None without monitoring."""
     terms: SeparationTerms | None
-    """S_p of the person who set the override, else of the nearest; None in an empty cell."""
+    """S_p of the person who set the override, else of the one with the least reserve; None in
+    an empty cell."""
     terms_of: int | None
     """Index of that person in ``observed`` of the query."""
     clearance: tuple[float, float, float]
