@@ -4,8 +4,9 @@
 The functions evaluate one state with the same kernels, for the live world and task selection.
 """
 
+import math
 from dataclasses import dataclass, field
-from typing import ClassVar, Literal
+from typing import ClassVar, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,7 +42,13 @@ from app.sim.robot.kernels.arm import CONTROLLED, Arm
 from app.sim.robot.kernels.joints import JointState
 from app.sim.robot.trajectory_segment import TrajectorySegment
 from app.sim.scenario.batch import EnvBatch
-from app.sim.scenario.kernels.episode import FEATURES, PLAIN, Indices, distance_to
+from app.sim.scenario.kernels.episode import (
+    FEATURES,
+    MAX_CANDIDATES,
+    PLAIN,
+    Indices,
+    distance_to,
+)
 from app.sim.scene.scene import (
     FAR_AWAY,
     HumanKind,
@@ -75,7 +82,11 @@ DEFAULT_WEIGHTS = RewardWeights(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PickSettings:
-    """Settings of the pick scenario."""
+    """Settings of the pick scenario.
+
+    Raises:
+        InvalidInput: A rule is unknown, or a number is out of range.
+    """
 
     time_limit_s: float = 20.0
     """Longest episode [s] (table 5.2)."""
@@ -96,7 +107,8 @@ class PickSettings:
     grasp: GraspRules = field(default=REACH_ONLY)
     """Phases of a pick; by default a target counts when it is reached."""
     n_candidates: tuple[int, int] = (1, 1)
-    """Fewest and most targets offered per episode."""
+    """Fewest and most targets offered per episode, at most ``MAX_CANDIDATES``; a cell needs as
+    many stations."""
     people: tuple[HumanKind, ...] | None = None
     """People in the cell, 0 to 4; None for the cell's own."""
     work: HumanMotionConfig = field(default=USUAL)
@@ -110,6 +122,27 @@ class PickSettings:
     """Contents of observations, a key of ``VIEWS``."""
     weights: RewardWeights = field(default=DEFAULT_WEIGHTS)
     """Reward coefficients (docs/method.md 3.3)."""
+
+    def __post_init__(self) -> None:
+        choices = (("start", get_args(StartRule)), ("observation", tuple(VIEWS)))
+        for name, known in choices:
+            if (rule := getattr(self, name)) not in known:
+                raise InvalidInput(name, rule, "must name a rule", known)
+        for name in ("time_limit_s", "short_limit_s"):
+            if not 0.0 < getattr(self, name) < math.inf:
+                raise InvalidInput(name, getattr(self, name), "must be positive and finite")
+        for name in ("short_share", "on_path_share", "at_target_share", "anywhere_share"):
+            if not 0.0 <= getattr(self, name) <= 1.0:
+                raise InvalidInput(name, getattr(self, name), "must lie in [0, 1]")
+        if not math.isfinite(self.start_clearance_m):
+            raise InvalidInput("start_clearance_m", self.start_clearance_m, "must be finite")
+        if not 0.0 <= self.target_jitter_m < math.inf:
+            rule = "must be finite and not negative"
+            raise InvalidInput("target_jitter_m", self.target_jitter_m, rule)
+        fewest, most = self.n_candidates
+        if not 1 <= fewest <= most <= MAX_CANDIDATES:
+            rule = f"must be a least and a greatest number in [1, {MAX_CANDIDATES}]"
+            raise InvalidInput("n_candidates", list(self.n_candidates), rule)
 
 
 WHOLE_PICK = PickSettings(time_limit_s=12.0, grasp=GraspRules(), observation="two-people")
@@ -139,6 +172,14 @@ def _world_of(cell: Cell, settings: PickSettings) -> starts.PickCell:
 
 
 def _rules_of(settings: PickSettings, stations: Vec) -> starts.PickRules:
+    """Return the rules of episodes; candidates are different stations.
+
+    Raises:
+        InvalidInput: Episodes offer more candidates than there are stations.
+    """
+    if settings.n_candidates[1] > len(stations):
+        rule = f"must be at most {len(stations)}, as many as the cell has cubes and docks"
+        raise InvalidInput("n_candidates", list(settings.n_candidates), rule)
     box = np.stack([stations.min(axis=0), stations.max(axis=0)])
     box += np.outer((-1.0, 1.0), BOX_MARGIN)
     return starts.PickRules(
@@ -164,6 +205,9 @@ class PickBatch(EnvBatch):
         settings: Settings of the scenario.
         first_env: Number of the first environment: environments of a batch that starts at ``k``
             equal environments ``k`` and on of a batch that starts at 0, bit for bit.
+
+    Raises:
+        InvalidInput: The cell lacks stations for picking or for the number of candidates.
     """
 
     STATE: ClassVar[tuple[str, ...]] = (*EnvBatch.STATE, "_sight")

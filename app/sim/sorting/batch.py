@@ -5,6 +5,7 @@ the moves that change the state, rewards and outcomes. ``human_rate`` includes p
 remove and move objects or change the goal (docs/method.md 1.2).
 """
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
@@ -35,11 +36,25 @@ OUTCOMES = ("running", "success", "timeout")
 """Names of the outcomes in ``rows.outcome``."""
 
 Obs = NDArray[np.uint8]
+_SHARES = (
+    "disturbed_share",
+    "solved_episodes",
+    "solved_share",
+    "even_share",
+    "human_rate",
+    "localisation_rate",
+    "random_map_share",
+)
+"""Settings that are shares or probabilities."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SortingSettings:
-    """Starts, disturbances, rewards and ends of episodes."""
+    """Starts, disturbances, rewards and ends of episodes.
+
+    Raises:
+        InvalidInput: A number is out of range.
+    """
 
     horizon_factor: float = 4.0
     """Attempts per clutter slot after which an episode is truncated."""
@@ -65,6 +80,17 @@ class SortingSettings:
     """Objects in the goal, K_G; 0: drawn."""
     weights: SortingWeights = field(default_factory=SortingWeights)
     """Reward coefficients."""
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.horizon_factor < math.inf:
+            rule = "must be positive and finite"
+            raise InvalidInput("horizon_factor", self.horizon_factor, rule)
+        for name in _SHARES:
+            if not 0.0 <= getattr(self, name) <= 1.0:
+                raise InvalidInput(name, getattr(self, name), "must lie in [0, 1]")
+        if not 0.0 <= self.failure_max <= MAX_FAILURE:
+            rule = f"must lie in [0, {MAX_FAILURE}]: a pick that always fails has no plan"
+            raise InvalidInput("failure_max", self.failure_max, rule)
 
 
 def shape_of(cell: Cell) -> SortingShape:

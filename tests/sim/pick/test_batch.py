@@ -1,5 +1,7 @@
 """The batched scenario: determinism, limits, starts, ends, and agreement with the referee."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -81,6 +83,38 @@ def test_candidates_are_different_stations_in_the_asked_for_number(
         assert len(set(offered)) == len(offered) and not occupied[offered].any()
     sizes = (batch.state.candidates >= 0).sum(axis=1)
     assert set(sizes) == set(range(fewest, most + 1))
+
+
+def test_more_candidates_than_stations_are_refused(cell: Cell) -> None:
+    two = cell.model_copy(update={"stations": (cell.station("cube0"), cell.station("dock1"))})
+    with pytest.raises(InvalidInput, match=r"n_candidates = \[2, 3\] must be at most 2"):
+        PickBatch(two, 1, 0, PickSettings(n_candidates=(2, 3)))
+    batch = PickBatch(two, 20, 0, PickSettings(n_candidates=(2, 2)))
+    batch.reset()
+    assert set(batch.state.candidates[:, :2].sum(axis=1)) == {1}
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "rule"),
+    [
+        ("n_candidates", (8, 8), r"in \[1, 6\]"),
+        ("n_candidates", (0, 0), r"in \[1, 6\]"),
+        ("n_candidates", (3, 2), r"in \[1, 6\]"),
+        ("time_limit_s", float("nan"), "positive"),
+        ("time_limit_s", -1.0, "positive"),
+        ("short_limit_s", float("inf"), "positive"),
+        ("short_share", 1.5, r"in \[0, 1\]"),
+        ("at_target_share", float("nan"), r"in \[0, 1\]"),
+        ("start_clearance_m", float("nan"), "finite"),
+        ("target_jitter_m", float("nan"), "finite"),
+        ("target_jitter_m", -0.1, "negative"),
+        ("start", "nope", "choices: clearance, uniform"),
+        ("observation", "nope", "choices: state, features"),
+    ],
+)
+def test_settings_out_of_range_are_refused(field: str, value: Any, rule: str) -> None:
+    with pytest.raises(InvalidInput, match=f"^{field} = .*{rule}"):
+        PickSettings(**{field: value})
 
 
 def test_meshes_find_no_contact_that_the_kernels_missed(cell: Cell) -> None:

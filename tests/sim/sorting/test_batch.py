@@ -305,3 +305,19 @@ def test_more_objects_than_fit_are_refused(n_objects: int, n_goal: int) -> None:
     settings = SortingSettings(n_objects=n_objects, n_goal=n_goal)
     with pytest.raises(InvalidInput, match="n_objects|n_goal"):
         batch_in(load_cell("sorting-e0"), 1, 0, settings)
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "rule"),
+    [
+        ("failure_max", 1.5, r"in \[0, 0.99\]"),
+        ("failure_max", -0.5, r"in \[0, 0.99\]"),
+        ("horizon_factor", float("nan"), "positive"),
+        ("horizon_factor", 0.0, "positive"),
+        ("human_rate", float("nan"), r"in \[0, 1\]"),
+        ("disturbed_share", -0.1, r"in \[0, 1\]"),
+    ],
+)
+def test_settings_out_of_range_are_refused(field: str, value: float, rule: str) -> None:
+    with pytest.raises(InvalidInput, match=f"^{field} = .*{rule}"):
+        SortingSettings(**{field: value})  # type: ignore[arg-type]
