@@ -68,3 +68,11 @@ def shipped_as(**fields: object) -> Checkpoint:
     preset = shipped.manifest["preset"]
     preset = {**preset, "episode": preset["episode"] | fields}
     return formats.load({**shipped.manifest, "preset": preset}, shipped.tensors)
+
+
+def shipped_pick_of(*stations: str) -> Checkpoint:
+    """Return the shipped pick policy as if its cell had only these stations."""
+    shipped, cell = pretrained.load("pick"), load_cell("pick-and-place")
+    kept = tuple(cell.station(name) for name in stations)
+    fewer = cell.model_copy(update={"name": "fewer-stations", "stations": kept})
+    return formats.load({**shipped.manifest, **manifest_fields(fewer)}, shipped.tensors)

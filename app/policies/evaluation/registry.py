@@ -13,6 +13,7 @@ from app.policies.checkpoints.checkpoint import (
     Checkpoint,
     purpose_of,
 )
+from app.policies.checkpoints.trained_cell import cell_of
 from app.policies.evaluation.pick import calibration, people, tracker, worst_people
 from app.policies.evaluation.pick import cases as pick_cases
 from app.policies.evaluation.pick import ssm as pick_ssm
@@ -79,6 +80,11 @@ OF_CASES = frozenset({"pick-cases", "pick-case-variants"})
 """Protocols of the case studies, which are laid out for one cell."""
 OF_REACHING = frozenset(name for name in PROTOCOLS if name.startswith("reach-"))
 """Protocols of reach policies; all others are of pick policies."""
+OF_CHOICE = frozenset(
+    {"pick-choice", "pick-choice-hard", "pick-tracker", "pick-people", "pick-yielding"}
+    | {"pick-mocap", "pick-worst"}
+)
+"""Protocols that offer 2 or 3 stations in all rows, and need as many in the cell."""
 MAX_EPISODES = 100_000
 """Maximum number of episodes of one evaluation."""
 MAX_SORTING_EPISODES = 10_000
@@ -192,7 +198,8 @@ def check_task(name: str, manifest: Mapping[str, Any], found: str) -> None:
 
     Raises:
         InvalidInput: It is of another scenario; the rule lists the protocols of its own. Or it
-            is of another cell than that of the case studies, or of an arm that contacts block.
+            is of another cell than that of the case studies, of a cell with too few stations,
+            or of an arm that contacts block.
     """
     wanted, actual = task_measured(name), purpose_of(manifest)
     if wanted != actual:
@@ -202,6 +209,10 @@ def check_task(name: str, manifest: Mapping[str, Any], found: str) -> None:
         raise InvalidInput("checkpoint", found, f"{rule}: {', '.join(known)}")
     if name in OF_CASES and manifest["cell"] != CASES_CELL:
         rule = f"must be of the cell {CASES_CELL!r} for {name}, not of {manifest['cell']!r}"
+        raise InvalidInput("checkpoint", found, rule)
+    most = people.CANDIDATES[1]
+    if name in OF_CHOICE and (n := len(cell_of(manifest).pick_stations)) < most:
+        rule = f"must be of a cell with at least {most} cubes and docks for {name}, not {n}"
         raise InvalidInput("checkpoint", found, rule)
     if name == "reach-oracle" and manifest["preset"]["episode"]["collision"] == "blocks":
         rule = f"must be of a policy whose episodes end at contacts for {name}"

@@ -8,6 +8,7 @@ from app.policies.checkpoints.checkpoint import Checkpoint
 from app.policies.configs.reach import AUTHORS
 from app.policies.evaluation.registry import (
     MAX_SORTING_EPISODES,
+    OF_CHOICE,
     OF_REACHING,
     OF_SORTING,
     PROTOCOLS,
@@ -19,7 +20,7 @@ from app.policies.evaluation.registry import (
     most_episodes,
 )
 from tests.policies.evaluation.sorting_players import untrained
-from tests.policies.untrained import untrained_reach
+from tests.policies.untrained import shipped_pick_of, untrained_reach
 from tests.sim.recorded_person import working
 from tests.sim.working_people import run_of
 
@@ -91,6 +92,15 @@ def test_case_studies_are_of_one_cell(name):
     elsewhere = Checkpoint({**shipped.manifest, "cell": "another"}, shipped.tensors)
     with pytest.raises(InvalidInput, match=f"of the cell 'pick-and-place' for {name}"):
         evaluate(name, elsewhere, episodes=1)
+
+
+@pytest.mark.parametrize("name", sorted(OF_CHOICE))
+def test_choices_need_a_cell_with_as_many_stations_as_they_offer(name):
+    two = shipped_pick_of("cube0", "dock1").manifest
+    with pytest.raises(InvalidInput, match=f"at least 3 cubes and docks for {name}, not 2"):
+        check_task(name, two, "mine")
+    check_task(name, shipped_pick_of("cube0", "cube1", "dock1").manifest, "mine")
+    check_task("pick-single", two, "mine")
 
 
 def test_search_of_avoidable_contacts_is_of_policies_that_contacts_end():

@@ -19,6 +19,8 @@ with the safety layer between policy and robot.
 ``choice-ssm-fast-hands``
     The same reaction time and hands of up to 2.8 m/s.
 
+Rows with a choice are left out in a cell of fewer than three stations.
+
 Contact with a moving link ends an episode, also at a speed that power and force limiting
 admits (``contact_admissible``). A person may touch a robot at standstill: the episode continues
 and counts in ``contact_at_rest``. ``stopped`` is the share of control periods with override 0,
@@ -51,6 +53,8 @@ SHORT_REACTION = replace(AMONG_HANDS, human_speed=2.0, reaction_time=0.05)
 """Assumptions for a short reaction time; an episode has no delay but the control period."""
 FAST_HANDS = replace(SHORT_REACTION, human_speed=2.8)
 """The same for faster hands."""
+CHOICE = (2, 3)
+"""Fewest and most targets where the critic chooses."""
 CHUNK = 5_000
 """Number of episodes that run together."""
 
@@ -85,11 +89,17 @@ CONDITIONS: Mapping[str, Condition] = {
 """Conditions by row."""
 
 
+def conditions_in(cell: Cell) -> dict[str, Condition]:
+    """Return the conditions of a cell; a choice needs as many stations as it offers."""
+    can_choose = len(cell.pick_stations) >= CHOICE[1]
+    return {name: one for name, one in CONDITIONS.items() if can_choose or not one.choice}
+
+
 class MonitoredPicks:
     """Episodes of a policy under the safety layer."""
 
     def __init__(self, checkpoint: Checkpoint, n_episodes: int, seed: int) -> None:
-        self._networks, self._cell = ValueNetworks(checkpoint), cell_of(checkpoint.manifest)
+        self._networks, self.cell = ValueNetworks(checkpoint), cell_of(checkpoint.manifest)
         self._preset = pick_preset_of(checkpoint)
         self._n, self._seed = n_episodes, seed
 
@@ -102,10 +112,10 @@ class MonitoredPicks:
                 cell, n, seed, settings, condition.safety, monitoring, first
             )
 
-        settings = settings_for((2, 3) if condition.choice else (1, 1), self._preset)
+        settings = settings_for(CHOICE if condition.choice else (1, 1), self._preset)
         settings = replace(settings, time_limit_s=TIME_LIMIT_S)
         n = min(CHUNK, self._n - first)
-        return Evaluator(self._networks, self._cell, n, self._seed, settings, new_batch)
+        return Evaluator(self._networks, self.cell, n, self._seed, settings, new_batch)
 
     def run(self, condition: Condition) -> MonitoredEpisodes:
         """Run all episodes under a condition."""
@@ -161,12 +171,13 @@ def run_ssm(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
     """Evaluate picks under the safety layer, and the same episodes without it."""
     picks = MonitoredPicks(checkpoint, request.episodes or DEFAULT_EPISODES, request.seed)
     runs: dict[str, MonitoredEpisodes] = {}
-    rows = request.rows(len(CONDITIONS))
-    for name, condition in CONDITIONS.items():
+    conditions = conditions_in(picks.cell)
+    rows = request.rows(len(conditions))
+    for name, condition in conditions.items():
         runs[name] = picks.run(condition)
         without = None if condition.against is None else runs[condition.against]
         rows.append(row_of(name, runs[name], without))
-    stated = {name: one.safety.describe() for name, one in CONDITIONS.items() if one.active}
+    stated = {name: one.safety.describe() for name, one in conditions.items() if one.active}
     started = picks.evaluator(CONDITIONS["ssm"], 0)
     started.batch.reset()  # the first states of at most CHUNK episodes are stated
     return {

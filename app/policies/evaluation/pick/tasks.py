@@ -171,16 +171,21 @@ def run_choice(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
 
 
 def run_choice_hard(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
-    """Evaluate the selection beside two people, faster people, both, and among more targets."""
+    """Evaluate the selection beside two people, faster people, both, and among more targets.
+
+    The last setting is left out in a cell with fewer stations than it offers.
+    """
     usual = settings_for((2, 3), pick_preset_of(checkpoint))
     fast = replace(usual, work=replace(usual.work, pace=FASTER))
     settings = {
         "two-people": replace(usual, people=PAIR),
         "faster": fast,
         "two-people-faster": replace(fast, people=PAIR),
-        "two-people-4-to-6-targets": replace(usual, people=PAIR, n_candidates=MANY_TARGETS),
     }
     networks, cell = ValueNetworks(checkpoint), cell_of(checkpoint.manifest)
+    if len(cell.pick_stations) >= MANY_TARGETS[1]:
+        more = replace(usual, people=PAIR, n_candidates=MANY_TARGETS)
+        settings["two-people-4-to-6-targets"] = more
     rows = request.rows(len(settings) * (len(OTHER_RULES) + 2))
     paired: list[dict[str, object]] = []
     stated: dict[str, object] = {"hysteresis": HYSTERESIS}

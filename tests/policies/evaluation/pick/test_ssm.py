@@ -6,6 +6,7 @@ from app.policies.checkpoints import pretrained
 from app.policies.evaluation.pick import ssm
 from app.policies.evaluation.pick.ssm import CONDITIONS, MonitoredPicks
 from app.policies.evaluation.registry import evaluate
+from tests.policies.untrained import shipped_pick_of
 
 N = 80
 
@@ -58,3 +59,10 @@ def test_chunks_equal_one_batch(monkeypatch):
     parts = picks.run(CONDITIONS["ssm"])
     assert whole.seconds.tolist() == parts.seconds.tolist()
     assert whole.override.tolist() == parts.override.tolist()
+
+
+def test_two_stations_leave_no_choice():
+    found = evaluate("pick-ssm", shipped_pick_of("cube0", "dock1"), episodes=2, seed=3)
+    names = [row["name"] for row in found["results"]]
+    assert names == ["no-ssm", "ssm", "ssm-short-reaction", "ssm-distance", "pfl"]
+    assert set(found["settings"]["safety"]) == set(names) - {"no-ssm"}

@@ -19,6 +19,7 @@ from app.policies.evaluation.registry import evaluate
 from app.policies.inference.value_networks import ValueNetworks
 from app.policies.training.pick import start
 from app.sim.cells.cell import load_cell
+from tests.policies.untrained import shipped_pick_of
 
 
 @pytest.fixture(scope="module")
@@ -137,6 +138,17 @@ def test_the_oracle_of_harder_choices_covers_every_target():
     for name, candidates in numbers.items():
         assert result["settings"][name]["candidates"] == candidates
         assert rate[f"{name} oracle"] >= rate[f"{name} random"]
+
+
+def test_harder_choices_offer_no_more_targets_than_the_cell_has():
+    policy = shipped_pick_of("cube0", "cube2", "cube4", "dock1")
+    result = evaluate("pick-choice-hard", policy, episodes=2, seed=5)
+    assert set(result["settings"]) == {
+        "two-people",
+        "faster",
+        "two-people-faster",
+        "hysteresis",
+    }
 
 
 def test_cases_count_each_clause_and_keep_the_values_over_time():
