@@ -30,7 +30,7 @@ from app.sim.core.jit import direct
 from app.sim.people.kernels.people import MAX_PEOPLE
 from app.sim.prediction.kernels.networks import Network
 from app.sim.reach.batch import N_ACT, GoalRule, LimitRule, ViewName, goal_region_of
-from app.sim.reach.goal_sets import halton_targets
+from app.sim.reach.goal_sets import OF_GRID, halton_targets
 from app.sim.reach.kernels import option_features, people_set
 from app.sim.reach.kernels.observation import BASE_START, N_FEATURES, SIZES, STATE_SIZES
 from app.sim.reach.recipe_rules import BlockedRules
@@ -102,11 +102,13 @@ class ReachPolicy(TrainedPolicy):
         """Limits of the joints in training."""
         self.blocked: BlockedRules | None = blocked_rules_of(preset)
         """Rules of an arm that contacts block in training; None where they do not."""
+        self.dt: float = self._cell.robot.dt
+        """Control period of the training cell [s]."""
         self.action: ActionSettings = preset.action.settings
         """Meaning of the actions (docs/method.md 2.2)."""
         self.targets: Vec | None = None
         """Training targets [m], shape (n, 3); None for a whole box."""
-        if self.goals in ("grid", "in-turn"):
+        if self.goals in OF_GRID:
             self.targets = goal_region_of(self._cell).targets()
         elif self.goals == "halton":
             self.targets = halton_targets(goal_region_of(self._cell), preset.episode.n_halton)

@@ -12,11 +12,13 @@ from numpy.typing import NDArray
 
 from app.errors import InvalidInput
 from app.sim.core.arrays import Vec
-from app.sim.reach.goal_sets import InterpolationWeights, TargetInterpolation, interpolation_of
+from app.sim.reach.goal_sets import (
+    INTERPOLATING,
+    InterpolationWeights,
+    TargetInterpolation,
+    interpolation_of,
+)
 from app.sim.reach.reach_actor import ReachActor
-
-INTERPOLATING = ("grid", "in-turn", "halton")
-"""Sets of training goals with targets to interpolate between."""
 
 
 def interpolates(actor: ReachActor) -> bool:

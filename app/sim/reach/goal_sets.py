@@ -38,6 +38,10 @@ N_HALTON = 54
 """Targets of a Halton set, as many as in the thesis' grid."""
 MOST_HALTON = 2000
 """Largest number of targets of a Halton set."""
+OF_GRID = ("grid", "in-turn")
+"""Rules of training goals whose targets are the points of a grid."""
+INTERPOLATING = (*OF_GRID, "halton")
+"""Rules of training goals with targets to interpolate between."""
 AXES = ("x", "y", "z")
 N_CORNERS = 8
 SLACK = 1e-9
@@ -234,9 +238,8 @@ def interpolation_of(targets: Vec, rule: str) -> TargetInterpolation:
     Raises:
         InvalidInput: The rule has no targets.
     """
-    if rule in ("grid", "in-turn"):
+    if rule in OF_GRID:
         return GridInterpolation(targets)
     if rule == "halton":
         return DelaunayInterpolation(targets)
-    choices = ("grid", "in-turn", "halton")
-    raise InvalidInput("goals", rule, "has no targets to interpolate", choices)
+    raise InvalidInput("goals", rule, "has no targets to interpolate", INTERPOLATING)
