@@ -43,6 +43,7 @@ from app.sim.perception.observed_people import (
     people_shapes,
     person_from_cylinder,
 )
+from app.sim.prediction.kernels.networks import STEP_S
 from app.sim.reach.batch import goal_region_of
 from app.sim.reach.monitored.batch import HORIZON_S
 from app.sim.reach.motion_types import (
@@ -214,7 +215,10 @@ class MotionDecider:
 
     def _rollout(self, asked: bool | None) -> bool:
         if asked and not self._can_roll_out:
-            rule = "needs a policy with option features and two hidden layers"
+            rule = (
+                "needs a policy with option features and two hidden layers, and a control "
+                f"period dt of the cell that divides {STEP_S} s"
+            )
             raise InvalidInput("rollout", True, rule, ("false",))
         return self._can_roll_out if asked is None else asked
 

@@ -86,11 +86,22 @@ def ssm_constraint_of(
 
 
 def _network_of(actor: ReachActor) -> Network | None:
-    return actor.kernel_network if isinstance(actor, ReachPolicy) else None
+    """Return the network that rollouts simulate; None if they cannot.
+
+    Rollouts move the robot by whole control periods and people by ``STEP_S``.
+    """
+    if not isinstance(actor, ReachPolicy):
+        return None
+    periods = STEP_S / actor.dt
+    return actor.kernel_network if abs(periods - round(periods)) < 1e-9 else None
 
 
 def can_roll_out(actor: ReachActor) -> bool:
-    """Return whether a policy can be simulated: a residual actor with option features."""
+    """Return whether a policy can be simulated.
+
+    It is a residual actor of two layers with option features, and its control period divides
+    ``STEP_S``.
+    """
     return _network_of(actor) is not None
 
 
@@ -113,7 +124,10 @@ class RolloutImprovement:
     def __init__(self, actor: ReachActor) -> None:
         network = _network_of(actor)
         if network is None:
-            rule = "must be a residual actor of two layers with option features, for rollouts"
+            rule = (
+                "must be a residual actor of two layers with option features, in a cell whose "
+                f"control period dt divides {STEP_S} s, for rollouts"
+            )
             raise InvalidInput("checkpoint", actor.checkpoint, rule)
         self._network, self._rule = network, actor.action.rule()
         self.constraint = NO_CONSTRAINT

@@ -7,6 +7,7 @@ from app.errors import InvalidInput
 from app.policies.checkpoints import pretrained
 from app.policies.evaluation.reach.episodes import run_episodes, target_goals
 from app.policies.inference.controllers import controller_of, inference_modes_of
+from app.policies.inference.motion_decision import MotionDecider
 from app.policies.inference.reach_policy import ReachPolicy
 from app.policies.inference.rollout import CANDIDATES, POLICY, RolloutImprovement, can_roll_out
 from app.policies.networks.actor_critic import BASE_WEIGHT
@@ -17,6 +18,7 @@ from app.sim.prediction.kernels.networks import STEP_S, Network
 from app.sim.prediction.weights import new_motion_predictor
 from app.sim.reach.batch import ReachBatch, ReachSettings
 from app.sim.reach.kernels.observation_workspace import new_observation_workspace
+from app.sim.reach.motion_types import MotionQuery
 from app.sim.reach.rollout.kernels import candidates, rollout
 from app.sim.reach.rollout.kernels import improvement as kernel
 from app.sim.reach.rollout.kernels.prediction import HORIZON_STEPS, N_MOMENTS, predict_people
@@ -24,6 +26,7 @@ from app.sim.reach.rollout.kernels.workspace import RolloutWorkspace, new_rollou
 from app.sim.robot.kernels.arm import place_robot
 from app.sim.scenario.kernels.episode import COLLISION, RUNNING, SUCCESS
 from tests.policies.inference.test_controllers import RandomActor
+from tests.policies.untrained import untrained_reach
 
 CELL = load_cell("shared-workspace")
 ACTOR = ReachPolicy(pretrained.load("reach"))
@@ -282,6 +285,30 @@ def test_every_candidate_has_a_name() -> None:
     assert CANDIDATES[candidates.STRAIGHT_CANDIDATE] == "straight"
     assert CANDIDATES[0] == "home-0.08s"
     assert CANDIDATES[-2:] == ("bang-bang-bbb-0.6s", "sampled")
+
+
+@pytest.mark.parametrize(
+    ("dt", "divides"),
+    [(0.01, True), (0.02, True), (0.04, True), (0.016, False), (0.05, False), (0.1, False)],
+)
+def test_rollouts_need_a_control_period_that_divides_their_step(
+    dt: float, divides: bool
+) -> None:
+    robot = CELL.robot.model_copy(update={"dt": dt})
+    cell = CELL.model_copy(update={"name": "other-period", "robot": robot})
+    actor = ReachPolicy(untrained_reach(cell=cell, width=16))
+    assert can_roll_out(actor) is divides
+    assert ("direct-rollout" in inference_modes_of(actor)) is divides
+    if not divides:
+        query = MotionQuery(
+            q=np.array(robot.home_q),
+            qd=np.zeros(6),
+            goal=np.array([0.0, 0.9, 0.3]),
+            people=(),
+            rollout=True,
+        )
+        with pytest.raises(InvalidInput, match="dt of the cell that divides 0.04 s"):
+            MotionDecider(actor, cell).decide(query)
 
 
 def test_other_policies_cannot_be_simulated() -> None:
