@@ -31,18 +31,23 @@ def is_sorting(cell: Cell) -> bool:
 
 
 def lacks_for_tasks(cell: Cell) -> str | None:
-    """Return the missing parts for training of a sorting policy; None if complete."""
+    """Return the missing parts for sorting tasks; None if complete.
+
+    Tasks have as many levels on each tower as clutter slots: a tower takes all objects.
+    """
     if not is_sorting(cell):
         return "needs at least one station of kind clutter and one of kind cluster"
     clutter, towers = cell.stations_of("clutter"), cell.stations_of("cluster")
     if len(clutter) > MAX_CELLS or len(towers) > MAX_COLOURS:
         return f"has more than {MAX_CELLS} clutter slots or {MAX_COLOURS} clusters"
+    if any((one.levels or 1) < len(clutter) for one in towers):
+        return f"needs at least {len(clutter)} levels for each cluster, one per clutter slot"
     return None
 
 
 def lacks_for_sorting(cell: Cell) -> str | None:
     """Return the missing parts for a live sorting cell; None if complete."""
-    clutter, towers = cell.stations_of("clutter"), cell.stations_of("cluster")
+    towers = cell.stations_of("cluster")
     if (lack := lacks_for_tasks(cell)) is not None:
         return lack
     if len(cell.people) != 1 or not cell.workers:
@@ -53,8 +58,6 @@ def lacks_for_sorting(cell: Cell) -> str | None:
         return "needs another colour for each cluster"
     if len({one.level_height for one in towers}) > 1:
         return "needs the same level height for each cluster"
-    if any((one.levels or 1) < len(clutter) for one in towers):
-        return f"needs at least {len(clutter)} levels for each cluster, one per clutter slot"
     return None
 
 

@@ -14,6 +14,7 @@ from app.sim.cells.cell import Cell
 from app.sim.cells.parts import MAX_FAILURE
 from app.sim.core.arrays import Vec
 from app.sim.sorting.batch import shape_of
+from app.sim.sorting.layout import lacks_for_tasks
 from app.sim.sorting.state import (
     NULL,
     SIZE_NAMES,
@@ -35,8 +36,6 @@ class SortingNames:
     """Clutter slots, in the order of their positions."""
     towers: tuple[str, ...]
     """Towers, in the order of their colours."""
-    levels: tuple[int, ...]
-    """Levels of each tower."""
     colours: tuple[str, ...]
     """Colours, one per tower."""
     sizes: tuple[str, ...]
@@ -73,15 +72,16 @@ def names_of(cell: Cell) -> SortingNames:
     """Return the words of a work cell's sorting task.
 
     Raises:
-        InvalidInput: The cell has nothing to sort.
+        InvalidInput: The cell has nothing to sort, or towers of too few levels.
     """
     shape = shape_of(cell)
+    if (lack := lacks_for_tasks(cell)) is not None:
+        raise InvalidInput("cell", cell.name, f"cannot be used for sorting: it {lack}")
     towers = cell.stations_of("cluster")
     return SortingNames(
         shape=shape,
         cells=tuple(one.id for one in cell.stations_of("clutter")),
         towers=tuple(one.id for one in towers),
-        levels=tuple(min(one.levels or shape.n_cells, shape.n_cells) for one in towers),
         colours=tuple(one.colour or one.id for one in towers),
         sizes=SIZE_NAMES[shape.n_sizes],
     )
@@ -100,7 +100,6 @@ def plain_names(
         shape=shape,
         cells=tuple(f"cell{k}" for k in range(n_cells)),
         towers=tuple(colours),
-        levels=(n_cells,) * len(colours),
         colours=tuple(colours),
         sizes=tuple(sizes),
     )
@@ -204,8 +203,9 @@ def _put(state: SortingState, names: SortingNames, one: NamedObject, place: str)
         state.clutter[position] = code
         return
     tower = position - names.shape.n_cells
-    if one.level is None or not 0 <= one.level < names.levels[tower]:
-        rule = f"must lie in [0, {names.levels[tower] - 1}] on the tower {one.at}, 0 the lowest"
+    n_levels = names.shape.n_cells
+    if one.level is None or not 0 <= one.level < n_levels:
+        rule = f"must lie in [0, {n_levels - 1}] on the tower {one.at}, 0 the lowest"
         raise InvalidInput(f"{place}.level", one.level, rule)
     if (there := int(state.towers[tower, one.level])) != NULL:
         rule = f"is taken: {_other(names, there)} is at this level of {one.at} already"
@@ -235,8 +235,8 @@ def _ask(
     wanted: Sequence[tuple[str | None, str]],
 ) -> None:
     c = _index("goal", tower, names.towers, "tower of this task")
-    if len(wanted) > names.levels[c]:
-        rule = f"must have at most {names.levels[c]} objects, one per level"
+    if len(wanted) > names.shape.n_cells:
+        rule = f"must have at most {names.shape.n_cells} objects, one per level"
         raise InvalidInput(f"goal.{tower}", len(wanted), rule)
     for level, (colour, size) in enumerate(wanted):
         place = f"goal.{tower}[{level}]"

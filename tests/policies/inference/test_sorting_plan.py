@@ -18,6 +18,7 @@ from app.sim.robot.actions import ActionSettings
 from app.sim.scene.scene import arm_of
 from app.sim.sorting.names import names_of
 from app.sim.sorting.state import Move, SortingState, empty_state
+from tests.sim.sorting.test_names import with_levels
 from tests.support.straight_policy import StraightPolicy
 
 CELL = load_cell("sorting-e0")
@@ -66,6 +67,12 @@ def test_a_hand_at_one_of_two_equal_objects_makes_the_other_one_the_choice() -> 
     assert beside.chosen is not None
     assert beside.chosen.move.pick == ({5, 9} - {blocked}).pop()
     assert {one.move.pick for one in beside.options} == {5, 9}
+
+
+def test_cell_of_towers_that_are_too_low_for_its_tasks_is_refused() -> None:
+    with pytest.raises(InvalidInput, match="levels for each cluster"):
+        planner(with_levels(CELL, 2))
+    assert planner(with_levels(CELL, 12)).plan(query(task(5))).chosen is not None
 
 
 def test_riskier_object_is_no_option_within_the_margin() -> None:

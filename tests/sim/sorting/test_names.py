@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from app.errors import InvalidInput
-from app.sim.cells.cell import load_cell
+from app.sim.cells.cell import Cell, load_cell
 from app.sim.sorting.batch import fail_of
 from app.sim.sorting.names import (
     NamedObject,
@@ -16,12 +16,20 @@ NAMES = plain_names(4, ["red", "blue"], ["small", "large"])
 NO_RISK = np.zeros(4)
 
 
+def with_levels(cell: Cell, levels: int) -> Cell:
+    """Return a cell whose towers have other numbers of levels."""
+    stations = tuple(
+        one.model_copy(update={"levels": levels}) if one.kind == "cluster" else one
+        for one in cell.stations
+    )
+    return cell.model_copy(update={"name": "other-towers", "stations": stations})
+
+
 def test_words_of_a_cell_are_its_stations_and_colours() -> None:
     names = names_of(load_cell("sorting-e0"))
     assert names.cells == tuple(f"cell{k}" for k in range(10))
     assert names.towers == names.colours == ("red", "blue")
     assert names.sizes == ("small", "medium", "large")
-    assert names.levels == (10, 10)
     assert names.stations[10] == "red"
 
 
@@ -51,7 +59,15 @@ def test_goal_that_lacks_objects_names_how_many_of_what() -> None:
         state_from_names(NAMES, objects, goal, NO_RISK)
 
 
-def test_full_tower_of_a_low_cell_takes_no_more_levels_than_it_has() -> None:
+def test_towers_of_fewer_levels_than_clutter_slots_are_refused() -> None:
+    with pytest.raises(InvalidInput, match="needs at least 10 levels for each cluster") as low:
+        names_of(with_levels(load_cell("sorting-e0"), 2))
+    assert low.value.field == "cell"
+    high = with_levels(load_cell("sorting-e0"), 12)
+    assert names_of(high).shape == names_of(load_cell("sorting-e0")).shape
+
+
+def test_tower_takes_no_more_levels_than_the_task_has() -> None:
     names = names_of(load_cell("sorting-e0"))
     objects = [NamedObject(colour="red", size="small", at="red", level=10)]
     with pytest.raises(InvalidInput, match=r"must lie in \[0, 9\]"):
