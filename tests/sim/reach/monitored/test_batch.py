@@ -12,8 +12,15 @@ from app.sim.collision.contact import clearance
 from app.sim.people.kernels.pedestrian import AGE, N_PAST, PAST_RADIUS, PAST_SPEED
 from app.sim.reach.batch import ReachBatch, ReachSettings
 from app.sim.reach.monitored.batch import MonitoredReachBatch
+from app.sim.robot.actions import ActionSettings
 from app.sim.safety.layer import SafetyLayer, safety_settings
-from app.sim.scenario.kernels.episode import COLLISION, RUNNING, SUCCESS, TIMEOUT
+from app.sim.scenario.kernels.episode import (
+    COLLISION,
+    RUNNING,
+    SUCCESS,
+    TIMEOUT,
+    UNFEASIBLE,
+)
 from app.sim.scenario.monitoring import MonitoringSettings
 from app.sim.scene.scene import NO_CYLINDERS, people_of
 from tests.sim.driven_batches import straight
@@ -66,6 +73,18 @@ def test_people_walk_as_they_do_without_the_layer():
     np.testing.assert_array_equal(
         guarded.state.people.cylinders[both], plain.state.people.cylinders[both]
     )
+
+
+def test_one_step_bounds_can_end_unfeasible():
+    action = ActionSettings(bounds="one-step", meaning="coefficient")
+    settings = replace(ALONE, time_limit_s=25.0, action=action)
+    batch = MonitoredReachBatch(CELL, 20, 3, settings, SAFETY)
+    batch.reset()
+    push = np.ones((20, 6), dtype=np.float32)
+    push[:, 1:] = 0.0
+    for _ in range(400):
+        batch.step(push, auto_reset=False, features=False)
+    assert (batch.state.outcome == UNFEASIBLE).any()
 
 
 def test_a_period_that_is_stopped_costs_what_the_weights_say():

@@ -8,15 +8,14 @@ Source: docs/method.md 2.6 (last row) and 2.7.
 
 from app.sim.core.arrays import Vec
 from app.sim.core.jit import kernel
-from app.sim.reach.kernels.episode import ReachCell, ReachTask
+from app.sim.reach.kernels.episode import ReachCell, ReachTask, outcome_of
 from app.sim.reach.kernels.reward import reward
 from app.sim.reach.monitored.kernels.state import Commands, StepResults
+from app.sim.robot.kernels.actions import MYOPIC
 from app.sim.scenario.kernels.episode import (
-    COLLISION,
     RUNNING,
     SUCCESS,
     SUCCESS_DISTANCE,
-    TIMEOUT,
     EpisodeState,
     Indices,
     StepWorkspace,
@@ -37,6 +36,7 @@ def monitored_cycle(
     state: EpisodeState,
     e: int,
     monitor: MonitoredState,
+    unfeasible: bool,
     work: StepWorkspace,
 ) -> float:
     """Execute one control period of environment ``e``; return the reward.
@@ -46,6 +46,7 @@ def monitored_cycle(
         state: Environments; changed.
         e: Environment.
         monitor: Safety layer, tracks and accounts.
+        unfeasible: Whether the one-step bounds left no admissible coefficient.
         work: ``c``, ``d`` are the command; ``q``, ``qd``, ``qdd`` its end.
     """
     weights, before = task.weights, state.distance[e]
@@ -56,11 +57,8 @@ def monitored_cycle(
     state.distance[e] = d
     if touched:
         state.touched[e] += 1
-        state.outcome[e] = COLLISION
-    elif d < SUCCESS_DISTANCE:
-        state.outcome[e] = SUCCESS
-    elif left <= 1e-9:
-        state.outcome[e] = TIMEOUT
+    near = d < SUCCESS_DISTANCE
+    state.outcome[e] = outcome_of(touched, touched, near, unfeasible, left, True)
     stopped = weights.c_o if monitor.override[e] <= 0.0 else 0.0
     return reward(before, d, work.c, touched, state.outcome[e] == SUCCESS, weights) - stopped
 
@@ -105,11 +103,13 @@ def step_rows(
         ended[e], rew[e] = RUNNING, 0.0
         if state.outcome[e] != RUNNING:
             continue
+        unfeasible = False
         if commands.segments.shape[0] > 0:
             _command_segment(state, e, commands.segments[k], world.arm.dt, work)
         else:
-            command_action(world.arm, task.action, state, e, commands.act[e], work)
-        rew[e] = monitored_cycle(world, task, state, e, monitor, work)
+            empty = command_action(world.arm, task.action, state, e, commands.act[e], work)
+            unfeasible = empty and task.action.bounds == MYOPIC
+        rew[e] = monitored_cycle(world, task, state, e, monitor, unfeasible, work)
         ended[e] = state.outcome[e]
         if ended[e] != RUNNING:
             close_account(monitor, e)
