@@ -28,6 +28,7 @@ REACHES, LIBRARY = range(2)
 SCRIPTED, ABSENT = -1, -2
 """Values in place of a track's index: the worker follows a script; the worker is absent."""
 MAX_PEOPLE = 4
+"""Most people in a cell."""
 DEEPEST = 32
 """Most bisections of a period in the contact test."""
 

@@ -74,8 +74,6 @@ N_PICK = sum(size for _, size in PICK_SIZES)
 """First index of each group of the second person."""
 CLOSE_SCALE = 0.1
 """Unit of ``near_clearance`` [m], which is clipped at one unit."""
-MAX_PEOPLE = 4
-"""Most people in a cell."""
 PRESENT_WITHIN = 4.0
 """Distance from the robot's base from which on nobody is observed as a second person [m]."""
 BASE_START = LAYOUT["base"].start
@@ -96,7 +94,7 @@ BASE_START = LAYOUT["base"].start
     )
 )
 """First index of each group of joints and tool."""
-(ARMS, MOTION, SCALARS, NEAREST, STILL_AHEAD, BASE_AHEAD, AT_GOAL_AHEAD) = (
+(ARMS, MOTION, SCALARS, NEAREST, STILL_AHEAD, AT_GOAL_AHEAD) = (
     LAYOUT[name].start
     for name in (
         "hands_and_elbows",
@@ -104,7 +102,6 @@ BASE_START = LAYOUT["base"].start
         "distance_tilt_clearance_time",
         "nearest_by_group",
         "look_ahead_still",
-        "look_ahead_base",
         "goal_clearance",
     )
 )

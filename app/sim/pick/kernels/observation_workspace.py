@@ -8,7 +8,7 @@ from app.sim.core.arrays import Vec
 from app.sim.core.jit import kernel
 from app.sim.geometry.capsules import new_columns, padded_size
 from app.sim.human.kernels import kinematics as body
-from app.sim.pick.kernels.observation_layout import MAX_PEOPLE
+from app.sim.people.kernels.people import MAX_PEOPLE
 from app.sim.prediction.kernels.worker import WorkerPredictor, predict_worker
 from app.sim.scenario.kernels.person_observation import (
     HORIZONS,
