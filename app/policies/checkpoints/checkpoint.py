@@ -24,6 +24,8 @@ from app.policies.checkpoints.manifest_rules import check_ranges, check_values, 
 FORMAT = "tandem-checkpoint/1"
 MAX_BYTES = 16 * 1024 * 1024
 """Maximum size of the tensors of a policy [bytes], stored in one database row."""
+MAX_STATE_BYTES = 256 * 1024 * 1024
+"""Maximum size of the tensors of a state of a training, as well [bytes]."""
 MAX_WEIGHT = float(np.finfo(np.float32).max)
 """Largest absolute value of a tensor: networks compute in single precision."""
 REAL = ("F16", "F32", "F64")

@@ -9,6 +9,7 @@ from typing import Literal, Self
 from pydantic import model_validator
 
 from app.errors import InvalidInput, digits
+from app.policies.checkpoints.checkpoint import MAX_STATE_BYTES
 from app.policies.configs.fields import (
     CellName,
     FieldGroup,
@@ -23,8 +24,13 @@ from app.policies.configs.td3 import (
     NoiseExploration,
     TD3Learning,
 )
+from app.sim.pick.kernels.episode import N_PLAIN
 from app.sim.pick.kernels.grasp import REACH_ONLY as GRASP_NOTHING
 from app.sim.pick.kernels.grasp import GraspRules
+from app.sim.robot.kernels.arm import CONTROLLED
+
+SPARE_STATE_BYTES = 1 << 24
+"""Bound of what a state has beside networks and perturbed actors: environments, generators."""
 
 
 class PickLearning(TD3Learning):
@@ -237,6 +243,11 @@ class PickPreset(TrainingConfig):
     action: ActionConfig = ActionConfig()
     reward: PickReward = PickReward()
 
+    @property
+    def predicts_outcomes(self) -> bool:
+        """Whether its checkpoints hold outcome probabilities, which need features."""
+        return self.episode.observation != "state"
+
     @model_validator(mode="after")
     def _check(self) -> Self:
         """Check the groups against each other.
@@ -253,14 +264,39 @@ class PickPreset(TrainingConfig):
         ):
             rule = "must be speed with actor = residual, or with degree = 3"
             raise InvalidInput("action.meaning", self.action.meaning, rule)
-        if self.exploration.noise == "parameters" and (
-            actor != "plain" or self.learning.progress_episodes == 0
-        ):
-            rule = "needs actor = plain and progress_episodes above 0"
-            raise InvalidInput("exploration.noise", self.exploration.noise, rule)
-        if self.exploration.noise == "ar1":
-            self.exploration.check_noise(self.learning.n_envs)
+        if self.exploration.noise == "parameters":
+            self._check_parameter_noise()
+        else:
+            self._check_noise()
         return self
+
+    def _check_parameter_noise(self) -> None:
+        """Check that actors can be perturbed, and that their copies fit into a state."""
+        noise, learning, networks = self.exploration.noise, self.learning, self.networks
+        if networks.actor != "plain" or learning.progress_episodes == 0:
+            rule = "needs actor = plain and progress_episodes above 0"
+            raise InvalidInput("exploration.noise", noise, rule)
+        # Weights, biases and the gains and shifts of the normalisation.
+        per_unit = (networks.layers - 1) * networks.width + 3 * networks.layers
+        per_unit += N_PLAIN + CONTROLLED
+        size = 4 * learning.n_envs * (networks.width * per_unit + CONTROLLED)
+        # Networks and their targets, and two moments of each weight, are in a state, too.
+        most = MAX_STATE_BYTES - SPARE_STATE_BYTES - 4 * networks.n_bytes
+        if size > most:
+            rule = (
+                f"makes perturbed actors of {size / 2**20:.0f} MB with networks.width = "
+                f"{networks.width} and layers = {networks.layers}; must stay below "
+                f"{most // 2**20} MB"
+            )
+            raise InvalidInput("learning.n_envs", learning.n_envs, rule)
+
+    def _check_noise(self) -> None:
+        """Check the AR(1) noise; options are commanded as joint speeds."""
+        self.exploration.check_noise(self.learning.n_envs)
+        rate = self.exploration.option_rate
+        if self.action.meaning == "coefficient" and rate > 0.0:
+            rule = "must be 0 with action.meaning = coefficient: options command joint speeds"
+            raise InvalidInput("exploration.option_rate", rate, rule)
 
 
 PICK = PickPreset(networks=PickNetworks(critic="quantiles"))

@@ -53,6 +53,13 @@ class ActorCriticNetworks(FieldGroup):
         2, 0, 99, "", "Dropped quantiles: the highest ones per critic, left out in targets"
     )
 
+    @property
+    def n_bytes(self) -> int:
+        """Upper bound of the size of actor and critics [bytes]."""
+        per_network = self.width * ((self.layers - 1) * self.width + MOST_SEEN)
+        values = self.n_critics * self.n_quantiles * self.width
+        return 4 * ((1 + self.n_critics) * per_network + values)
+
     @model_validator(mode="after")
     def _check_quantiles(self) -> Self:
         """Check that targets keep quantiles.
@@ -72,9 +79,7 @@ class ActorCriticNetworks(FieldGroup):
         Raises:
             InvalidInput: They are too large.
         """
-        per_network = self.width * ((self.layers - 1) * self.width + MOST_SEEN)
-        values = self.n_critics * self.n_quantiles * self.width
-        size = 4 * ((1 + self.n_critics) * per_network + values)
+        size = self.n_bytes
         if size + SPARE_BYTES > MAX_BYTES:
             rule = (
                 f"makes networks of {size / 2**20:.0f} MB with layers = {self.layers} and "

@@ -16,7 +16,12 @@ import torch
 
 from app.errors import CheckpointMismatch, InvalidInput
 from app.policies.algorithms.prioritized_replay import PrioritisedReplay
-from app.policies.checkpoints.checkpoint import TensorFile, check_file, tensor_bytes
+from app.policies.checkpoints.checkpoint import (
+    MAX_STATE_BYTES,
+    TensorFile,
+    check_file,
+    tensor_bytes,
+)
 from app.policies.checkpoints.model_state import moments_of, restore, weights_of
 from app.policies.checkpoints.trained_cell import DEFINITION, manifest_fields
 from app.policies.configs.fields import read_config
@@ -25,8 +30,6 @@ from app.sim.cells.cell import Cell
 from app.state_dict import State
 
 FORMAT = "tandem-training-state/1"
-MAX_BYTES = 256 * 1024 * 1024
-"""Maximum size of the tensors, which are stored in one database row [bytes]."""
 REQUIRED = {
     "format": str,
     "preset": dict,
@@ -75,7 +78,7 @@ def load(manifest: object, tensors: bytes) -> TrainingState:
         CheckpointMismatch: The format is another one.
     """
     return TrainingState(
-        check_file(manifest, tensors, FORMAT, REQUIRED, MAX_BYTES), bytes(tensors)
+        check_file(manifest, tensors, FORMAT, REQUIRED, MAX_STATE_BYTES), bytes(tensors)
     )
 
 

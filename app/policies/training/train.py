@@ -89,13 +89,14 @@ def train(
     Raises:
         CheckpointMismatch: ``resume`` belongs to another configuration, seed, cell or program.
         Damaged: A file of ``memory`` is missing or changed.
-        InvalidInput: The cell cannot be trained in.
+        InvalidInput: The cell cannot be trained in, or the networks fit into no checkpoint.
         SimulationError: A reward was not finite.
     """
     place = cell or load_cell(preset.cell)
     calls = Callbacks(on_progress, on_checkpoint, should_stop)
     with _without_denormals():
         run, reporter = start(preset, seed, place, calls)
+        run.policy()  # refuses networks that no checkpoint can hold before the first step
         if memory is not None:
             run.keep_states(memory)
         if resume is not None:

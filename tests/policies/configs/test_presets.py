@@ -108,12 +108,28 @@ def test_a_bad_override_is_refused_by_name(overrides, field):
             "overrides.exploration.greedy_share",
         ),
         ("sorting-e0-dqn", {"networks": {"width": 1024}}, "overrides.networks.width"),
+        (
+            "pick-td3-thesis",
+            {"exploration": {"noise": "ar1"}},
+            "overrides.exploration.option_rate",
+        ),
+        (
+            "pick-td3-thesis",
+            {"learning": {"n_envs": 125}, "networks": {"width": 1024}},
+            "overrides.learning.n_envs",
+        ),
     ],
 )
 def test_what_would_fail_late_or_have_no_effect_is_refused(preset, overrides, field):
     with pytest.raises(InvalidInput) as refused:
         presets.resolve(preset, overrides)
     assert refused.value.field == field
+
+
+def test_noise_without_options_explores_coefficients():
+    noise = {"noise": "ar1", "option_rate": 0.0}
+    preset = presets.resolve("pick-td3-thesis", {"exploration": noise})
+    assert (preset.action.meaning, preset.exploration.option_rate) == ("coefficient", 0.0)
 
 
 def test_presets_load_no_learning_library():

@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from app.errors import CheckpointMismatch
+from app.errors import CheckpointMismatch, InvalidInput
 from app.policies.inference.task_selection import TaskChooser
 from app.policies.inference.value_networks import ValueNetworks
 from app.policies.networks.pick import LAYOUTS
@@ -55,6 +55,23 @@ def test_a_training_counts_episodes_that_end_unfeasible():
 @pytest.mark.usefixtures("tiny_run")
 def test_thread_of_a_training_keeps_denormal_numbers_afterwards():
     assert np.float64(1e-300) * np.float64(1e-15) > 0.0
+
+
+def test_networks_that_no_checkpoint_holds_are_refused_before_the_first_step():
+    cell = load_cell("sorting-e0")
+    slot, tower = cell.stations_of("clutter")[0], cell.stations_of("cluster")[0]
+    slots = [slot.model_copy(update={"id": f"cell{k}"}) for k in range(30)]
+    towers = [
+        tower.model_copy(update={"id": f"tower{k}", "levels": 30, "colour": None})
+        for k in range(4)
+    ]
+    large = cell.model_copy(update={"name": "large", "stations": (*slots, *towers)})
+    fields = {**TINY, "networks.width": 512, "learning.progress_episodes": 10}
+    del fields["learning.actor_frozen_updates"]
+    recorder = Recorder()
+    with pytest.raises(InvalidInput, match="tensors"):
+        recorder.run(preset_of("sorting-e0-thesis", fields), cell=large)
+    assert not recorder.progress
 
 
 def test_the_same_seed_trains_the_same_bits(tiny_preset, tiny_run):
