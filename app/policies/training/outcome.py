@@ -6,6 +6,7 @@ Half of the episodes have less time than those of the training, down to almost n
 of the ensemble learns from a bootstrap sample of the episodes.
 """
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -34,6 +35,10 @@ TIME_WEIGHT = 0.05
 """Weight of the error of the time, relative to the cross-entropy."""
 
 
+class FitStopped(Exception):
+    """A stop was asked for before the outcome probabilities were fitted."""
+
+
 class OutcomeData(NamedTuple):
     """Labelled observations."""
 
@@ -49,14 +54,29 @@ class OutcomeData(NamedTuple):
     """Number of the episode, shape (n,)."""
 
 
+def _continue_unless(should_stop: Callable[[], bool]) -> None:
+    """Raise FitStopped where a stop is asked for."""
+    if should_stop():
+        raise FitStopped
+
+
 def collect(
-    batch: PickBatch, actor: nn.Module, critic: Critics, n_steps: int, seed: int
+    batch: PickBatch,
+    actor: nn.Module,
+    critic: Critics,
+    n_steps: int,
+    seed: int,
+    should_stop: Callable[[], bool],
 ) -> OutcomeData:
     """Return labelled observations of episodes under a greedy policy.
 
     Args:
         n_steps: Steps of all environments.
         seed: Seed of the steps that are kept.
+        should_stop: Called before every step.
+
+    Raises:
+        FitStopped: ``should_stop`` asked for it.
     """
     rng, n = np.random.default_rng(seed), batch.n_envs
     batch.reset()
@@ -64,6 +84,7 @@ def collect(
     rows: list[tuple[NDArray[np.float32], float, int, float, int]] = []
     episode, dt = np.arange(n), batch.arm.dt
     for _ in range(n_steps):
+        _continue_unless(should_stop)
         first = batch.state.elapsed < 0.5 * dt
         shortened = np.flatnonzero(first & (rng.random(n) < SHORTENED))
         batch.shorten(shortened, rng.random(len(shortened)))
@@ -93,7 +114,7 @@ def collect(
     )
 
 
-def fit(data: OutcomeData, seed: int) -> OutcomeHead:
+def fit(data: OutcomeData, seed: int, should_stop: Callable[[], bool]) -> OutcomeHead:
     """Return the ensemble fitted to labelled observations.
 
     A tenth of the episodes is kept apart: on them the spread is widened until the rate of
@@ -102,6 +123,10 @@ def fit(data: OutcomeData, seed: int) -> OutcomeHead:
     Args:
         data: Labelled observations.
         seed: Seed of weights, bootstrap and order.
+        should_stop: Called before every pass over the data.
+
+    Raises:
+        FitStopped: ``should_stop`` asked for it.
     """
     torch.manual_seed(seed)
     rng = np.random.default_rng(seed)
@@ -114,8 +139,9 @@ def fit(data: OutcomeData, seed: int) -> OutcomeHead:
     rest = names[~np.isin(names, data.episode[apart])]
     for member in range(MEMBERS):
         drawn = rng.choice(rest, len(rest))
-        weight = np.bincount(np.searchsorted(names, drawn), minlength=len(names))
-        _fit_member(head, member, data, weight[np.searchsorted(names, data.episode)], rng)
+        times = np.bincount(np.searchsorted(names, drawn), minlength=len(names))
+        weight = times[np.searchsorted(names, data.episode)]
+        _fit_member(head, member, data, weight, rng, should_stop)
     _widen(head, data, apart)
     return head.eval()
 
@@ -126,6 +152,7 @@ def _fit_member(
     data: OutcomeData,
     weight: NDArray[np.int64],
     rng: np.random.Generator,
+    should_stop: Callable[[], bool],
 ) -> None:
     """Fit one member to the observations of a bootstrap sample."""
     network = head.members[member]
@@ -141,6 +168,7 @@ def _fit_member(
         optimizer, RATE, total_steps=EPOCHS * (len(rows) // size) + 1
     )
     for _ in range(EPOCHS):
+        _continue_unless(should_stop)
         rng.shuffle(rows)
         for first in range(0, len(rows) - size + 1, size):
             one = torch.as_tensor(rows[first : first + size])

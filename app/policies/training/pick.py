@@ -1,6 +1,6 @@
 """Training on the pick scenario: settings, networks, exploration and learning curve."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -21,7 +21,7 @@ from app.policies.networks.actor_critic import Critics
 from app.policies.networks.outcome import OutcomeHead
 from app.policies.networks.pick import LAYOUTS, actor_of, critics_for
 from app.policies.training.curve import CURVE_SEED, outcome_rates, play
-from app.policies.training.outcome import collect, fit
+from app.policies.training.outcome import FitStopped, collect, fit
 from app.policies.training.reporter import Callbacks, Reporter
 from app.policies.training.run import TrainingRun
 from app.policies.training.td3 import TD3Scenario, TrainingMonitor, start_td3
@@ -172,16 +172,24 @@ def start(preset: PickPreset, seed: int, cell: Cell) -> tuple[TrainingRun, Train
 
 
 def fit_outcomes(
-    preset: PickPreset, seed: int, cell: Cell, policy: Checkpoint
+    preset: PickPreset,
+    seed: int,
+    cell: Cell,
+    policy: Checkpoint,
+    should_stop: Callable[[], bool],
 ) -> OutcomeHead | None:
     """Return the outcome probabilities of a trained policy.
 
     Args:
         seed: Seed of the training.
         cell: Work cell of the training.
+        should_stop: Called before every step and every pass over the data.
 
     Returns:
         The ensemble; None where too few episodes ended to fit one.
+
+    Raises:
+        FitStopped: ``should_stop`` asked for it.
     """
     learning = preset.learning
     batch = batch_of(preset, cell, learning.n_envs, seed + OUTCOME_SEED)
@@ -191,17 +199,24 @@ def fit_outcomes(
     actor.load_state_dict(tensors_under(arrays, "actor"))
     critic.load_state_dict(tensors_under(arrays, "critic"))
     n_steps = round(OUTCOME_SHARE * learning.total_steps) // learning.n_envs
-    data = collect(batch, actor, critic, n_steps, seed)
-    return fit(data, seed) if len(np.unique(data.episode)) >= MIN_EPISODES else None
+    data = collect(batch, actor, critic, n_steps, seed, should_stop)
+    enough = len(np.unique(data.episode)) >= MIN_EPISODES
+    return fit(data, seed, should_stop) if enough else None
 
 
-def add_outcomes(
-    run: TrainingRun, preset: PickPreset, seed: int, cell: Cell, policy: Checkpoint
-) -> None:
-    """Fit the outcome probabilities of a finished policy and add them to its checkpoint."""
-    head = fit_outcomes(preset, seed, cell, policy)
+def add_outcomes(run: TrainingRun, preset: PickPreset, should_stop: Callable[[], bool]) -> bool:
+    """Fit the outcome probabilities of a finished policy and add them to its checkpoint.
+
+    Returns:
+        Whether that was done; false where ``should_stop`` ended it.
+    """
+    try:
+        head = fit_outcomes(preset, run.seed, run.cell, run.policy(), should_stop)
+    except FitStopped:
+        return False
     if head is not None:
         run.add("outcome", head)
+    return True
 
 
 def collision_cost(preset: PickPreset, step: int) -> float:

@@ -142,7 +142,7 @@ class TrainingRun:
         self._files = files
 
     def learn(self, callback: BaseCallback, report: Callable[[], bool]) -> bool:
-        """Train to the end, or until a report stops it; return whether it was stopped.
+        """Train to the end, or until a report stops it before; return whether it was stopped.
 
         Args:
             callback: Called by Stable-Baselines3 in every step.
@@ -170,8 +170,8 @@ class TrainingRun:
             if self.step > model.learning_starts:
                 model.train(model.gradient_steps, model.batch_size)
             if not report():
-                return True
-        return False
+                break
+        return self.step < total
 
     def policy(self) -> Checkpoint:
         """Return the checkpoint of the present policy."""

@@ -81,7 +81,8 @@ def train(
         on_progress: Called every ``progress_steps``.
         on_checkpoint: Called every ``checkpoint_steps`` and at the end or stop with the step,
             the policy and the state to resume from.
-        should_stop: Called after every step of the environments, so it must be cheap.
+        should_stop: Called after every step of the environments, also of those that follow the
+            training of a pick policy and fit its outcome probabilities, so it must be cheap.
         cell: The work cell that the preset names; by default the shipped one of that name.
         memory: Files of the replay memory; None if no states are wanted.
         resume: The last state of an interrupted attempt; needs ``memory``.
@@ -103,11 +104,11 @@ def train(
             run.restore(resume)
         with nullcontext() if _keeps_precision(preset) else _bfloat16_products():
             stopped = run.learn(reporter, reporter.report)
-        features = isinstance(preset, PickPreset) and preset.episode.observation != "state"
-        if not stopped and isinstance(preset, PickPreset) and features:
-            pick_training.add_outcomes(run, preset, seed, place, run.policy())
-            run.save(on_checkpoint)
-        elif run.step % preset.learning.checkpoint_steps:
+        completed = False
+        if not stopped and isinstance(preset, PickPreset) and preset.predicts_outcomes:
+            completed = pick_training.add_outcomes(run, preset, should_stop)
+            stopped = not completed
+        if completed or run.step % preset.learning.checkpoint_steps:
             run.save(on_checkpoint)
         return TrainResult(checkpoint=run.policy(), step=run.step, stopped=stopped)
 

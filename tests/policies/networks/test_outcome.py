@@ -6,7 +6,7 @@ import torch
 
 from app.policies.networks.actor_critic import ResidualActor, ResidualFading
 from app.policies.networks.outcome import OutcomeHead
-from app.policies.training.outcome import OutcomeData, fit
+from app.policies.training.outcome import EPOCHS, FitStopped, OutcomeData, fit
 
 
 def test_probabilities_sum_to_one_and_times_are_not_negative() -> None:
@@ -25,7 +25,7 @@ def test_a_fit_recovers_a_rate_that_depends_on_one_input(n: int, error: float) -
     value = np.zeros(n, dtype=np.float32)
     time_s = np.full(n, 3.0, dtype=np.float32)
     data = OutcomeData(obs, value, label, time_s, np.arange(n))
-    head = fit(data, seed=1)
+    head = fit(data, seed=1, should_stop=lambda: False)
     probe = torch.zeros(3, 4)
     probe[:, 1] = torch.tensor([-1.0, 0.0, 1.0])
     found = head.predict(probe, torch.zeros(3))
@@ -33,6 +33,16 @@ def test_a_fit_recovers_a_rate_that_depends_on_one_input(n: int, error: float) -
     np.testing.assert_allclose(found.probability[:, 0], expected, atol=error)
     assert found.probability[:, 2].max() < error
     np.testing.assert_allclose(found.time_s, 3.0, atol=0.3)
+
+
+def test_a_fit_stops_between_two_passes_over_the_data() -> None:
+    rng, passes = np.random.default_rng(2), iter(range(100))
+    obs, label = rng.normal(size=(200, 4)).astype(np.float32), rng.integers(3, size=200)
+    value, time_s = np.zeros((2, 200), dtype=np.float32)
+    data = OutcomeData(obs, value, label, time_s, np.arange(200))
+    with pytest.raises(FitStopped):
+        fit(data, seed=1, should_stop=lambda: next(passes) == EPOCHS + 1)
+    assert next(passes) == EPOCHS + 2
 
 
 @pytest.mark.parametrize(("distance", "share"), [(0.2, 1.0), (0.9, 0.5), (1.5, 0.0)])

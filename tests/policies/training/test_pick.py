@@ -52,7 +52,7 @@ def test_outcomes_are_learned_from_episodes_of_any_length():
     preset = PickPreset()
     batch = batch_of(preset, CELL, 32, 3)
     networks = (make(preset, batch.obs_size) for make in (actor_of, critics_for))
-    data = collect(batch, *networks, n_steps=420, seed=3)
+    data = collect(batch, *networks, n_steps=420, seed=3, should_stop=lambda: False)
     first = np.unique(data.episode, return_index=True)[1]
     seen = TIME_SCALE * data.obs[:, SCALARS + 3]
     left = seen[first]

@@ -131,6 +131,24 @@ def interrupted_at(kind: str, folder: Path, *stops: int) -> tuple[Training, Trai
     return training, training.run()
 
 
+def test_training_stopped_while_outcomes_are_fitted_continues_there(
+    uninterrupted: Any, tmp_path: Path
+) -> None:
+    whole, result = uninterrupted("TD3")
+    training = Training(small("TD3"), tmp_path)
+    for n_played in (1, 5):
+        stopped = training.run(1024 + n_played * N_ENVS)
+        assert (stopped.stopped, stopped.step) == (True, 1024)
+    resumed = training.run()
+    assert (resumed.stopped, resumed.checkpoint.sha256) == (False, result.checkpoint.sha256)
+    assert training.curve == whole.curve
+
+
+def test_stop_at_the_last_step_is_no_interruption(tmp_path: Path) -> None:
+    result = Training(small("DQN"), tmp_path).run(1024)
+    assert (result.stopped, result.step) == (False, 1024)
+
+
 def steps_of(seed: int, n: int, total: int = 1024) -> list[int]:
     """Return steps at which a training is interrupted."""
     return sorted(random.Random(seed).sample(range(N_ENVS, total, N_ENVS), n))
