@@ -23,8 +23,7 @@ from app.policies.checkpoints import pretrained
 from app.policies.checkpoints.checkpoint import Checkpoint
 from app.policies.checkpoints.trained_cell import cell_of
 from app.policies.evaluation.pick import selection_rules
-from app.policies.evaluation.pick.episodes import Evaluator, settings_for
-from app.policies.evaluation.pick.people import CANDIDATES
+from app.policies.evaluation.pick.episodes import CANDIDATES, Evaluator, settings_for
 from app.policies.evaluation.pick.worst_people import FILE, HandMotion, beside
 from app.policies.inference.task_selection import HYSTERESIS
 from app.policies.inference.value_networks import ValueNetworks, pick_preset_of

@@ -30,7 +30,7 @@ from app.errors import InvalidInput
 from app.policies.checkpoints.checkpoint import Checkpoint, load
 from app.policies.checkpoints.trained_cell import cell_of
 from app.policies.evaluation.pick import selection_rules
-from app.policies.evaluation.pick.episodes import Evaluator, settings_for
+from app.policies.evaluation.pick.episodes import CANDIDATES, Evaluator, settings_for
 from app.policies.inference.task_selection import HYSTERESIS
 from app.policies.inference.value_networks import ValueNetworks, pick_preset_of
 from app.provenance import describe
@@ -96,7 +96,7 @@ def successes(checkpoint: Checkpoint, motions: Sequence[Motion], episodes: int) 
     """Return the success rate of a policy in each test."""
     cell = cell_of(checkpoint.manifest)
     recorded = tuple(at_the_table(motion, cell) for motion in motions)
-    usual = settings_for((2, 3), pick_preset_of(checkpoint))
+    usual = settings_for(CANDIDATES, pick_preset_of(checkpoint))
     networks, rates = ValueNetworks(checkpoint), {}
     for name, settings in tests(usual, recorded).items():
         evaluator = Evaluator(networks, cell, episodes, SEED, settings)

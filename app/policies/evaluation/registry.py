@@ -19,6 +19,7 @@ from app.policies.evaluation.pick import cases as pick_cases
 from app.policies.evaluation.pick import ssm as pick_ssm
 from app.policies.evaluation.pick import tasks as pick
 from app.policies.evaluation.pick.case_variants import run_case_variants
+from app.policies.evaluation.pick.episodes import CANDIDATES
 from app.policies.evaluation.reach.oracle import run_oracle
 from app.policies.evaluation.reach.people import run_constant, run_people, run_speeds
 from app.policies.evaluation.reach.random_goals import run_random
@@ -210,7 +211,7 @@ def check_task(name: str, manifest: Mapping[str, Any], found: str) -> None:
     if name in OF_CASES and manifest["cell"] != CASES_CELL:
         rule = f"must be of the cell {CASES_CELL!r} for {name}, not of {manifest['cell']!r}"
         raise InvalidInput("checkpoint", found, rule)
-    most = people.CANDIDATES[1]
+    most = CANDIDATES[1]
     if name in OF_CHOICE and (n := len(cell_of(manifest).pick_stations)) < most:
         rule = f"must be of a cell with at least {most} cubes and docks for {name}, not {n}"
         raise InvalidInput("checkpoint", found, rule)

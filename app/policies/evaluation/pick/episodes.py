@@ -37,6 +37,8 @@ from app.sim.scene.scene import NO_CYLINDERS, people_geometry_of
 Index = NDArray[np.int64]
 SECOND_GOAL = slices_of(PICK_SIZES)["second_goal_clearance"].start
 """Index of the clearance of the second person at the object."""
+CANDIDATES = (2, 3)
+"""Fewest and most targets of an episode in which the policy chooses."""
 EVALUATION_LIBRARY = 1_000_003
 """Seed of the person's postures in evaluations; training uses 0, so these were never seen."""
 

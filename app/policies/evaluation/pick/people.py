@@ -28,7 +28,12 @@ from app.errors import InvalidInput
 from app.policies.checkpoints.checkpoint import Checkpoint
 from app.policies.checkpoints.trained_cell import cell_of
 from app.policies.evaluation.pick import selection_rules
-from app.policies.evaluation.pick.episodes import Episodes, Evaluator, settings_for
+from app.policies.evaluation.pick.episodes import (
+    CANDIDATES,
+    Episodes,
+    Evaluator,
+    settings_for,
+)
 from app.policies.evaluation.pick.tasks import settings_of
 from app.policies.evaluation.rows import EvaluationRequest, Json
 from app.policies.evaluation.statistics import wilson
@@ -45,7 +50,6 @@ from app.sim.scenario.kernels.episode import COLLISION, RUNNING, TIMEOUT
 from app.sim.scene.scene import HumanKind
 
 DEFAULT_EPISODES = 1000
-CANDIDATES = (2, 3)
 YIELDING_LEVELS = (0.0, 0.5, 1.0)
 """Strengths of yielding."""
 MAX_RECORDED_S = 36_000

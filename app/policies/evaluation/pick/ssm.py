@@ -34,7 +34,7 @@ from dataclasses import dataclass, replace
 from app.policies.checkpoints.checkpoint import Checkpoint
 from app.policies.checkpoints.trained_cell import cell_of
 from app.policies.evaluation.pick import selection_rules
-from app.policies.evaluation.pick.episodes import Evaluator, settings_for
+from app.policies.evaluation.pick.episodes import CANDIDATES, Evaluator, settings_for
 from app.policies.evaluation.pick.tasks import settings_of
 from app.policies.evaluation.rows import EvaluationRequest, Json
 from app.policies.evaluation.statistics import mean_of, wilson
@@ -53,8 +53,6 @@ SHORT_REACTION = replace(AMONG_HANDS, human_speed=2.0, reaction_time=0.05)
 """Assumptions for a short reaction time; an episode has no delay but the control period."""
 FAST_HANDS = replace(SHORT_REACTION, human_speed=2.8)
 """The same for faster hands."""
-CHOICE = (2, 3)
-"""Fewest and most targets where the critic chooses."""
 CHUNK = 5_000
 """Number of episodes that run together."""
 
@@ -91,7 +89,7 @@ CONDITIONS: Mapping[str, Condition] = {
 
 def conditions_in(cell: Cell) -> dict[str, Condition]:
     """Return the conditions of a cell; a choice needs as many stations as it offers."""
-    can_choose = len(cell.pick_stations) >= CHOICE[1]
+    can_choose = len(cell.pick_stations) >= CANDIDATES[1]
     return {name: one for name, one in CONDITIONS.items() if can_choose or not one.choice}
 
 
@@ -112,7 +110,7 @@ class MonitoredPicks:
                 cell, n, seed, settings, condition.safety, monitoring, first
             )
 
-        settings = settings_for(CHOICE if condition.choice else (1, 1), self._preset)
+        settings = settings_for(CANDIDATES if condition.choice else (1, 1), self._preset)
         settings = replace(settings, time_limit_s=TIME_LIMIT_S)
         n = min(CHUNK, self._n - first)
         return Evaluator(self._networks, self.cell, n, self._seed, settings, new_batch)

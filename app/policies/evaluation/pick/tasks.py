@@ -16,6 +16,7 @@ from app.policies.checkpoints.trained_cell import cell_of
 from app.policies.evaluation.contact_recheck import recheck
 from app.policies.evaluation.pick import selection_rules
 from app.policies.evaluation.pick.episodes import (
+    CANDIDATES,
     Episodes,
     Evaluator,
     Rule,
@@ -154,7 +155,7 @@ class ChoiceRun:
 
 def run_choice(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
     """Evaluate selection among 2 or 3 random targets, and other rules on the same episodes."""
-    evaluators = evaluators_of(checkpoint, (2, 3), request.episodes, request.seed)
+    evaluators = evaluators_of(checkpoint, CANDIDATES, request.episodes, request.seed)
     rows = request.rows(len(evaluators) * (len(OTHER_RULES) + 2))
     runs = {name: ChoiceRun(one, request.seed, name) for name, one in evaluators.items()}
     for name, run in runs.items():
@@ -175,7 +176,7 @@ def run_choice_hard(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
 
     The last setting is left out in a cell with fewer stations than it offers.
     """
-    usual = settings_for((2, 3), pick_preset_of(checkpoint))
+    usual = settings_for(CANDIDATES, pick_preset_of(checkpoint))
     fast = replace(usual, work=replace(usual.work, pace=FASTER))
     settings = {
         "two-people": replace(usual, people=PAIR),

@@ -25,6 +25,7 @@ import numpy as np
 from app.policies.checkpoints.checkpoint import Checkpoint
 from app.policies.evaluation.pick import selection_rules
 from app.policies.evaluation.pick.episodes import (
+    CANDIDATES,
     Index,
     ObservedPeople,
     PeopleObserver,
@@ -166,7 +167,7 @@ class KeypointObserver:
 def run_tracker(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
     """Evaluate task selection among 2 or 3 random targets with people observed by a tracker."""
     n = request.episodes or DEFAULT_EPISODES
-    evaluator = evaluators_of(checkpoint, (2, 3), n, request.seed)[""]
+    evaluator = evaluators_of(checkpoint, CANDIDATES, n, request.seed)[""]
     rule = selection_rules.critic(HYSTERESIS)
     observers: dict[str, PeopleObserver] = {"exact": observe_exactly}
     observers |= {name: KeypointObserver(row, request.seed) for name, row in ROWS.items()}
