@@ -52,9 +52,6 @@ STANDSTILL = 1e-3
 APART_M = 0.02
 """Separation distance from which a contact at standstill is over [m]."""
 
-_TOUCHED = {"cell": "table", "self": "robot"}
-
-
 P = TypeVar("P", bound=MovingPeople)
 
 
@@ -279,7 +276,7 @@ class BaseWorld(ABC, Generic[P]):
         self.contact = ContactSnapshot(
             kind=found.kind,
             link=found.link,
-            body=found.part if found.kind == "human" else _TOUCHED[found.kind],
+            body=found.part,
             person=self._touched_person(found),
         )
         self.count(contacts=1)

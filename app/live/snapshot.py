@@ -96,9 +96,10 @@ class ContactSnapshot(ReadModel):
     kind: str
     """human, cell or self"""
     link: str
-    """robot link in contact"""
+    """capsule of the robot in contact"""
     body: str
-    """capsule of the person, `table` or `robot`"""
+    """touched part: a capsule of a person, `walker`, `table`, `obstacle`, or for `self` another
+    capsule of the robot"""
     person: int | None = None
     """id of the touched person"""
 

@@ -24,14 +24,15 @@ _TOUCHED = {
     "leg_l": "the left leg",
     "walker": "the person",
     "table": "the table",
-    "robot": "another part of the robot",
+    "obstacle": "an obstacle",
 }
 
 
 def contact_message(contact: ContactSnapshot, *, final: bool) -> str:
     """Return the message on a contact; ``final`` if it ends a case study."""
-    link = contact.link.replace("_", " ")
-    body = _TOUCHED.get(contact.body, contact.body)
+    link, body = contact.link.replace("_", " "), _TOUCHED.get(contact.body, contact.body)
+    if contact.kind == "self":
+        body = f"the robot's {contact.body.replace('_', ' ')}"
     then = "The scenario ended." if final else "The robot starts again from home."
     return f"Contact: {link} touched {body}. {then}"
 

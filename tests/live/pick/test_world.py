@@ -11,6 +11,7 @@ from app.sim.cells.cell import Cell, load_cell
 from app.sim.human import model as human
 from app.sim.human.person import Person
 from app.sim.pick.task_policy import Candidate, PickProgress
+from tests.live.pick.pick_scenes import run, until
 from tests.support.straight_policy import StraightPolicy
 
 
@@ -27,20 +28,6 @@ def world(cell: Cell) -> LivePickWorld:
     run(world, 40)
     world.apply(commands.Reset())
     return world
-
-
-def run(world: LivePickWorld, ticks: int) -> WorldSnapshot:
-    for _ in range(ticks):
-        world.step()
-    return world.snapshot()
-
-
-def until(world: LivePickWorld, status: str, limit: int = 400) -> WorldSnapshot:
-    for _ in range(limit):
-        world.step()
-        if world.snapshot().status == status:
-            return world.snapshot()
-    raise AssertionError(f"never {status}: {world.snapshot().message}")
 
 
 def palm(snapshot: WorldSnapshot, cell: Cell, hand: str) -> np.ndarray:
@@ -226,22 +213,6 @@ def test_speed_given_to_the_policy_is_the_speed_of_the_movement(world: LivePickW
     before = run(world, 3)
     after = run(world, 1)
     assert np.allclose(after.people[0].qd, (after.people[0].q - before.people[0].q) / 0.05)
-
-
-def test_contact_is_reported_and_the_robot_restarts_from_home(
-    world: LivePickWorld, cell: Cell
-) -> None:
-    world.apply(commands.SetSafety(on=False))
-    world.apply(commands.SetCandidates(ids=("cube2",)))
-    world.apply(commands.MovePerson(pelvis=(0.0, 1.15, -1.57), right=(-0.1, 0.62, 0.2)))
-    hit = until(world, "contact")
-    assert hit.contact is not None
-    assert hit.contact.kind == "human"
-    assert hit.contact.body in human.CAPSULE_NAMES
-    world.apply(commands.MovePerson(pelvis=(0.0, 2.4, -1.57)))
-    again = until(world, "moving")
-    assert np.allclose(again.robot_q, cell.robot.home_q)
-    assert again.counters.contacts == 1
 
 
 def test_paused_clock_stands_while_the_dragged_person_moves(world: LivePickWorld) -> None:

@@ -1,5 +1,7 @@
 """The robot in the scene: link meshes at the poses of Pinocchio, and gripper or magnet."""
 
+from collections.abc import Collection
+
 import numpy as np
 import viser
 
@@ -91,9 +93,9 @@ class RobotView:
             np.einsum("nij,nkj->nki", frames[:, :3, :3], ends) + frames[:, None, :3, 3]
         )
 
-    def show_capsules(self, visible: bool, touched: str | None) -> None:
+    def show_capsules(self, visible: bool, touched: Collection[str]) -> None:
         """Show or hide the collision capsules; those in contact are always shown, in red."""
-        self._capsules.show(visible, () if touched is None else touched.split(" and "))
+        self._capsules.show(visible, touched)
 
     def grip(self, closed: bool) -> None:
         """Open or close the fingers, or switch the magnet."""

@@ -43,7 +43,7 @@ class CellScene:
             self._reach = ReachScene(server, cell, submit) if is_reaching(cell) else None
             picks = self._sorting is None and self._reach is None
             self._risk = RiskView(server) if picks else None
-            self._path = Arc(server, "/path/arc", lift=PATH_LIFT)
+            self._path = Arc(server, "/path/arc", lift=PATH_LIFT) if picks else None
 
     def note(self, snapshot: WorldSnapshot) -> None:
         """Add a snapshot that is not drawn to the trail of the tool."""
@@ -66,23 +66,30 @@ class CellScene:
             risk: Risk map of a pick cell.
         """
         with self._server.atomic():
-            touched = snapshot.contact if snapshot.status == "contact" else None
             self._robot.draw(snapshot.robot_q)
             self._robot.grip(snapshot.gripping)
-            self._robot.show_capsules(shapes, touched.link if touched else None)
+            self._robot.show_capsules(shapes, _touched_capsules(snapshot))
             self._people.draw(snapshot, dt, shapes=shapes)
             self._stations.draw(snapshot)
             if self._sorting is not None:
                 self._sorting.draw(snapshot)
             elif self._reach is not None:
                 self._reach.draw(snapshot)
-            else:
-                self._draw_path(snapshot)
+            if self._path is not None:
+                self._draw_path(self._path, snapshot)
             if self._risk is not None:
                 self._risk.draw(risk)
 
-    def _draw_path(self, snapshot: WorldSnapshot) -> None:
+    def _draw_path(self, path: Arc, snapshot: WorldSnapshot) -> None:
         if snapshot.status != "moving" or snapshot.chosen is None:
-            self._path.hide()
+            path.hide()
             return
-        self._path.show(snapshot.tcp, np.array(self._cell.station(snapshot.chosen).position))
+        path.show(snapshot.tcp, np.array(self._cell.station(snapshot.chosen).position))
+
+
+def _touched_capsules(snapshot: WorldSnapshot) -> set[str]:
+    """Return the names of the robot's capsules in contact: two where it touches itself."""
+    contact = snapshot.contact if snapshot.status == "contact" else None
+    if contact is None:
+        return set()
+    return {contact.link, contact.body} if contact.kind == "self" else {contact.link}

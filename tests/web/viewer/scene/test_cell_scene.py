@@ -1,9 +1,12 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import viser
 
 from app.live import commands
 from app.live.pick.world import LivePickWorld
+from app.live.snapshot import ContactSnapshot
 from app.sim.cells.cell import Cell, load_cell
 from app.sim.human import model as human
 from app.sim.robot.ur10 import LINK_NAMES, Robot
@@ -92,6 +95,17 @@ def test_contact_shows_what_touched_in_red(
     world.apply(commands.Reset())
     scene.draw(world.snapshot(), 0.05)
     assert server.scene.get_handle_by_name(touched.name) is None
+
+
+def test_both_capsules_are_red_where_the_robot_touches_itself(
+    scene: CellScene, server: viser.ViserServer, world: LivePickWorld
+) -> None:
+    contact = ContactSnapshot(kind="self", link="upper_arm_low", body="tool")
+    scene.draw(replace(world.snapshot(), status="contact", contact=contact), 0.05)
+    for name in ("upper_arm_low", "tool"):
+        assert tuple(node(server, f"/touched/robot/{name}").color) == HIT
+    scene.draw(world.snapshot(), 0.05)
+    assert server.scene.get_handle_by_name("/touched/robot/tool") is None
 
 
 def test_collision_shapes_lie_over_the_person_when_asked_for(
