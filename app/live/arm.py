@@ -85,8 +85,8 @@ class LiveArm:
         self.q, self.qd, self.qdd = q, np.zeros(6), np.zeros(6)
 
     def halt(self) -> None:
-        """Set the speed to 0, as after a contact."""
-        self.qd = np.zeros(6)
+        """Set speeds and accelerations to 0, as after a contact."""
+        self.qd, self.qdd = np.zeros(6), np.zeros(6)
 
     def in_contact(self, people: PeopleInCell) -> bool:
         """Return whether the robot is in contact; updates the separation distance."""

@@ -190,9 +190,10 @@ class BaseWorld(ABC, Generic[P]):
             self._decide()
 
     def _wait(self) -> None:
+        touches = self.in_contact()
         if self.status == "contact" and self.status_s >= CONTACT_HOLD_S:
             self._end_contact()
-        elif self.status == "blocked" and not self.in_contact():
+        elif self.status == "blocked" and not touches:
             self._begin()
 
     def _reset(self) -> None:

@@ -21,7 +21,7 @@ from app.live.pick.risk_worker import RiskQuery
 from app.live.snapshot import Status, WorldSnapshot
 from app.sim.cells.cell import Cell
 from app.sim.core.arrays import Vec, as_kernel_array
-from app.sim.pick.case_verdict import CaseRun, Verdict, judge
+from app.sim.pick.case_verdict import CaseRun, End, Verdict, judge
 from app.sim.pick.cases import Case, find_case
 from app.sim.pick.kernels.grasp import APPROACH, DESCEND, next_phase
 from app.sim.pick.task_policy import Candidate, ChoiceTerms, Decision, PickProgress, TaskPolicy
@@ -120,7 +120,9 @@ class LivePickWorld(BaseWorld[LiveWorkers]):
         self._refresh()
 
     def _refresh(self) -> None:
-        if self.status == "case done":
+        if self.status == "case done" and self.contact is not None:
+            self._restart_robot()
+        elif self.status == "case done":
             self._begin()
         elif self.status == "picking":
             self._decide()
@@ -150,8 +152,7 @@ class LivePickWorld(BaseWorld[LiveWorkers]):
                 self._finish_pick(self.decision.chosen)
             elif self.time_left <= 0.0:
                 self.count(timeouts=1)
-                self._run = self._run.finish("timeout", self.t)
-                self._begin("moving" if self._case is None else "case done")
+                self._end_motion("timeout")
 
     def _advance_pick(self, decision: Decision) -> bool:
         """Enter the phase that follows; return whether the pick has succeeded."""
@@ -175,12 +176,18 @@ class LivePickWorld(BaseWorld[LiveWorkers]):
     def _finish_pick(self, station: str) -> None:
         self.count(reached=1)
         self._goal = station
-        if self._case is not None:
-            self.status = "case done"
-            self._run = self._run.finish("reached", self.t)
-        else:
+        if self._case is None:
             self._note_picked(station)
+        self._end_motion("reached")
+
+    def _end_motion(self, end: End) -> None:
+        """Begin the next motion; in a case study end the run, and the robot stands still."""
+        if self._case is None:
             self._begin()
+        else:
+            self._run = self._run.finish(end, self.t)
+            self.robot.halt()
+            self.enter("case done")
 
     def _note_picked(self, station: str) -> None:
         """Remove a picked station from the candidates until all have been picked."""

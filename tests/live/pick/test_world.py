@@ -243,29 +243,6 @@ def test_person_does_not_jump_when_it_goes_back_to_work(world: LivePickWorld) ->
         q = after
 
 
-def test_case_study_starts_at_its_station_and_ends_with_a_verdict(cell: Cell) -> None:
-    world = LivePickWorld(cell, StraightPolicy(cell), seed=1)
-    world.apply(commands.StartCase(id="case-1"))
-    start = world.snapshot()
-    assert np.allclose(start.tcp, cell.station("cube5").position, atol=1e-6)
-    assert {c.id for c in start.candidates} == {"cube0", "cube4"}
-    assert not start.safety.on
-    end = until(world, "case done")
-    assert end.case == "case-1"
-    assert "ended" in end.message
-
-
-def test_leaving_a_case_brings_back_the_visitors_candidates(cell: Cell) -> None:
-    world = LivePickWorld(cell, StraightPolicy(cell), seed=1)
-    world.apply(commands.SetCandidates(ids=("cube3", "dock0")))
-    world.apply(commands.StartCase(id="case-2"))
-    world.apply(commands.SetMode(mode="manual"))
-    after = world.snapshot()
-    assert after.case is None
-    assert after.safety.on
-    assert after.selected == ("cube3", "dock0")
-
-
 def test_without_policy_or_candidates_the_robot_rests_and_says_why(cell: Cell) -> None:
     world = LivePickWorld(cell, None, seed=1)
     assert run(world, 20).status == "no policy"
