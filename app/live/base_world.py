@@ -122,8 +122,8 @@ class BaseWorld(ABC, Generic[P]):
         """Query the policy for the present state; nothing where :meth:`_wanted` does."""
 
     def _refresh(self) -> None:
-        """Decide again after people or policy changed."""
-        if self.status == "moving":
+        """Decide again after people, policy or task changed."""
+        if self.status in ("moving", "blocked"):
             self._decide()
 
     def _start_configuration(self) -> Vec:

@@ -139,8 +139,8 @@ class LiveSortingWorld(BaseWorld[LiveWorkers]):
 
     def _replan(self) -> None:
         """Choose the next move again after the task changed."""
-        if self.status == "moving":
-            self._begin()
+        if self.status in ("moving", "blocked"):
+            self._begin(self.status)
         elif self._vertical is not None and self._vertical.step == "down":
             self._check_vertical(self._vertical)
 

@@ -134,19 +134,37 @@ def test_robot_does_not_set_off_into_a_person_after_a_pick(
     assert after.safety.stopped_s > 1.0
 
 
-def test_person_at_home_keeps_the_robot_there(world: LivePickWorld, cell: Cell) -> None:
+def block_home(world: LivePickWorld) -> None:
+    """Put a hand where the robot starts, and start again."""
     world.apply(commands.PauseClock())
     x, y, z = world.snapshot().tcp
     world.apply(commands.MovePerson(pelvis=(x, 1.15, -1.57), right=(x, y, z)))
     run(world, 100)
     world.apply(commands.ResumeClock())
     world.apply(commands.Reset())
+
+
+def test_person_at_home_keeps_the_robot_there(world: LivePickWorld, cell: Cell) -> None:
+    block_home(world)
     inside = run(world, 60)
     assert inside.status == "blocked"
     assert np.allclose(inside.robot_q, cell.robot.home_q)
     assert inside.counters.contacts == 0
     world.apply(commands.MovePerson(pelvis=(0.0, 2.4, -1.57)))
     assert until(world, "picking").counters.contacts == 0
+
+
+def test_commands_change_the_decision_while_a_person_blocks_the_robot(
+    world: LivePickWorld,
+) -> None:
+    block_home(world)
+    assert len(world.snapshot().candidates) > 1
+    world.apply(commands.SetCandidates(ids=("dock0",)))
+    one = world.snapshot()
+    assert (one.status, one.chosen) == ("blocked", "dock0")
+    assert [candidate.id for candidate in one.candidates] == ["dock0"]
+    world.apply(commands.SetPolicy(checkpoint=None))
+    assert (world.snapshot().status, world.snapshot().chosen) == ("blocked", None)
 
 
 def test_decision_in_a_snapshot_is_the_one_for_its_own_state(
