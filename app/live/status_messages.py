@@ -37,15 +37,9 @@ def contact_message(contact: ContactSnapshot, *, final: bool) -> str:
     return f"Contact: {link} touched {body}. {then}"
 
 
-def standstill_message(status: Status, goal: str | None, label: Label) -> str:
-    """Return why the robot does not move.
-
-    Args:
-        goal: Station the robot is at, if any.
-        label: Names of stations.
-    """
+def standstill_message(status: Status) -> str:
+    """Return why the robot does not move."""
     return {
-        "picking": f"Reached {label(goal)}." if goal else "Reached.",
         "blocked": "Waiting at home: a person blocks the robot.",
         "no candidates": "Nothing to do: click a cube or a dock to select it.",
         "no policy": "Resting: no policy is active. Choose a checkpoint, or train one here.",

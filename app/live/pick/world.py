@@ -275,7 +275,7 @@ class LivePickWorld(BaseWorld[LiveWorkers]):
                 return status_messages.contact_message(self.contact, final=True)
             verdict = judge(self._case, self._run, self._label)
             return explanation.case_outcome(verdict, self._goal, self._label)
-        return status_messages.standstill_message(status, self._goal, self._label)
+        return status_messages.standstill_message(status)
 
     def _verdict(self) -> Verdict | None:
         return None if self._case is None else judge(self._case, self._run, self._label)

@@ -156,12 +156,18 @@ class SortController:
         return found
 
     def _move_of(self, decision: SortingDecision) -> Move:
-        """Return the best move, or one as short if its block was not reached."""
-        others = [
-            one for one in decision.ranked if one.fewest and one.move.pick not in self._avoid
-        ]
-        best = decision.ranked[0]
-        return others[0].move if best.move.pick in self._avoid and others else best.move
+        """Return the best move, or one as short if its block was not reached.
+
+        Where no block of a shortest plan was reached, all of them are offered again.
+        """
+        best = decision.ranked[0].move
+        if best.pick not in self._avoid:
+            return best
+        for other in decision.ranked:
+            if other.fewest and other.move.pick not in self._avoid:
+                return other.move
+        self._avoid.clear()
+        return best
 
 
 def has_safer_duplicate(table: SortingTable, cell: int) -> bool:

@@ -1,5 +1,6 @@
 """Status messages of a live sorting cell, one sentence each."""
 
+from app.live.snapshot import Status
 from app.live.sorting.controller import FALLBACK_REASONS, MoveChoice, SortController
 from app.live.sorting.snapshot import Order, Phase
 from app.live.sorting.table import Block, SortingTable
@@ -8,8 +9,12 @@ from app.sim.cells.cell import Cell
 from app.sim.pick.task_policy import Decision
 from app.sim.sorting.decision_types import REASONS
 
-NO_GOAL = "Nothing to do: click blocks to add them to the goal."
-DONE = "Done: every tower matches the goal."
+WITHOUT_MOVE: dict[Status, str] = {
+    "picking": "Moving up again: blocks, goal or policy have changed.",
+    "solved": "Done: every tower matches the goal.",
+    "no candidates": "Nothing to do: click blocks to add them to the goal.",
+}
+"""Message of a status without a chosen move."""
 
 
 class StatusMessages:
@@ -59,9 +64,13 @@ class StatusMessages:
         chance = percent_text(risk)
         return f"Grasp of {self.block(block)} failed ({chance} fail here): trying again."
 
-    def timeout(self, choice: MoveChoice) -> str:
+    def timeout(self, phase: Phase, choice: MoveChoice) -> str:
         """Return that a motion reached the time limit."""
-        return f"Timed out on the motion to {self.block(choice.block)}: trying again."
+        block = self.block(choice.block)
+        if phase == "carry":
+            place = self.place(choice.move.place)
+            return f"Timed out carrying {block} to {place}: trying again."
+        return f"Timed out on the motion to {block}: trying again."
 
     def returned_block(self, block: Block, position: int) -> str:
         """Return the place of a held block after a contact."""

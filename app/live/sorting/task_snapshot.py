@@ -59,7 +59,7 @@ def task_snapshot(inputs: SnapshotInputs) -> SortingSnapshot:
         phase=inputs.phase,
         decided_by=None if choice is None or decision is None else decision.by,
         order=inputs.controller.order,
-        duplicates=() if choice is None else tuple(block.id for block, _ in choice.options),
+        duplicates=() if choice is None else _duplicates(table, choice),
         ranked=tuple(_ranked(table, one) for one in ranked),
         moves_to_go=0 if decision is None else decision.fewest_moves,
         attempts_to_go=0.0 if decision is None else decision.expected_attempts,
@@ -140,6 +140,10 @@ def _goal(inputs: SnapshotInputs) -> tuple[GoalBlockSnapshot, ...]:
     return tuple(found)
 
 
+def _duplicates(table: SortingTable, choice: MoveChoice) -> tuple[str, ...]:
+    return tuple(block.id for block, _ in choice.options if block in table.blocks)
+
+
 def _ranked(table: SortingTable, one: RankedMove) -> MoveSnapshot:
     held = table.held is not None and one.move.pick == table.held_position
     block = table.held if held else table.top(one.move.pick)
@@ -152,7 +156,8 @@ def _current(inputs: SnapshotInputs, choice: MoveChoice) -> MoveSnapshot:
         one for one in (() if decision is None else decision.ranked) if one.move == choice.move
     ]
     value, best = (same[0].value, same[0].fewest) if same else (None, False)
-    return _move(inputs.table, choice.move, choice.block, value, best)
+    block = choice.block if choice.block in inputs.table.blocks else None
+    return _move(inputs.table, choice.move, block, value, best)
 
 
 def _move(

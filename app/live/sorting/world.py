@@ -31,7 +31,7 @@ from app.live.snapshot import Status, WorldSnapshot
 from app.live.sorting.benchmark_run import SortingTestRun, random_task
 from app.live.sorting.commands import PlanningCommand, StartTest, TableCommand, change_table
 from app.live.sorting.controller import MoveChoice, SortController, has_safer_duplicate
-from app.live.sorting.explanation import DONE, NO_GOAL, StatusMessages
+from app.live.sorting.explanation import WITHOUT_MOVE, StatusMessages
 from app.live.sorting.snapshot import Phase, SortingCounters
 from app.live.sorting.table import SortingTable
 from app.live.sorting.task_snapshot import SnapshotInputs, is_solved, task_snapshot
@@ -235,13 +235,13 @@ class LiveSortingWorld(BaseWorld[LiveWorkers]):
 
     def _give_up(self) -> None:
         """Start again after the time limit, with another block of equal value if any."""
-        choice = self._choice
+        choice = self._chosen()
         self.count(timeouts=1)
         if choice is None:
             return
         if self._table.held is None:
             self._controller.avoid(choice.move.pick)
-        self.set_message(self._messages.timeout(choice))
+        self.set_message(self._messages.timeout(self._phase, choice))
         self._begin()
 
     def _begin_vertical(self, name: str) -> None:
@@ -367,11 +367,7 @@ class LiveSortingWorld(BaseWorld[LiveWorkers]):
             return reason
         if status in ("moving", "picking") and (chosen := self._chosen()) is not None:
             return self._messages.motion(self._phase, chosen, self._controller, self.decision)
-        if status == "solved":
-            return DONE
-        if status == "no candidates":
-            return NO_GOAL
-        return status_messages.standstill_message(status, None, str)
+        return WITHOUT_MOVE.get(status) or status_messages.standstill_message(status)
 
     def snapshot(self) -> WorldSnapshot:
         """Return the read model of the present state."""

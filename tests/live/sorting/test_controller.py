@@ -70,6 +70,17 @@ def test_block_that_was_not_reached_is_left_for_one_as_good(table: SortingTable)
     assert second.move.place == RED
 
 
+def test_all_blocks_are_offered_again_once_none_of_them_was_reached(
+    table: SortingTable,
+) -> None:
+    controller = SortController(None)
+    for cell in (2, 5, 9):
+        controller.avoid(cell)
+    choice = controller.choose(table)
+    assert choice is not None
+    assert {move.pick for _, move in choice.options} == {5, 9}
+
+
 def test_held_block_keeps_its_place_while_on_a_shortest_plan(table: SortingTable) -> None:
     table.lift(9)
     on = SortController(None).choose(table, Move(9, RED))
