@@ -139,7 +139,7 @@ def tests_of(cell: Cell) -> tuple[SortingTest, ...]:
 
 def _check_people(command: Command, cell: Cell, people: Sequence[int]) -> None:
     if isinstance(command, AddPerson) and len(people) >= MAX_PEOPLE:
-        raise InvalidInput("people", len(people), f"must be at most {MAX_PEOPLE}")
+        raise InvalidInput("people", len(people) + 1, f"must be at most {MAX_PEOPLE}")
     if isinstance(command, PersonCommand | RemovePerson) and command.person not in people:
         known = [str(one) for one in people]
         rule = "is no person in this cell" if people else "is no person: the cell is empty"

@@ -96,7 +96,7 @@ def test_people_are_those_of_the_snapshot_once_no_command_waits() -> None:
     handle = WorldHandle("main", cell, new_world(cell, None, 1).snapshot())
     for _ in range(3):
         last = handle.submit(AddPerson())
-    with pytest.raises(InvalidInput, match="at most 4"):
+    with pytest.raises(InvalidInput, match="people = 5 must be at most 4"):
         handle.submit(AddPerson())
     handle.drain()  # and all three fail
     handle.publish(replace(handle.snapshot(), commands=last))

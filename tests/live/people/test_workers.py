@@ -371,7 +371,7 @@ def test_command_that_does_not_fit_the_people_is_refused(
 def test_fifth_person_is_refused(world: LivePickWorld) -> None:
     for _ in range(3):
         world.apply(commands.AddPerson())
-    with pytest.raises(InvalidInput, match="at most 4"):
+    with pytest.raises(InvalidInput, match="people = 5 must be at most 4"):
         world.apply(commands.AddPerson())
 
 
