@@ -298,7 +298,8 @@ class WorldSnapshot(ReadModel):
     previous: str | None
     """choice one tick earlier, as observed by the policy"""
     time_left_s: float
-    """time left in the episode, as observed by the policy [s]"""
+    """time left in the episode [s], as observed by the policy; in a reach cell it observes at
+    most 5 s"""
     phase: PickPhase = "approach"
     """phase of the pick, as observed by the policy"""
     closing_s: float = 0.0

@@ -14,14 +14,19 @@ from app.live.arm import GAIN, LiveArm
 from app.live.reach.interfaces import LiveReachPolicy
 from app.sim.cells.cell import Cell
 from app.sim.core.arrays import Vec
-from app.sim.people.kernels.pedestrian import R, X, Y
+from app.sim.core.out_of_range import OutOfRangeValue
+from app.sim.people.kernels.pedestrian import GROWTH, VX, VY, R, X, Y
 from app.sim.people.kernels.people import MAX_PEOPLE
 from app.sim.reach.batch import ReachBatch, ReachSettings
+from app.sim.reach.kernels.observation import NO_PERSON
 from app.sim.reach.reach_actor import observed_people
 from app.sim.robot.kernels.arm import Arm
 from app.sim.safety.layer import SafetySettings
 from app.sim.scene.scene import HumanKind
 
+_ROW = np.zeros(1, dtype=np.int64)
+_OBSERVED = [X, Y, VX, VY, R, GROWTH]
+"""Variables of a pedestrian that policies observe."""
 TIME_LIMIT_S = 5.0
 """Time limit of a goal [s] (docs/method.md 2.3)."""
 
@@ -43,6 +48,8 @@ class ReachController:
         self.policy = policy
         self.inference_mode = "" if policy is None else default_mode(policy)
         self.elapsed_ms: float | None = None
+        self.outside: tuple[OutOfRangeValue, ...] = ()
+        """Inputs of the last decision outside the training range."""
         self._batch: ReachBatch | None = None
 
     @property
@@ -89,7 +96,21 @@ class ReachController:
         found = self.policy.acts(batch, self.inference_mode, safety)[0]
         act = np.asarray(found, dtype=np.float64)
         self.elapsed_ms = 1e3 * (time.perf_counter() - started)
+        self.outside = self._outside(self.policy, batch)
         return np.clip(act, -1.0, 1.0)
+
+    def _outside(
+        self, policy: LiveReachPolicy, batch: ReachBatch
+    ) -> tuple[OutOfRangeValue, ...]:
+        """Return the inputs of a decision outside the training range."""
+        state, rows = batch.state, batch.state.people.walkers.rows[0]
+        people: list[tuple[int | None, Vec]] = [
+            (k, row[_OBSERVED]) for k, row in enumerate(rows)
+        ] or [(None, np.array(NO_PERSON))]
+        if self.observed_people == 1 < len(rows):
+            people = [people[int(batch.person_distances(_ROW)[0].argmin())]]
+        values = np.concatenate((state.q[0], state.qd[0], state.goal[0]))
+        return policy.outside(values, people)
 
     def _filled(
         self, policy: LiveReachPolicy, robot: LiveArm, walkers: Vec, clear_m: float, left: float

@@ -1,10 +1,13 @@
 """Interface of policies of a live reach cell; ``app.policies`` implements it."""
 
+from collections.abc import Sequence
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from app.sim.core.arrays import Vec
+from app.sim.core.out_of_range import OutOfRangeValue
 from app.sim.reach.batch import ReachBatch
 from app.sim.reach.reach_actor import ReachPolicyInfo
 from app.sim.safety.layer import SafetySettings
@@ -26,4 +29,15 @@ class LiveReachPolicy(ReachPolicyInfo, Protocol):
             batch: Robots, people and goals.
             inference_mode: One of ``inference_modes``.
             safety: Safety layer that limits the actions; None without one.
+        """
+
+    def outside(
+        self, state: Vec, people: Sequence[tuple[int | None, Vec]]
+    ) -> tuple[OutOfRangeValue, ...]:
+        """Return the inputs of a decision outside the training range.
+
+        Args:
+            state: q [rad], qd [rad/s] and goal [m], shape (15,).
+            people: Index of each observed person, None for ``NO_PERSON``, and its x, y [m],
+                vx, vy [m/s], r [m] and growth [m/s], shape (6,).
         """

@@ -64,7 +64,7 @@ class LiveReachWorld(BaseWorld[LivePedestrians]):
     # Starts and ends.
 
     def _reset_scenario(self) -> None:
-        self._counts = ReachCounters()
+        self._counts, self.decided_s = ReachCounters(), None
         self.people.robot_q = self.robot.home
         self.people.restart()
         self._goal.restart()
@@ -97,6 +97,7 @@ class LiveReachWorld(BaseWorld[LivePedestrians]):
                 self.people.set_speed(command.speed)
             case SetPolicy():
                 self._controller.use(command.loaded)
+                self.decided_s = None
                 self._goal.among = self._goals_drawn()
                 self._follow_goal()
             case _:
@@ -161,6 +162,7 @@ class LiveReachWorld(BaseWorld[LivePedestrians]):
             self.status_s,
             self.safety.settings if self.safety.on else None,
         )
+        self.decided_s = self.t
         return robot.segment(act, straight=self._controller.policy is None)
 
     # Read model.
@@ -202,4 +204,6 @@ class LiveReachWorld(BaseWorld[LivePedestrians]):
             policy_title=policy.title,
             observed_people=controller.observed_people,
             elapsed_ms=controller.elapsed_ms,
+            outside=controller.outside,
+            decided_s=self.decided_s,
         )

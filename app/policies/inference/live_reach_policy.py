@@ -1,5 +1,7 @@
 """Reach policy of a live cell, with all its inference modes."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -9,7 +11,11 @@ from app.policies.inference.controllers import (
     controller_of,
     inference_modes_of,
 )
+from app.policies.inference.reach_training_range import PersonValues, ReachTrainingRange
 from app.policies.inference.rollout import ssm_constraint_of
+from app.sim.core.arrays import Vec
+from app.sim.core.out_of_range import OutOfRangeValue
+from app.sim.people.kernels.people import MAX_PEOPLE
 from app.sim.reach.batch import ReachBatch
 from app.sim.reach.reach_actor import ReachActor
 from app.sim.safety.layer import SafetySettings
@@ -32,6 +38,7 @@ class TrainedReachPolicy:
         }
         self.inference_modes = tuple(self._controllers)
         """Available inference modes."""
+        self._trained = ReachTrainingRange(actor.trained_range)
 
     def acts(
         self, batch: ReachBatch, inference_mode: str, safety: SafetySettings | None
@@ -47,3 +54,14 @@ class TrainedReachPolicy:
         if isinstance(controller, RolloutController):
             controller.constraint = ssm_constraint_of(safety, batch.arm.dt)
         return controller.acts(batch)
+
+    def outside(
+        self, state: Vec, people: Sequence[PersonValues]
+    ) -> tuple[OutOfRangeValue, ...]:
+        """Return the inputs of a decision outside the training range.
+
+        Args:
+            state: q [rad], qd [rad/s] and goal [m], shape (15,).
+            people: Observed people.
+        """
+        return self._trained.outside(state, people, range(MAX_PEOPLE))

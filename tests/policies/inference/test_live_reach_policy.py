@@ -7,6 +7,7 @@ from app.live.commands import SetPolicy, SetSafety
 from app.live.reach.commands import SetInferenceMode
 from app.live.reach.controller import TIME_LIMIT_S, ReachController
 from app.live.reach.world import LiveReachWorld
+from app.policies.checkpoints import checkpoint as formats
 from app.policies.inference.controllers import RolloutController, controller_of
 from app.policies.inference.live_reach_policy import TrainedReachPolicy
 from app.policies.inference.reach_policy import ReachPolicy
@@ -42,6 +43,31 @@ def test_snapshot_says_how_many_people_the_policy_observes(view: str, direct: in
         world.apply(SetInferenceMode(inference_mode=mode))
         assert world.snapshot().observed_people == observed
     assert LiveReachWorld(CELL, None, seed=1).snapshot().observed_people is None
+
+
+def test_snapshot_names_time_and_inputs_outside_the_training_range_of_the_decision() -> None:
+    untrained = untrained_reach(width=32)
+    behind = {"low": [-9.0, -9.0, -9.0, -9.0, 0.0], "high": [9.0, -8.0, 9.0, 9.0, 9.0]}
+    manifest = {**untrained.manifest, "trained_range": {"human": behind}}
+    policy = ReachPolicy(formats.load(manifest, untrained.tensors))
+    world = LiveReachWorld(CELL, TrainedReachPolicy(policy), seed=1)
+    world.apply(SetInferenceMode(inference_mode="direct"))
+    world.apply(commands.AddPerson())
+    world.step()
+    direct = world.snapshot()
+    [one] = direct.outside
+    nearest = [person.nearest for person in direct.people].index(True)
+    assert (one.field, one.high) == (f"people[{nearest}].y", -8.0)
+    assert direct.decided_s == direct.t_s > 0.0
+    world.apply(SetInferenceMode(inference_mode="distance-weighted"))
+    fields = [one.field for one in world.snapshot().outside]
+    assert fields == ["people[0].y", "people[1].y"]
+    for id in (0, 1):
+        world.apply(commands.RemovePerson(person=id))
+    assert [one.field for one in world.snapshot().outside] == ["people"]
+    world.apply(SetPolicy(checkpoint=None))
+    after = world.snapshot()
+    assert (after.outside, after.decided_s) == ((), None)
 
 
 def test_live_state_is_seen_as_the_batch_sees_it(policy: ReachPolicy) -> None:
