@@ -1,7 +1,8 @@
 """Immutable state of a live world at one tick, for any thread and as JSON of the HTTP API.
 
-Robot, people, ``previous`` and ``time_left_s`` are the inputs of the decision in the same
-snapshot: ``POST /v1/task-selection`` returns the same choice and values for them.
+While the status is ``moving``, in pick cells also ``picking``, robot, people, ``previous`` and
+``time_left_s`` are the inputs of the decision in the same snapshot:
+``POST /v1/task-selection`` returns the same choice and values for them.
 """
 
 from collections.abc import Sequence
@@ -36,10 +37,10 @@ Status = Literal[
     "reached",
 ]
 """``picking``: the tool descends to an object, closes and comes up; ``blocked``: the robot
-waits at home for a person to leave. In ``contact`` and ``case done`` the last decision stays;
-in ``moving`` and ``picking`` it belongs to the present state. In a sorting cell ``picking`` is
-``grasp`` and ``place``, and ``solved`` means that every tower matches the goal. In a reach cell
-``reached`` means that the tool is at the goal."""
+waits at home for a person to leave. In ``moving``, in a pick cell also in ``picking``, the
+decision belongs to the present state; otherwise the last one stays. In a sorting cell
+``picking`` is ``grasp`` and ``place`` by inverse kinematics, and ``solved`` means that every
+tower matches the goal. In a reach cell ``reached`` means that the tool is at the goal."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

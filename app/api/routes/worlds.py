@@ -76,7 +76,9 @@ async def list_worlds(services: ServicesDep) -> WorldList:
 async def get_world(world: WorldDep) -> WorldState:
     """Return the last snapshot.
 
-    Its ``state`` can be posted to /v1/task-selection as it is; null without candidates.
+    Its ``state`` can be posted to /v1/task-selection as it is; null without candidates. While
+    the status is ``moving``, in pick cells also ``picking``, the answer has the same choice and
+    values.
     """
     return state_of(world.handle.snapshot())
 

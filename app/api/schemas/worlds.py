@@ -49,8 +49,8 @@ class WorldState(WorldSnapshot):
     viewer: str
     """path of its 3D scene"""
     state: TaskSelectionRequest | None
-    """body for /v1/task-selection: while the status is `moving`, it returns the same choice and
-    values; null without candidates"""
+    """body for /v1/task-selection; it returns the same choice and values while the status is
+    `moving`, in pick cells also `picking`; null without candidates"""
 
 
 def state_of(snapshot: WorldSnapshot) -> WorldState:

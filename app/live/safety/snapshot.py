@@ -16,11 +16,12 @@ class SafetySnapshot(ReadModel):
     advised: float
     """override of the layer, enabled or not"""
     person: int | None
-    """id of the person nearest to the robot; null without people"""
+    """id of the person that limits the override, else of the one with the least reserve: its
+    distance minus what it may move until the robot rests; null without people"""
     link: str | None
-    """link nearest to that person"""
+    """link nearest to the body part of that person with the least reserve"""
     separation: float | None
-    """separation distance [m]"""
+    """distance of that link and that body part [m]"""
     required: float | None
     """S_p of that link with the protective distance: the sum of the three terms [m]"""
     person_distance: float | None
