@@ -114,16 +114,16 @@ def _listening_on(address: Path) -> Iterator[None]:
     except OSError:
         listener.close()
         raise
-    original = websockets.asyncio.server.serve
-
-    def serve(handler: Any, host: Any = None, port: Any = None, **options: Any) -> Any:
-        if host != str(address):
-            return original(handler, host, port, **options)
-        # Both ends live in this process: a ping could only find that it was paused.
-        options |= {"sock": listener, "ping_interval": None}
-        return websockets.asyncio.server.unix_serve(handler, **options)
-
     with _starting:
+        original = websockets.asyncio.server.serve
+
+        def serve(handler: Any, host: Any = None, port: Any = None, **options: Any) -> Any:
+            if host != str(address):
+                return original(handler, host, port, **options)
+            # Both ends live in this process: a ping could only find that it was paused.
+            options |= {"sock": listener, "ping_interval": None}
+            return websockets.asyncio.server.unix_serve(handler, **options)
+
         websockets.asyncio.server.serve = serve  # type: ignore[assignment,misc]
         try:
             yield
