@@ -147,7 +147,7 @@ class LiveCell:
             except Exception as error:  # The commands after it are carried out all the same.
                 self._refuse(f"{command.tag} failed: {error}")
                 logger.exception("command %s failed", command.tag)
-        for _ in range(self._speed):
+        for _ in range(1 if self._world.paused else self._speed):
             self._world.step()
         snapshot = replace(
             self._world.snapshot(),

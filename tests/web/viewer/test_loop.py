@@ -285,3 +285,21 @@ def test_faster_clock_takes_so_many_steps_between_two_pictures(live: LiveCell) -
     live.handle.submit(commands.SetSpeed(factor=1))
     wait_until(lambda: live.handle.snapshot().speed == 1)
     assert {(tick - first) % 4 for tick in seen} == {0}
+
+
+@pytest.mark.parametrize("name", ["pick-and-place", "shared-workspace"])
+def test_dragged_person_is_as_fast_at_any_speed_of_the_clock_while_it_is_paused(
+    name: str,
+) -> None:
+    places = []
+    for factor in (1, 8):
+        live = LiveCell(load_cell(name), None)
+        live.handle.submit(commands.SetSpeed(factor=factor))
+        live.handle.submit(commands.PauseClock())
+        live.handle.submit(commands.MovePerson(pelvis=(0.5, 2.0, 0.0)))
+        before = live.handle.snapshot().people[0].q
+        for _ in range(2):
+            live._tick(lambda _: None, live.cell.robot.dt)
+        places.append(live.handle.snapshot().people[0].q)
+    assert not np.array_equal(places[0], before)
+    assert np.array_equal(places[0], places[1])
