@@ -25,13 +25,13 @@ from app.live import commands
 from app.live.command_checks import Command
 from app.live.factory import new_world
 from app.live.lateness import Lateness
-from app.live.pick.risk_worker import RiskWorker
+from app.live.pick.risk_worker import PersonRisk, RiskWorker
 from app.live.pick.world import LivePickWorld
 from app.live.reach.interfaces import LiveReachPolicy
 from app.live.snapshot import MAX_REFUSED, RefusedCommand, WorldSnapshot
 from app.live.world_handle import WorldHandle
 from app.sim.cells.cell import Cell
-from app.sim.pick.task_policy import RiskMap, TaskPolicy
+from app.sim.pick.task_policy import TaskPolicy
 from app.sim.sorting.sorting_values import SortingValues
 from web.viewer.scene.cell_scene import CellScene
 from web.viewer.server import ViewerServer
@@ -187,6 +187,7 @@ class LiveCell:
         """Draw a snapshot if a viewer is connected."""
         if not server.has_viewers:
             server.is_current.clear()
+            self._risk.forget()
             scene.note(snapshot)
             return
         shapes, risk = views.is_seen(COLLISION_SHAPES), self._risk_map(views)
@@ -194,9 +195,10 @@ class LiveCell:
         self._undrawn_s = 0.0
         server.is_current.set()
 
-    def _risk_map(self, views: ViewSettings) -> RiskMap | None:
+    def _risk_map(self, views: ViewSettings) -> PersonRisk | None:
         """Return the newest risk map; None if no visitor shows it."""
         if not isinstance(self._world, LivePickWorld) or not views.is_seen(RISK_MAP):
+            self._risk.forget()
             return None
         self._risk.offer(self._world.risk_query)
         return self._risk.newest

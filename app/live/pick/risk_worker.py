@@ -23,6 +23,16 @@ GRID = PersonGrid(x=np.linspace(-0.95, 0.95, 28), y=np.linspace(0.55, 1.95, 21))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class PersonRisk:
+    """Risk map over the positions of one person."""
+
+    person: int
+    """Id of the person."""
+    map: RiskMap
+    """Choice and probabilities at each position of ``GRID``."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class RiskQuery:
     """State for which a map is computed; immutable."""
 
@@ -34,18 +44,21 @@ class RiskQuery:
     """Joint speeds of the robot [rad/s], shape (6,)."""
     people: Sequence[Person]
     """The people; the first one is moved."""
+    person: int
+    """Id of the first one."""
     offered: tuple[Candidate, ...]
     """The candidates."""
     terms: ChoiceTerms
     """Previous choice, progress, time left and objective of the choices."""
 
-    def answer(self) -> RiskMap:
+    def answer(self) -> PersonRisk:
         """Return the map over ``GRID``."""
         person = self.people[0]
         moved = MovedPerson(index=0, q=GRID.postures(person)[0])
-        return self.policy.risk_map(
+        found = self.policy.risk_map(
             self.q, self.qd, self.people, self.offered, moved, terms=self.terms
         )
+        return PersonRisk(person=self.person, map=found)
 
 
 class RiskWorker:
@@ -53,9 +66,9 @@ class RiskWorker:
 
     def __init__(self) -> None:
         self._pool = ThreadPoolExecutor(1, thread_name_prefix="risk-map")
-        self._running: Future[RiskMap] | None = None
+        self._running: Future[PersonRisk] | None = None
         self._started = -INTERVAL_S
-        self.newest: RiskMap | None = None
+        self.newest: PersonRisk | None = None
         """The last finished map."""
 
     def offer(self, query: Callable[[], RiskQuery | None]) -> None:
@@ -77,6 +90,10 @@ class RiskWorker:
             self.newest = None
         else:
             self._running = self._pool.submit(asked.answer)
+
+    def forget(self) -> None:
+        """Drop the last map, and the one that is being computed."""
+        self._running = self.newest = None
 
     def close(self) -> None:
         """End the thread after the present map."""

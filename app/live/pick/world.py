@@ -241,6 +241,7 @@ class LivePickWorld(BaseWorld[LiveWorkers]):
             q=self.robot.q.copy(),
             qd=self.robot.qd.copy(),
             people=[replace(one, q=one.q.copy(), qd=one.qd.copy()) for one in people],
+            person=self.people.ids[0],
             offered=self.offered,
             terms=ChoiceTerms(
                 previous=self.previous, progress=self.progress, time_left_s=self.time_left

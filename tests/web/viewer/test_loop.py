@@ -21,7 +21,8 @@ from tests.web.viewer_client import ViewerClient
 from web.viewer import loop
 from web.viewer.loop import LiveCell
 from web.viewer.scene.cell_scene import CellScene
-from web.viewer.server import _LoopEvent
+from web.viewer.server import ViewerServer, _LoopEvent
+from web.viewer.view_settings import PREFIX, RISK_MAP, ViewSettings
 
 
 @pytest.fixture(scope="module")
@@ -303,3 +304,23 @@ def test_dragged_person_is_as_fast_at_any_speed_of_the_clock_while_it_is_paused(
         places.append(live.handle.snapshot().people[0].q)
     assert not np.array_equal(places[0], before)
     assert np.array_equal(places[0], places[1])
+
+
+def test_risk_map_that_was_hidden_is_not_shown_again(server: ViewerServer) -> None:
+    cell = load_cell()
+    live, views = LiveCell(cell, StraightPolicy(cell)), ViewSettings(server, cell)
+    box = f"{PREFIX}{RISK_MAP.label}"
+    with ViewerClient(server.address) as visitor:
+        wait_until(
+            lambda: (
+                box in {one["props"]["label"] for one in visitor.heard("GuiCheckboxMessage")}
+            )
+        )
+        visitor.check(box, value=True)
+        wait_until(lambda: live._risk_map(views) is not None)
+        visitor.check(box, value=False)
+        wait_until(lambda: live._risk_map(views) is None)
+        visitor.check(box, value=True)
+        wait_until(lambda: views.is_seen(RISK_MAP))
+        assert live._risk_map(views) is None
+    live.stop()

@@ -9,10 +9,10 @@ import numpy as np
 import viser
 
 from app.live.command_checks import Command
+from app.live.pick.risk_worker import PersonRisk
 from app.live.reach.commands import is_reaching
 from app.live.snapshot import WorldSnapshot
 from app.sim.cells.cell import Cell
-from app.sim.pick.task_policy import RiskMap
 from app.sim.sorting.layout import is_sorting
 from web.viewer.people.people_view import PeopleView
 from web.viewer.robot.robot_view import RobotView
@@ -56,7 +56,7 @@ class CellScene:
         dt: float,
         *,
         shapes: bool = False,
-        risk: RiskMap | None = None,
+        risk: PersonRisk | None = None,
     ) -> None:
         """Show a snapshot; sends only what changed.
 

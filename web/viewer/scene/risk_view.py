@@ -4,8 +4,8 @@ import numpy as np
 import viser
 from numpy.typing import NDArray
 
-from app.live.pick.risk_worker import GRID
-from app.sim.pick.task_policy import RiskMap
+from app.live.pick.risk_worker import GRID, PersonRisk
+from app.live.status_messages import percent_text
 
 NODE = "/risk"
 HEIGHT_M = 0.004
@@ -56,9 +56,8 @@ class RiskView:
             receive_shadow=False,
             position=(x1 - 0.5 * length, y0 - 0.12, HEIGHT_M),
         )
-        low, high = (f"{100.0 * end:.0f} %" for end in ENDS)
-        texts = {-0.5: low, 0.0: "P(contact), person 1 there", 0.5: f"{high} or more"}
-        for share, text in texts.items():
+        low, high = (percent_text(end) for end in ENDS)
+        labels = [
             server.scene.add_label(
                 f"{NODE}/scale/{share + 0.5}",
                 text,
@@ -66,16 +65,20 @@ class RiskView:
                 anchor="center-center",
                 font_screen_scale=0.8,
             )
-        self._shown: RiskMap | None = None
+            for share, text in ((-0.5, low), (0.0, "P(contact)"), (0.5, f"{high} or more"))
+        ]
+        self._title = labels[1]
+        self._shown: PersonRisk | None = None
 
-    def draw(self, found: RiskMap | None) -> None:
+    def draw(self, found: PersonRisk | None) -> None:
         """Show a map; sends nothing if it is shown already."""
         if found is self._shown:
             return
         self._shown = found
-        if found is None or found.contact is None:
+        if found is None or found.map.contact is None:
             self._image.image = np.zeros((*GRID.shape, 4), dtype=np.uint8)
             return
-        picture = colours_of(found.contact)
-        picture[found.clearance_m <= 0.0] = NOTHING
+        self._title.text = f"P(contact), person {found.person + 1} there"
+        picture = colours_of(found.map.contact)
+        picture[found.map.clearance_m <= 0.0] = NOTHING
         self._image.image = picture.reshape(*GRID.shape, 4)

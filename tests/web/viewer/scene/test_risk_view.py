@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from app.live.pick.risk_worker import GRID
+from app.live.pick.risk_worker import GRID, PersonRisk
 from app.sim.pick.task_policy import RiskMap
 from tests.web.conftest import node
 from web.viewer.scene.risk_view import COLOURS, NODE, NOTHING, RiskView, colours_of
@@ -11,8 +11,8 @@ from web.viewer.server import ViewerServer
 N = len(GRID.x) * len(GRID.y)
 
 
-def risk(contact: np.ndarray | None, clearance: np.ndarray) -> RiskMap:
-    return RiskMap(
+def risk(contact: np.ndarray | None, clearance: np.ndarray, person: int = 0) -> PersonRisk:
+    found = RiskMap(
         chosen=np.zeros(N, dtype=np.int64),
         value=np.zeros(N),
         success=contact,
@@ -21,6 +21,7 @@ def risk(contact: np.ndarray | None, clearance: np.ndarray) -> RiskMap:
         outside=np.zeros(N, dtype=np.bool_),
         elapsed_ms=1.0,
     )
+    return PersonRisk(person=person, map=found)
 
 
 def test_colours_go_from_one_end_of_the_scale_to_the_other() -> None:
@@ -46,3 +47,11 @@ def test_without_probabilities_nothing_is_drawn(server: ViewerServer) -> None:
     view = RiskView(server)
     view.draw(risk(None, np.ones(N)))
     assert not node(server, f"{NODE}/map").image.any()
+
+
+def test_legend_names_the_person_of_the_map(server: ViewerServer) -> None:
+    view = RiskView(server)
+    for person in (0, 2):
+        view.draw(risk(np.zeros(N), np.ones(N), person))
+        text = node(server, f"{NODE}/scale/0.5").text
+        assert text == f"P(contact), person {person + 1} there"
