@@ -13,9 +13,10 @@ from multiprocessing import get_context
 
 import numpy as np
 
-from app.live.commands import MovePerson, SetMode
+from app.live.commands import AddPerson, MovePerson, SetMode
 from app.live.factory import new_world
 from app.live.pick.world import LivePickWorld
+from app.live.reach.commands import SetInferenceMode
 from app.live.reach.world import LiveReachWorld
 from app.policies.checkpoints import pretrained
 from app.policies.checkpoints.checkpoint import CHOOSING, REACHING, Checkpoint, purpose_of
@@ -33,6 +34,8 @@ from app.sim.sorting.batch import batch_in
 
 N_ENVS = 8
 SORTING_CELL, REACH_CELL = "sorting-e0", "shared-workspace"
+TOUCHING = ((1, 0.0), (2, 2.8))
+"""Joints, each with a position [rad] at which the robot touches the table, then itself."""
 
 
 def _shipped(purpose: str) -> list[Checkpoint]:
@@ -42,11 +45,16 @@ def _shipped(purpose: str) -> list[Checkpoint]:
 
 
 def _moving() -> None:
-    """Decide motion without people, beside a body and a cylinder; step the live reach cell."""
+    """Decide motion without people, beside a body and a cylinder; step live reach cells."""
     for checkpoint in _shipped(REACHING):
         policy, cell = ReachPolicy(checkpoint), cell_of(checkpoint.manifest)
         MotionDecider(policy, cell).warm_up()
-        LiveReachWorld(cell, TrainedReachPolicy(policy), seed=0).step()
+        live = TrainedReachPolicy(policy)
+        world = LiveReachWorld(cell, live, seed=0)
+        world.step()
+        world.apply(AddPerson())
+        for mode in live.inference_modes:
+            world.apply(SetInferenceMode(inference_mode=mode))
     new_world(load_cell(REACH_CELL), None, seed=0).step()
 
 
@@ -70,6 +78,11 @@ def _choosing() -> None:
     world.apply(SetMode(mode="still"))
     for _ in range(round(REST_S / world.robot.dt) + 5):  # a planner acts at the end
         world.step()
+    for joint, position in TOUCHING:
+        q = world.robot.home
+        q[joint] = position
+        world.robot.place(q)
+        world.in_contact()
 
 
 def _sorting() -> None:
