@@ -11,7 +11,6 @@ from pydantic import Field
 
 from app.errors import InvalidInput
 from app.live.commands import (
-    MAX_PEOPLE,
     AddPerson,
     MovePerson,
     PersonCommand,
@@ -41,6 +40,7 @@ from app.live.sorting.commands import (
 )
 from app.live.sorting.task_snapshot import table_of
 from app.sim.cells.cell import Cell
+from app.sim.people.kernels.people import MAX_PEOPLE
 from app.sim.pick.cases import cases_of
 from app.sim.sorting.batch import shape_of
 from app.sim.sorting.benchmark_tasks import TESTS, SortingTest

@@ -11,7 +11,6 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, PrivateAttr
 from pydantic_core import PydanticCustomError
 
-from app.sim.cells.cell import LIMITS
 from app.sim.human.anthropometry import PERCENTILES
 from app.sim.perception.keypoints import FARTHEST_M
 
@@ -19,8 +18,6 @@ Mode = Literal["manual", "auto", "still", "recorded"]
 """Motion source of a person: dragging; the work loop or a case study; none; a recording."""
 PlainMode = Literal["manual", "auto", "still"]
 """Motion sources without further data; ``recorded`` is set by :class:`SetMotion`."""
-MAX_PEOPLE = LIMITS["people"]
-"""Maximum number of people in a live cell."""
 FIRST = 0
 """Id of the first person, the default of person commands."""
 

@@ -312,8 +312,3 @@ class WorldSnapshot(ReadModel):
     def values(self) -> dict[str, float]:
         """Value estimate per candidate id."""
         return {c.id: c.value for c in self.candidates if c.value is not None}
-
-    @property
-    def nearest(self) -> PersonSnapshot | None:
-        """The person nearest to the robot; None without people."""
-        return next((person for person in self.people if person.nearest), None)

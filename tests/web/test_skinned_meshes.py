@@ -12,6 +12,7 @@ from app.live import commands
 from app.live.command_checks import Command
 from app.live.factory import new_world
 from app.sim.cells.cell import load_cell
+from app.sim.people.kernels.people import MAX_PEOPLE
 from tests.web.conftest import node
 from tests.web.viewer_client import ViewerClient
 from web.viewer.scene.cell_scene import CellScene
@@ -34,9 +35,9 @@ LIVES: dict[str, Sequence[Command]] = {
         commands.AddPerson(),
     ],
     "as many as there can be, all gone, all back": [
-        *[commands.AddPerson()] * (commands.MAX_PEOPLE - 1),
-        *[commands.RemovePerson(person=id) for id in range(commands.MAX_PEOPLE)],
-        *[commands.AddPerson()] * commands.MAX_PEOPLE,
+        *[commands.AddPerson()] * (MAX_PEOPLE - 1),
+        *[commands.RemovePerson(person=id) for id in range(MAX_PEOPLE)],
+        *[commands.AddPerson()] * MAX_PEOPLE,
     ],
     "a person grows and shrinks": [
         commands.SetAnthropometry(stature=95.0),

@@ -277,7 +277,7 @@ class LivePedestrian:
         self.enter("manual")
         if command.pelvis is not None:
             self._aim = np.array(self._among.walkable(*command.pelvis[:2]))
-            self._head_for_aim(self.yaw)
+            self.row[VX], self.row[VY] = self._velocity()
 
     def enter(self, mode: Mode) -> None:
         """Set the motion source."""
@@ -327,10 +327,6 @@ class LivePedestrian:
         velocity = (self._aim - self.row[[X, Y]]) / max(DRAG_LAG_S, self._among.dt)
         speed = float(np.linalg.norm(velocity))
         return np.asarray(velocity * min(1.0, DRAG_SPEED / max(speed, 1e-9)))
-
-    def _head_for_aim(self, yaw: float) -> None:
-        self.row[VX], self.row[VY] = self._velocity()
-        self.yaw = yaw
 
     def snapshot(self, clearance_m: float, *, nearest: bool) -> PersonSnapshot:
         """Return the read model of the person.

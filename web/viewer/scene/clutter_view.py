@@ -3,6 +3,7 @@
 import numpy as np
 import viser
 
+from app.live.status_messages import percent_text
 from app.sim.cells.cell import Cell
 from web.viewer.poses import Vec
 from web.viewer.scene.sorting_bodies import failure_color, tile, tray
@@ -71,7 +72,7 @@ class ClutterView:
         self._shown = failure
         for surface, label, chance in zip(self._tiles, self._labels, failure, strict=True):
             surface.color = failure_color(chance)
-            label.text = f"{100.0 * chance:.0f} %"
+            label.text = percent_text(chance)
 
 
 def _spacing(values: Vec) -> float:

@@ -13,6 +13,7 @@ import viser
 from app.live.reach.commands import MoveGoal, goal_box
 from app.live.safety.snapshot import SafetySnapshot
 from app.live.snapshot import WorldSnapshot
+from app.live.status_messages import percent_text
 from app.sim.cells.cell import Cell
 from app.sim.reach.batch import goal_region_of
 from app.sim.safety.separation_zone import N_DIRECTIONS
@@ -20,10 +21,11 @@ from web.viewer.people.mannequin import Rgb
 from web.viewer.people.pedestrians_view import PedestriansView
 from web.viewer.poses import Vec
 from web.viewer.scene.arc import Arc
+from web.viewer.scene.color_scale import ColorScale, blend
 from web.viewer.scene.goal_gizmo import GoalGizmo
 from web.viewer.scene.stations_view import MARK
 
-OVERRIDES: tuple[tuple[float, Rgb], ...] = (
+OVERRIDES: ColorScale = (
     (0.0, (214, 52, 46)),
     (0.5, (240, 176, 52)),
     (1.0, (38, 166, 104)),
@@ -44,13 +46,6 @@ def override_color(safety: SafetySnapshot) -> Rgb:
     if not safety.on:
         return OFF
     return blend(OVERRIDES, safety.override)
-
-
-def blend(ramp: tuple[tuple[float, Rgb], ...], x: float) -> Rgb:
-    """Return the colour at ``x`` in [0, 1] of a colour scale."""
-    places = [at for at, _ in ramp]
-    channels = [np.interp(x, places, [color[k] for _, color in ramp]) for k in range(3)]
-    return int(channels[0]), int(channels[1]), int(channels[2])
 
 
 class ReachScene:
@@ -157,7 +152,7 @@ class _Gauge:
         colors = np.full((N_GAUGE, 2, 3), BACK, dtype=np.uint8)
         colors[: round(N_GAUGE * safety.override)] = override_color(safety)
         self._ring.colors = colors
-        self._text.text = f"{100 * safety.override:.0f} %" if safety.on else "no safety layer"
+        self._text.text = percent_text(safety.override) if safety.on else "no safety layer"
 
 
 class _Trail:

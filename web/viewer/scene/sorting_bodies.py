@@ -6,16 +6,16 @@ light to dark, readable without colour vision and different from the colours of 
 
 from functools import lru_cache
 
-import numpy as np
 import trimesh
 
 from web.viewer.people.mannequin import Rgb
 from web.viewer.poses import Vec
+from web.viewer.scene.color_scale import ColorScale, blend
 from web.viewer.scene.solid_meshes import material, painted, rod, slab
 
 BLOCKS: dict[str, Rgb] = {"red": (205, 58, 62), "green": (112, 184, 92), "blue": (52, 104, 196)}
 """Colour of blocks and towers by name."""
-FAILURES: tuple[tuple[float, Rgb], ...] = (
+FAILURES: ColorScale = (
     (0.0, (240, 237, 229)),
     (0.2, (243, 217, 164)),
     (0.4, (226, 166, 92)),
@@ -33,11 +33,7 @@ GHOST_GROWTH = 1.02
 
 def failure_color(chance: float) -> Rgb:
     """Return the colour of a clutter slot with a failure probability."""
-    channels = [
-        np.interp(chance, [x for x, _ in FAILURES], [color[k] for _, color in FAILURES])
-        for k in range(3)
-    ]
-    return round(float(channels[0])), round(float(channels[1])), round(float(channels[2]))
+    return blend(FAILURES, chance)
 
 
 @lru_cache(maxsize=64)

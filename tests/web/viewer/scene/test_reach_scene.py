@@ -16,7 +16,8 @@ from tests.web.conftest import node
 from tests.web.viewer_client import ViewerClient
 from web.viewer.people.mannequin import VESTS
 from web.viewer.scene.cell_scene import CellScene
-from web.viewer.scene.reach_scene import N_GAUGE, OFF, OVERRIDES, blend, override_color
+from web.viewer.scene.color_scale import blend
+from web.viewer.scene.reach_scene import N_GAUGE, OFF, OVERRIDES, override_color
 from web.viewer.scene.stations_view import HIT
 
 CELL = load_cell("shared-workspace")
