@@ -111,6 +111,33 @@ def test_message_of_the_service_is_shown_as_a_sentence(
 
 
 @pytest.mark.parametrize(
+    ("field", "value", "shown"),
+    [
+        ("people[0].q.elbow_r", 2.7, "Person 1: right elbow 155°, training range 0° to 57°"),
+        ("people[1].q.elbow_r", 2.7, "Person 4: right elbow 155°, training range 0° to 57°"),
+        ("people[1].q.pelvis_x", 2.7, "Person 4: pelvis x 2.7 m, training range 0 m to 1 m"),
+        ("people[0].q.pelvis_yaw", 2.7, "Person 1: pelvis yaw 155°, training range 0° to 57°"),
+        (
+            "people[0].qd.pelvis_yaw",
+            2.7,
+            "Person 1: speed of pelvis yaw 155°/s, training range 0°/s to 57°/s",
+        ),
+        ("time_left_s", 2.7, "time left 2.7 s, training range 0 s to 1 s"),
+    ],
+)
+def test_input_outside_the_training_range_has_the_name_of_its_person_and_its_unit(
+    page: Page, field: str, value: float, shown: str
+) -> None:
+    people = [{"id": 0}, {"id": 3}]
+    text = page.evaluate(
+        """([one, people]) =>
+          import("/live/status.js").then((of) => of.outsideText(one, people))""",
+        [{"field": field, "value": value, "low": 0.0, "high": 1.0}, people],
+    )
+    assert " ".join(text).replace("\u00a0", " ") == shown
+
+
+@pytest.mark.parametrize(
     ("person", "separation", "advised", "short"),
     [
         (0, 0.36, 1.0, False),

@@ -87,7 +87,7 @@ export function SmallPrint({ world }) {
           In distribution: all inputs within the training range.</p>`}
     ${outside.length > 0 && html`<div class="range warn"><${Icon} name="alert" /><div>
           Out of distribution: inputs outside the training range
-          <ul>${outside.slice(0, 4).map(outsideText).map(([name, text]) => html`<li key=${name}>
+          <ul>${outside.slice(0, 4).map((one) => outsideText(one, world.people)).map(([name, text]) => html`<li key=${name}>
             <b>${name}</b> ${text}</li>`)}
             ${outside.length > 4 && html`<li>and ${outside.length - 4} more</li>`}
           </ul></div></div>`}
@@ -102,16 +102,21 @@ export function Provenance({ world: { checkpoint, elapsed_ms: ms } }) {
     <code title=${checkpoint}>${format.short(checkpoint)}</code></p>`;
 }
 
-/** "people[0].q.elbow_r" = 2.7 -> "right elbow 155°, training range 0° to 149°". */
-export function outsideText({ field, value, low, high }) {
+/**
+ * "people[0].q.elbow_r" = 2.7 -> "right elbow", "155°, training range 0° to 149°"; the name begins
+ * with that of the person where `people`, those of the world, are several.
+ */
+export function outsideText({ field, value, low, high }, people = []) {
   const show = inUnits(field);
-  return [fieldName(field), `${show(value)}, training range ${show(low)} to ${show(high)}`];
+  const person = people.length > 1 && people[/^people\[(\d+)\]/.exec(field)?.[1]];
+  const name = person ? `${nameOf(person.id)}: ${fieldName(field)}` : fieldName(field);
+  return [name, `${show(value)}, training range ${show(low)} to ${show(high)}`];
 }
 
 function inUnits(field) {
   const speed = /\bqd\b/.test(field) ? "/s" : "";
   if (/time_left/.test(field)) return (v) => format.quantity(v, "s");
-  if (/pelvis_[xy]|position|tcp/.test(field)) return (v) => format.quantity(v, `m${speed}`);
+  if (/pelvis_[xy]\b|position|tcp/.test(field)) return (v) => format.quantity(v, `m${speed}`);
   return (v) => `${format.number(Math.round((v * 180) / Math.PI))}°${speed}`;
 }
 
@@ -122,5 +127,6 @@ function fieldName(field) {
     .replace(/([a-z]+)_([rl])(?:_([a-z]+))?\]?$/, (_, joint, side, direction) =>
       `${side === "r" ? "right" : "left"} ${joint} ${NOUNS[direction] ?? direction ?? ""}`.trim())
     .replace(/[\]]/g, "")
+    .replace(/_s$/, "")
     .replaceAll("_", " ");
 }
