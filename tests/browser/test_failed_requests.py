@@ -68,6 +68,37 @@ def test_checkpoint_of_another_purpose_is_not_evaluated(
     assert sent == [pick, None]
 
 
+def test_cell_is_shown_while_the_list_of_cells_cannot_be_read(
+    open_page: Callable[..., Page],
+) -> None:
+    page = open_page(scene=False)
+    title = page.locator('.topbar [data-role="cell"]')
+    expect(title).to_be_visible()
+    away = {"title": "Service Unavailable", "detail": "the database is locked"}
+    page.route("**/v1/cells", lambda route: route.fulfill(status=503, json=away))
+    page.reload()
+    expect(page.locator("[data-link=live] [data-chosen=true]")).to_be_visible()
+    expect(title).to_have_count(0)
+    expect(page.locator(".dock")).to_contain_text("The goals of this cell could not be loaded.")
+    page.unroute("**/v1/cells")
+    expect(title).to_be_visible()
+
+
+def test_page_says_why_the_server_does_not_show_the_cell(
+    open_page: Callable[..., Page],
+) -> None:
+    page = open_page(scene=False)
+    fault = {"title": "Internal Server Error", "detail": "the cell has failed"}
+    page.route("**/v1/worlds/main", lambda route: route.fulfill(status=500, json=fault))
+    page.reload()
+    expect(page.locator(".veil")).to_contain_text(
+        "The cell has failed. Trying again every second."
+    )
+    expect(page.locator(".veil")).not_to_contain_text("does not answer")
+    page.unroute("**/v1/worlds/main")
+    expect(page.locator("[data-link=live]")).to_be_visible()
+
+
 def test_list_of_jobs_says_that_it_is_old_or_not_complete(
     open_page: Callable[..., Page], server: str
 ) -> None:

@@ -138,12 +138,13 @@ const CAUSES = {
 };
 
 /** Says that what is shown is old, how old, and what waits. */
-function Stale({ cell: { link, world, heardAt, pending, show } }) {
+function Stale({ cell: { link, reason, world, heardAt, pending, show } }) {
   const seconds = useSeconds(heardAt, link in CAUSES && world);
   if (seconds === null) return null;
   const waits = pending === 1 ? " 1 command is pending." : ` ${pending} commands are pending.`;
   return html`<p class="banner warn" role="alert" data-role="stale"><${Icon} name="alert" />
-    <span><b>Stale<span aria-hidden="true"> for ${seconds} s</span>.</b> ${CAUSES[link]} Scene and
+    <span><b>Stale<span aria-hidden="true"> for ${seconds} s</span>.</b> ${link === "lost" && reason
+      ? again(reason) : CAUSES[link]} Scene and
     values show the last known state.${pending > 0 && waits}</span>
     ${link === "stalled" && html`<button type="button" class="tool" data-action="start-again"
       disabled=${pending > 0} onClick=${() => show(world.cell)}>Start the cell again</button>`}</p>`;
@@ -219,7 +220,13 @@ function Scene({ cell }) {
   </section>`;
 }
 
+/** What the server says of its fault, and that the page asks again. */
+function again(reason) {
+  return `${sentence(reason)} Trying again every second.`;
+}
+
 function veil(link, reason) {
+  if (link === "lost" && reason) return ["The cell cannot be shown", again(reason)];
   if (link === "lost" || link === "stale") return ["The server does not answer", "Trying again every second."];
   if (link !== "warming") return ["Opening the cell", ""];
   const doing = reason.replace(/^(warming up|starting):? */, "");
@@ -231,8 +238,8 @@ function veil(link, reason) {
 function Decision({ cell, checkpoints, jobs }) {
   const goals = useGoals(cell);
   if (!cell.world) return html`<div class="skeleton tall" aria-busy="true"></div>`;
-  if (cell.world.sorting && cell.cell) {
-    return html`<${SortingDecision} world=${cell.world} cell=${cell.cell} send=${cell.send}
+  if (cell.world.sorting) {
+    return !cell.cell ? html`<${StatusPanel} world=${cell.world} /><${Safety} world=${cell.world} />` : html`<${SortingDecision} world=${cell.world} cell=${cell.cell} send=${cell.send}
       checkpoints=${checkpoints} jobs=${jobs} />`;
   }
   if (cell.world.reach) return html`<${ReachDecision} world=${cell.world} />`;

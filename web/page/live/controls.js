@@ -51,6 +51,7 @@ export function Controls({ world, cell, cases, send, colourOf, labelOf }) {
 }
 
 function Goals({ world, cell, send, colourOf, labelOf }) {
+  if (!cell) return html`<p class="dock-note">The goals of this cell could not be loaded.</p>`;
   const active = new Set(world.selected ?? world.candidates.map((c) => c.id));
   return html`<div class="goals" role="group" aria-labelledby="goals-label">
     ${(cell?.stations ?? []).map(({ id }) => {

@@ -1,6 +1,6 @@
 // The live cell as this page knows it: its last snapshot, its recent values, the link to it.
 import { useCallback, useEffect, useRef, useState } from "../vendor/htm-preact-standalone.module.js";
-import { follow, get, inOrder, post, put, SIGN_IN, Unreachable, wait } from "../api.js";
+import { follow, get, inOrder, post, Problem, put, SIGN_IN, Unreachable, wait } from "../api.js";
 import { Lost, Unconfirmed } from "../unconfirmed.js";
 import { History } from "./history.js";
 import { hidden, seen } from "../visibility.js";
@@ -28,7 +28,9 @@ export function answers(link) {
  *            send: (command: object) => Promise<void>, show: (cell: string) => Promise<void>}}
  *   `epoch` counts how often the server was found ready; `heardAt` is the time of the last
  *   snapshot, as performance.now() gives it, or of the page's start; a world is stalled that no
- *   longer moves though the server answers; `pending` counts commands that no snapshot shows yet;
+ *   longer moves though the server answers; `reason` is what the server says of its fault, "" if
+ *   it does not answer; `cell` is null until the list of cells has been read, which needs the
+ *   database; `pending` counts commands that no snapshot shows yet;
  *   `errors` are those of the newest commands.
  */
 export function useCell() {
@@ -101,24 +103,37 @@ async function carryOut(command, unconfirmed, posts) {
 async function watch(signal, history, unconfirmed, setState, setEpoch) {
   const merge = (more) => !signal.aborted && setState((now) => ({ ...now, ...more }));
   let isBack = false; // seen again: the scene has its own connection
+  let cells = [];
   while (!signal.aborted) {
     await seen(signal);
     let { first, stalled } = await ready(signal, merge);
     isBack &&= first;
     try {
-      const [world, cells] = await Promise.all([get(`v1/worlds/${WORLD}`), get("v1/cells")]);
-      const list = cells.items;
-      const cell = list.find((c) => c.name === world.cell) ?? null;
+      const [world, listed] = await Promise.all([
+        get(`v1/worlds/${WORLD}`), get("v1/cells", { patience: ASK_MS }).catch(() => null),
+      ]);
+      const showCells = () =>
+        merge({ cells, cell: cells.find(({ name }) => name === world.cell) ?? null });
       let replaced = false;
       let link = "lost";
+      let fault = null;
+      cells = listed?.items ?? cells;
       history.add(world);
-      merge({ world, cell, cells: list, link: stalled ? "stalled" : "live", reason: "" });
+      showCells();
+      merge({ world, link: stalled ? "stalled" : "live", reason: "" });
       if (!stalled) merge({ heardAt: performance.now() });
       if (!isBack) setEpoch((n) => (stalled ? Math.max(n, 1) : n + 1));
       isBack = false;
       await until(signal, (lost) => {
         const left = new AbortController();
         hidden(left.signal).then(() => left.signal.aborted || lost((isBack = true)));
+        if (!listed) {
+          cellsLater(left.signal).then((items) => {
+            if (left.signal.aborted) return;
+            cells = items;
+            showCells();
+          });
+        }
         const silence = listen((quiet) => {
           const still = stalled ? "stalled" : "stale";
           merge({ link: still });
@@ -140,19 +155,34 @@ async function watch(signal, history, unconfirmed, setState, setEpoch) {
               ...now, world: { ...now.world, ...snapshot }, link: "live", heardAt,
             }));
           },
-          onDown: lost,
+          onDown: (error) => lost((fault = error)),
         });
         return () => (left.abort(), silence.stop(), leave());
       });
       unconfirmed.drop();
       if (replaced || isBack) continue;
-      merge({ link });
+      merge({ link, reason: saidBy(fault) });
     } catch (error) {
       isBack = false;
       if (error.status === 401) return; // the page asks for the token
-      merge({ link: error.silent ? "stale" : "lost", reason: error.message });
+      merge({ link: error.silent ? "stale" : "lost", reason: saidBy(error) });
     }
     await wait(RETRY_MS, signal);
+  }
+}
+
+/** What the server says of a request that failed; "" if it has not answered. */
+function saidBy(error) {
+  return error instanceof Problem ? error.message : "";
+}
+
+/** The list of cells, asked for until it is answered; null once the signal aborts. */
+async function cellsLater(signal) {
+  for (;;) {
+    await wait(RETRY_MS, signal);
+    if (signal.aborted) return null;
+    const listed = await get("v1/cells", { signal }).catch(() => null);
+    if (listed) return listed.items;
   }
 }
 
