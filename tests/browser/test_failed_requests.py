@@ -3,11 +3,14 @@
 import re
 from collections.abc import Callable
 from typing import Any
+from urllib.parse import parse_qs, urlsplit
 
 import pytest
-from playwright.sync_api import Page, expect
+from playwright.sync_api import Page, Route, expect
 
 from app.policies.checkpoints import pretrained
+from jobs.executor import NO_CPU
+from jobs.supervisor import OTHER_SERVER
 from tests.browser.test_checkpoints import uploaded
 from tests.browser.test_training import open_form
 from tests.support import patient_http
@@ -105,11 +108,15 @@ def test_list_of_jobs_says_that_it_is_old_or_not_complete(
     body = {"kind": "evaluate", "protocol": "pick-single", "episodes": 1, "priority": -100}
     job = patient_http.post(f"{server}/v1/jobs", json=body).json()
     patient_http.post(f"{server}/v1/jobs/{job['id']}/cancel").raise_for_status()
-    many = [{**job, "id": f"job-{n}", "number": n} for n in range(1, 51)]
-    listed = {"items": many, "next_cursor": "more", "waiting": None}
+    jobs = [
+        {**job, "id": f"job-{n}", "number": n, "state": "cancelled" if n == 1 else "queued"}
+        for n in range(260, 0, -1)
+    ]
     page = open_page(scene=False)
-    page.route("**/v1/jobs?*", lambda route: route.fulfill(json=listed))
+    page.route("**/v1/jobs?*", lambda route: route.fulfill(json=page_of(jobs, route)))
     page.click("#tab-training")
+    expect(page.locator(".job")).to_have_count(259)
+    expect(page.locator("#tab-training .count")).to_have_text("259")
     expect(page.locator(".training")).to_contain_text(
         "The newest 50 are shown, and older ones that have not ended."
     )
@@ -120,6 +127,55 @@ def test_list_of_jobs_says_that_it_is_old_or_not_complete(
         "The jobs could not be loaded: the server answered 500. Trying again every 2 s."
     )
     expect(page.locator(".job").first).to_be_visible()
+
+
+def page_of(jobs: list[dict[str, Any]], route: Route) -> dict[str, Any]:
+    """Return the page of a list of jobs that a request asks for, as the service gives it."""
+    asked = parse_qs(urlsplit(route.request.url).query)
+    state, first = asked.get("state", [None])[0], int(asked.get("cursor", ["0"])[0])
+    end = first + int(asked.get("limit", ["50"])[0])
+    found = [job for job in jobs if state in (None, job["state"])]
+    cursor = str(end) if end < len(found) else None
+    return {"items": found[first:end], "next_cursor": cursor, "waiting": None}
+
+
+WAITS = {
+    "disk full": "Jobs are waiting: disk full. Free some space on the disk of the data folder.",
+    "database locked": "Another program holds the database, such as a backup. No progress is",
+    "database unavailable": "The database does not answer. No progress is lost, and the jobs",
+    "database damaged": "What was stored since the backup is lost.",
+    "no free resources": "The machine can start no further process. No progress is lost",
+    "disk error": "reports errors: check it. The jobs resume once it can be used.",
+    NO_CPU: "They start as soon as a node has a free CPU. No progress is lost",
+    OTHER_SERVER: "Another server runs the jobs. It holds the lease of the database",
+    "server unreachable": "A worker on another machine does not reach this server. No progress",
+}
+"""Part of what the page says for each reason for which jobs wait."""
+LOSES = ("database damaged", "disk error", OTHER_SERVER)
+"""Reasons for which progress may be lost, or jobs do not wait."""
+
+
+def test_page_says_why_jobs_wait_and_what_happens_to_them(
+    open_page: Callable[..., Page],
+) -> None:
+    page = open_page(scene=False)
+    texts = page.evaluate(
+        """async (reasons) => {
+          const page = (path) => import(`/static/${path}`);
+          const { html, render } = await page("vendor/htm-preact-standalone.module.js");
+          const { QueueWaits } = await page("training/jobs.js");
+          return reasons.map((waiting) => {
+            const box = document.createElement("div");
+            render(html`<${QueueWaits} waiting=${waiting} />`, box);
+            return box.textContent.replace(/\\s+/g, " ");
+          });
+        }""",
+        list(WAITS),
+    )
+    for (reason, shown), text in zip(WAITS.items(), texts, strict=True):
+        assert shown in text
+        assert ("The database does not answer." in text) == (reason == "database unavailable")
+        assert ("No progress is lost" in text) == (reason not in LOSES)
 
 
 def test_ages_are_by_the_clock_of_the_server(

@@ -20,6 +20,9 @@ import { whileSeen } from "../visibility.js";
 const POLL_MS = 2000;
 const PAGE = 50;
 const ACTIVE = ["queued", "running", "cancelling"]; // shown however many newer jobs there are
+const LONGEST_PAGE = 200;
+const MAX_PAGES = 10; // of one state
+const MOST = LONGEST_PAGE * MAX_PAGES;
 const TONES = { queued: "quiet", running: "accent", cancelling: "warn", succeeded: "good",
   failed: "bad", cancelled: "quiet" };
 const OUTCOMES = [
@@ -30,6 +33,7 @@ const OUTCOMES = [
 const KINDS = { evaluate: "evaluation", sweep: "sweep" };
 const UNITS = { evaluate: "rows", sweep: "trials", report: "evaluations" };
 const SHA_256 = 64; // characters; a shorter name is an alias
+const TURN = "Waiting for its turn.";
 const REWARD = [{ key: "reward", label: "mean reward of an episode", colour: "accent" }];
 
 /** Newest jobs, asked for again every two seconds while the server is there; parts of others, too. */
@@ -43,9 +47,8 @@ export function useJobs(link) {
       if (over) return;
       try {
         const [own, all] = await Promise.all([get(`v1/jobs?part_of=none&limit=${PAGE}`), get("v1/jobs")]);
-        const older = own.next_cursor ? await Promise.all(ACTIVE.map((one) =>
-          get(`v1/jobs?part_of=none&state=${one}`))) : [];
-        const found = [...own.items, ...all.items.filter((one) => one.part_of), ...older.flatMap((one) => one.items)];
+        const older = own.next_cursor ? await Promise.all(ACTIVE.map(inState)) : [];
+        const found = [...own.items, ...all.items.filter((one) => one.part_of), ...older.flat()];
         const items = [...new Map(found.map((one) => [one.id, one])).values()];
         if (!over) setState({ jobs: items.sort(byNumber), error: null, waiting: own.waiting });
       } catch (error) {
@@ -61,6 +64,19 @@ export function useJobs(link) {
     };
   }, [link]);
   return { ...state, refresh: useCallback(() => refresh.current(), []) };
+}
+
+/** The jobs of a state that are part of none, up to MOST of them. */
+async function inState(state) {
+  const found = [];
+  let cursor = "";
+  for (let n = 0; n < MAX_PAGES && cursor !== null; n += 1) {
+    const after = cursor && `&cursor=${encodeURIComponent(cursor)}`;
+    const page = await get(`v1/jobs?part_of=none&state=${state}&limit=${LONGEST_PAGE}${after}`);
+    found.push(...page.items);
+    cursor = page.next_cursor;
+  }
+  return found;
 }
 
 /** The jobs with the open one, which may be older than they are; `onGone` if it was deleted. */
@@ -81,20 +97,26 @@ function byNumber(a, b) {
   return b.number - a.number;
 }
 
+const OTHER_SERVER = "another server runs the jobs";
+const KEPT = "No progress is lost, and the jobs resume by themselves.";
 const REMEDIES = {
-  "disk full": "Free some space on the disk of the data folder.",
-  "database locked": "Another program holds the database, such as a backup.",
-  "database damaged": "Stop the server and restore a backup: python -m app restore FILE.",
-  "no free resources": "The machine can start no further process.",
-  "disk error": "The disk of the data folder reports errors: check it.",
+  "disk full": `Free some space on the disk of the data folder. ${KEPT}`,
+  "database locked": `Another program holds the database, such as a backup. ${KEPT}`,
+  "database unavailable": `The database does not answer. ${KEPT}`,
+  "database damaged": "Stop the server and restore a backup: python -m app restore FILE. What was stored since the "
+    + "backup is lost.",
+  "no free resources": `The machine can start no further process. ${KEPT}`,
+  "disk error": "The disk of the data folder reports errors: check it. The jobs resume once it can be used.",
+  "no free CPU in the Ray cluster": `They start as soon as a node has a free CPU. ${KEPT}`,
+  [OTHER_SERVER]: "It holds the lease of the database; this server takes over once that one has ended.",
+  "server unreachable": `A worker on another machine does not reach this server. ${KEPT}`,
 };
 
-/** Says why no job runs; what was recorded stays, and the queue goes on by itself. */
+/** Says why no job runs, and what happens to them. */
 export function QueueWaits({ waiting }) {
   return waiting && html`<p class="notice warn" role="status" data-role="queue-waits">
-    <${Icon} name="alert" /><span><b>Jobs are waiting: ${waiting}.</b> ${REMEDIES[waiting] ??
-    "The database does not answer."} No progress is lost, and the jobs resume by themselves.
-    </span></p>`;
+    <${Icon} name="alert" /><span><b>${waiting === OTHER_SERVER ? format.sentence(waiting)
+      : `Jobs are waiting: ${waiting}.`}</b> ${REMEDIES[waiting]}</span></p>`;
 }
 
 export function JobList({ jobs, error, onNew, ...rest }) {
@@ -110,12 +132,14 @@ export function JobList({ jobs, error, onNew, ...rest }) {
         <${Icon} name="plus" />Start one</button>`}</div>`;
   }
   const listed = jobs.filter((job) => !job.part_of || job.id === rest.open || rest.chosen);
+  const own = jobs.filter((job) => !job.part_of).length;
   return html`${fault}<ul class="jobs">
     ${listed.map((job) => html`<${Job} key=${job.id} job=${job} jobs=${jobs} ...${rest}
       open=${rest.open === job.id} />`)}
   </ul>
-  ${jobs.filter((job) => !job.part_of).length >= PAGE && html`<p class="faint">
-    ${`The newest ${PAGE} are shown, and older ones that have not ended.`}</p>`}`;
+  ${own >= PAGE && html`<p class="faint">
+    ${`The newest ${PAGE} are shown, and older ones that have not ended${
+      own >= MOST ? `, up to ${MOST} of a state` : ""}.`}</p>`}`;
 }
 
 function Job({ job, jobs, open, chosen, onChoose, ...rest }) {
@@ -201,7 +225,7 @@ function JobDetail({ job, presets, onChanged, onOpen, onClone, onAct, acting }) 
   return html`<${JobFrame} ...${{ job, actions, onChanged, onOpen, onClone }}>
     ${!rows && html`<div class="skeleton tall" aria-busy="true" aria-label="Loading the curve"></div>`}
     ${rows && rows.length === 0 && html`<p class="empty">${job.state === "queued"
-      ? "Waiting for its turn; one job runs at a time."
+      ? TURN
       : isActive(job) ? "Warming up; the first point comes after the first episodes."
         : "It ended before its first point: retry it, or clone it with changes."}</p>`}
     ${rows && rows.length > 0 && html`
@@ -261,7 +285,7 @@ function Evaluation({ job, ...rest }) {
     <${Facts} entries=${[["Checkpoint", checkpoint?.length === SHA_256 ? format.short(checkpoint) : checkpoint ?? "–"],
       ["Episodes", fieldValue(episodes)]]} />
     ${rows.length === 0 && !job.error && html`<p class="empty">${job.state === "queued"
-      ? "Waiting for its turn; one job runs at a time."
+      ? TURN
       : isActive(job) ? "The rows are shown once all are known."
         : "It ended without a result: retry it."}</p>`}
     ${rows.length > 0 && html`<dl class="rows" data-role="rows">${rows.map((row) => html`
