@@ -1,12 +1,15 @@
 """A visitor starts jobs by their forms, limits them and goes on."""
 
+import json
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import pytest
 from playwright.sync_api import Page, Route, expect
 
+from app.sim.cells.cell import load_cell
+from tests.browser.conftest import show
 from tests.browser.test_drag import tell
 from tests.browser.test_training import GROWTH_MS, open_form
 from tests.support import patient_http
@@ -90,6 +93,34 @@ def test_phone_offers_letters_for_a_name_and_digits_for_a_number(
     open_form(page)
     expect(page.locator("#train-name")).to_have_attribute("inputmode", "text")
     expect(page.locator("#train-seed")).to_have_attribute("inputmode", "decimal")
+
+
+@pytest.fixture
+def own_reach_cell(server: str) -> Iterator[str]:
+    """Name of a reach cell that a test stores and shows; it is deleted after the test."""
+    name = "own-reach"
+    yield name
+    show(server, load_cell().name)
+    patient_http.delete(f"{server}/v1/cells/{name}")
+
+
+def test_forms_propose_a_preset_for_a_cell_that_was_added_later(
+    open_page: Callable[..., Page], server: str, own_reach_cell: str
+) -> None:
+    page = open_page((1280, 900), scene=False)
+    open_form(page)
+    expect(page.locator("#train-preset")).to_have_value("pick-td3")
+    page.get_by_role("button", name="Close the form").click()
+    definition = load_cell("shared-workspace").definition()
+    own = json.loads(json.dumps({**definition, "name": own_reach_cell, "title": "Own"}))
+    patient_http.post(f"{server}/v1/cells", json=own).raise_for_status()
+    show(server, own_reach_cell)
+    expect(page.locator('[data-role="cell"]')).to_have_value(own_reach_cell)
+    open_form(page)
+    expect(page.locator("#train-preset")).to_have_value("reach-td3")
+    expect(page.locator("#train-cell")).to_have_value(own_reach_cell)
+    page.click('[data-kind="sweep"]')
+    expect(page.locator("#sweep-preset")).to_have_value("reach-td3")
 
 
 def test_kind_of_job_obeys_the_arrow_keys(open_page: Callable[..., Page]) -> None:

@@ -35,7 +35,7 @@ function App() {
   const { link, world } = cell;
   const { jobs, error, waiting, refresh } = useJobs(link);
   const active = (jobs ?? []).filter(isActive).length;
-  const checkpoints = useCheckpoints(link, `${world?.checkpoint}:${stamp(jobs)}`);
+  const checkpoints = useCheckpoints(link, `${world?.checkpoint}:${stamp(jobs)}`, world?.cell);
   const [tab, setTab] = useState("cell");
   const roomy = useMedia("(min-width: 1760px)");
   const visited = useRef(false);

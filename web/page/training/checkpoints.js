@@ -26,10 +26,10 @@ export async function storedCheckpoints() {
 
 /**
  * Known checkpoints, and the ids of policies that act and are no longer stored; asked for again when `stamp`
- * changes and by `refresh`. Presets, whose titles name them.
+ * changes and by `refresh`. Presets, whose titles name them, asked for again for another `cell`: cells are choices.
  */
-export function useCheckpoints(link, stamp) {
-  const presets = useItems(link, "v1/presets");
+export function useCheckpoints(link, stamp, cell) {
+  const presets = useItems(link, "v1/presets", cell);
   const [list, setList] = useState([]);
   const [unstored, setUnstored] = useState([]);
   const [ask] = useState(() => inTurn(() => Promise.allSettled([

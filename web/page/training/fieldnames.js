@@ -7,6 +7,18 @@ export function presetTitle(presets, name) {
   return presets?.items?.find((one) => one.name === name)?.title ?? name;
 }
 
+/** The preset of a name, else the first one that is for a cell or can be trained in it. */
+export function presetFor(presets, name, cell) {
+  return presets?.find((one) => one.name === name) ?? presets?.find((one) => one.cell === cell)
+    ?? presets?.find((one) => shownCell(one, cell).cell) ?? presets?.[0] ?? null;
+}
+
+/** The cell that is shown as the field of a preset, where it can be trained in it. */
+export function shownCell(preset, cell) {
+  const field = preset?.fields.find(({ name }) => name === "cell");
+  return field?.choices?.includes(cell) ? { cell } : {};
+}
+
 const OTHERS = { cell: "Work cell", kind: "Kind of job", purpose: "Purpose" };
 
 /** Title and unit of a field by its dotted name; `preset` is where it is looked for first. */

@@ -47,22 +47,27 @@ export function useForm({ typed: first = {}, names, onDone, prefix = "train" }) 
 }
 
 /** The items of a route, asked for while the server is there until it answers; or the error. */
-export function useItems(link, path) {
-  return useLoaded(link, (options) => get(path, options).then(({ items }) => items));
+export function useItems(link, path, cause = null) {
+  return useLoaded(link, (options) => get(path, options).then(({ items }) => items), cause);
 }
 
-/** The items that `load` promises, asked for as those of a route are. */
-export function useLoaded(link, load) {
+/** The items that `load` promises, asked for as those of a route are; again for another `cause`. */
+export function useLoaded(link, load, cause = null) {
   const [state, setState] = useState({ items: null, error: null });
+  const known = useRef(null); // the cause for which the items were loaded
   useEffect(() => {
-    if (!answers(link) || state.items) return undefined;
+    if (!answers(link) || (state.items && known.current === cause)) return undefined;
     const stop = new AbortController();
     let timer = null;
     const ask = () => load({ signal: stop.signal }).then(
-      (items) => stop.signal.aborted || setState({ items, error: null }),
+      (items) => {
+        if (stop.signal.aborted) return;
+        known.current = cause;
+        setState({ items, error: null });
+      },
       (error) => {
         if (stop.signal.aborted) return;
-        setState({ items: null, error });
+        setState((now) => ({ ...now, error }));
         timer = setTimeout(ask, AGAIN_MS);
       });
     ask();
@@ -70,7 +75,7 @@ export function useLoaded(link, load) {
       stop.abort();
       clearTimeout(timer);
     };
-  }, [link]);
+  }, [link, cause]);
   return state;
 }
 

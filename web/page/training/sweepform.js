@@ -2,7 +2,7 @@
 import { html, useState } from "../vendor/htm-preact-standalone.module.js";
 import { post } from "../api.js";
 import { Close, Icon } from "../icons.js";
-import { byGroup } from "./fieldnames.js";
+import { byGroup, presetFor, shownCell } from "./fieldnames.js";
 import { Loading, OWN, parsed, presetField, protocolField, StartForm, useForm } from "./formfields.js";
 
 const MAX_RANGES = 8;
@@ -25,8 +25,7 @@ const PRUNE = { name: "prune", title: "Pruning", default: "true", choices: ["tru
 export function SweepForm({ protocols, presets: { items: presets, error }, cell, onStarted, onClose }) {
   const [name, setName] = useState(null);
   const [ranges, setRanges] = useState([{ path: "learning.lr_start" }]);
-  const preset = presets?.find((p) => p.name === name)
-    ?? presets?.find((p) => p.cell === cell) ?? presets?.[0];
+  const preset = presetFor(presets, name, cell);
   const total = preset?.fields.find((f) => f.name === "learning.total_steps");
   const own = [...OWN, ...COUNTS, QUANTITY, EPISODES, PRUNE].map((f) => f.name);
   const form = useForm({
@@ -38,7 +37,7 @@ export function SweepForm({ protocols, presets: { items: presets, error }, cell,
   const value = (field) => form.typed[field.name] ?? String(field.default);
   const send = (key) => post("v1/jobs", {
     kind: "sweep", preset: preset.name, seed: parsed(value(OWN[0])), name: value(OWN[1]) || null,
-    overrides: { ...(cellOf(preset, cell)), learning: { total_steps: parsed(value(total)) } },
+    overrides: { ...shownCell(preset, cell), learning: { total_steps: parsed(value(total)) } },
     ranges: Object.fromEntries(ranges.map((one) => [one.path, rangeOf(one, preset)])),
     trials: parsed(value(COUNTS[0])), parallel: parsed(value(COUNTS[1])),
     prune: value(PRUNE) === "true",
@@ -78,11 +77,6 @@ export function SweepForm({ protocols, presets: { items: presets, error }, cell,
       ...protocolField(protocols.items, preset.objectives, preset.objectives[0]) })}
     ${[QUANTITY, EPISODES, PRUNE].map((field) => form.row(field))}
   </${StartForm}>`;
-}
-
-function cellOf(preset, cell) {
-  const field = preset.fields.find((f) => f.name === "cell");
-  return field?.choices?.includes(cell) ? { cell } : {};
 }
 
 /** The range of a row; empty ends are the limits of the field. */

@@ -4,7 +4,7 @@ import { post } from "../api.js";
 import { count, grouped } from "../format.js";
 import { Alert, Icon } from "../icons.js";
 import { BUDGETS, budgetBody, budgetTexts } from "./budgets.js";
-import { byGroup } from "./fieldnames.js";
+import { byGroup, presetFor, shownCell } from "./fieldnames.js";
 import { changed, Loading, OWN, parsed, presetField, StartForm, useForm } from "./formfields.js";
 
 const FIRST_FIELDS = ["cell", "learning.total_steps", "learning.n_envs", "learning.lr_start"];
@@ -14,8 +14,7 @@ const FIRST_FIELDS = ["cell", "learning.total_steps", "learning.n_envs", "learni
  */
 export function TrainForm({ presets: { items: presets, error }, cell, from, onStarted, onClose }) {
   const [name, setName] = useState(from?.preset ?? null);
-  const preset = presets?.find((p) => p.name === name)
-    ?? presets?.find((p) => p.cell === cell) ?? presets?.[0] ?? null;
+  const preset = presetFor(presets, name, cell);
   const fields = preset?.fields ?? [];
   const form = useForm({
     typed: { seed: String(from?.seed ?? 1), ...texts(from?.overrides), ...budgetTexts(from) },
@@ -60,12 +59,6 @@ export function TrainForm({ presets: { items: presets, error }, cell, from, onSt
         <legend>${group}</legend>${members.map(row)}</fieldset>`)}
     </details>`}
   </${StartForm}>`;
-}
-
-/** The cell that is shown, as if it had been chosen, where the preset can be trained in it. */
-function shownCell(preset, cell) {
-  const field = preset?.fields?.find((f) => f.name === "cell");
-  return field?.choices?.includes(cell) ? { cell } : {};
 }
 
 function overrides(preset, texts) {
