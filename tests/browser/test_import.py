@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from urllib.parse import parse_qs, urlsplit
 
 import pytest
 from playwright.sync_api import Page, Route, expect
@@ -70,6 +71,32 @@ def test_no_other_file_is_chosen_while_one_is_read(
     first_of(page, held).continue_()
     expect(page.locator('[data-role="import-error"]')).to_be_visible()
     expect(chooser).to_be_enabled()
+
+
+def test_what_is_stated_of_one_file_is_not_shown_for_the_next(
+    open_page: Callable[..., Page], tmp_path: Path
+) -> None:
+    clips = [tmp_path / "first.bvh", tmp_path / "second.bvh"]
+    for clip in clips:
+        clip.write_text("HIERARCHY\n", encoding="utf-8")
+    page = open_page(scene=False)
+    page.click('[data-mode="recorded"]')
+    page.set_input_files('[data-role="import-file"]', clips[0])
+    page.locator('[data-role="import-unit"]').fill(" cm ")
+    page.locator('[data-role="import-names"]').fill("Spine = chest; Neck=head ")
+    page.select_option('[data-role="import-up"]', "z")
+    for sent in (
+        {"unit": ["cm"], "up": ["z"], "map": ["Spine = chest", "Neck=head"]},
+        {},
+    ):
+        with page.expect_request("**/v1/recordings?*") as request:
+            page.click('[data-action="import"]')
+        asked = parse_qs(urlsplit(request.value.url).query)
+        assert {name: asked[name] for name in asked if name != "file_name"} == sent
+        expect(page.locator('[data-role="import-error"]')).to_be_visible()
+        page.set_input_files('[data-role="import-file"]', clips[1])
+        for role in ("import-unit", "import-root-unit", "import-up", "import-names"):
+            expect(page.locator(f'[data-role="{role}"]')).to_have_value("")
 
 
 @pytest.mark.usefixtures("emptied")

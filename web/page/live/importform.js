@@ -23,7 +23,7 @@ export function ImportForm({ onDone }) {
     setFile(null);
     onDone(made);
   });
-  const state = (name) => (e) => setStated((now) => ({ ...now, [name]: e.target.value.trim() }));
+  const state = (name) => (e) => setStated((now) => ({ ...now, [name]: e.target.value }));
   const choose = (e) => {
     setFile(e.target.files[0] ?? null);
     setStated({});
@@ -35,9 +35,10 @@ export function ImportForm({ onDone }) {
     e.preventDefault();
     const { names = "", ...others } = stated;
     const asked = [
-      ...Object.entries({ file_name: file.name, ...others }).filter(([, value]) => value),
-      ...names.split(";").filter((pair) => pair.trim()).map((pair) => ["map", pair]),
-    ];
+      ["file_name", file.name],
+      ...Object.entries(others).map(([name, value]) => [name, value.trim()]),
+      ...names.split(";").map((pair) => ["map", pair.trim()]),
+    ].filter(([, value]) => value);
     setMotion(null);
     run(() => postFile(`v1/recordings?${new URLSearchParams(asked)}`, file));
   };
@@ -53,18 +54,18 @@ export function ImportForm({ onDone }) {
       </datalist>
       <label class="stated" title=${NUMBER_TITLE}>Unit
         <input data-role="import-unit" list="import-units" placeholder="found"
-          onInput=${state("unit")} /></label>
+          value=${stated.unit ?? ""} onInput=${state("unit")} /></label>
       <label class="stated" title=${`Unit of the root's path, if another. ${NUMBER_TITLE}`}>Root
         <input data-role="import-root-unit" list="import-units" placeholder="same"
-          onInput=${state("root_unit")} /></label>
+          value=${stated.root_unit ?? ""} onInput=${state("root_unit")} /></label>
       <label class="stated" title="Axis that points up; found from the file if empty">Up
-        <select data-role="import-up" onChange=${state("up")}>
+        <select data-role="import-up" value=${stated.up ?? ""} onChange=${state("up")}>
           <option value="">found</option>
           ${UP_AXES.map((one) => html`<option key=${one} value=${one}>${one}</option>`)}
         </select></label>`}
     ${file && html`<label class="stated" title=${NAMES_TITLE}>Names
       <input class="names" data-role="import-names" placeholder="theirs=ours; …" spellcheck="false"
-        onInput=${state("names")} /></label>
+        value=${stated.names ?? ""} onInput=${state("names")} /></label>
     <button type="submit" class="tool" data-action="import"
       disabled=${busy}>${busy ? "Reading …" : "Import"}</button>`}
     ${error && html`<p class="field-error" role="alert" data-role="import-error">
