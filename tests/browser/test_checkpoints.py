@@ -123,6 +123,23 @@ def test_newest_list_of_checkpoints_is_not_replaced_by_an_older_answer(
     expect(acting.locator("option:checked")).to_contain_text("newer")
 
 
+def test_record_without_outcomes_is_shown(open_page: Callable[..., Page]) -> None:
+    """Older versions have stored records that are refused now."""
+
+    def incomplete(route: Route) -> None:
+        answer = route.fetch()
+        stored = answer.json()
+        for one in stored["items"]:
+            one["manifest"]["recalibration"] = {"outcomes": None}
+        route.fulfill(response=answer, json=stored)
+
+    page = open_page(scene=False)
+    page.route("**/v1/checkpoints?limit=100", incomplete)
+    page.click("#tab-training")
+    page.click(f"{card('reach')} .job-head")
+    expect(page.locator(f"{card('reach')} .facts")).to_contain_text("0 outcomes, from –")
+
+
 def test_uploaded_files_make_the_same_checkpoint(open_page: Callable[..., Page]) -> None:
     page = opened(open_page, "pick")
     files = page.locator("[data-role=checkpoint-files]")

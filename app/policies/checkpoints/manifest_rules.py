@@ -11,6 +11,7 @@ from typing import Any, TypeGuard
 
 from app.errors import InvalidInput, interval
 from app.one_line import ONE_LINE
+from app.sim.cells.parts import CELL_NAME
 
 MAX_NAME = 64
 """Longest name of a preset [characters]."""
@@ -32,6 +33,9 @@ def check_values(manifest: Mapping[str, Any]) -> None:
         if not low <= (value := manifest[name]) <= high:
             rule = f"must lie in {interval(low, high)} {unit}".rstrip()
             raise InvalidInput(f"manifest.{name}", value, rule)
+    if not re.fullmatch(CELL_NAME, manifest["cell"]):
+        rule = f"must be the name of a cell, which matches {CELL_NAME}"
+        raise InvalidInput("manifest.cell", manifest["cell"], rule)
     _check_preset(manifest["preset"])
     _check_layout(manifest["layout"])
     _check_origin(manifest)
@@ -56,7 +60,7 @@ def _check_layout(layout: Sequence[Any]) -> None:
 
 
 def _check_origin(manifest: Mapping[str, Any]) -> None:
-    """Check processor time, versions and commits, which a manifest may lack."""
+    """Check what a manifest may lack: processor time, versions, commits, recalibration."""
     cpu_s = manifest.get("cpu_s", 0.0)
     if not _is_finite(cpu_s) or cpu_s < 0.0:
         raise InvalidInput("manifest.cpu_s", cpu_s, "must be a finite number, at least 0 s")
@@ -67,6 +71,22 @@ def _check_origin(manifest: Mapping[str, Any]) -> None:
     commits = manifest.get("commits", [])
     if not isinstance(commits, list) or not _are_texts(commits):
         raise InvalidInput("manifest.commits", commits, "must be a list of texts")
+    if "recalibration" in manifest:
+        _check_recalibration(manifest["recalibration"])
+
+
+def _check_recalibration(record: object) -> None:
+    if not isinstance(record, dict):
+        raise InvalidInput("manifest.recalibration", record, "must be an object")
+    if not isinstance(record.get("from"), str):
+        rule = "must be text, the id of a checkpoint"
+        raise InvalidInput("manifest.recalibration.from", record.get("from"), rule)
+    counts = record.get("outcomes")
+    if not isinstance(counts, dict) or not all(
+        is_whole(n) and 0 <= n <= MAX_WHOLE for n in counts.values()
+    ):
+        rule = "must be an object of whole numbers, the count of each outcome"
+        raise InvalidInput("manifest.recalibration.outcomes", counts, rule)
 
 
 def check_ranges(ranges: Mapping[str, Any], sizes: Mapping[str, int], purpose: str) -> None:

@@ -20,6 +20,7 @@ from pydantic import (
 from pydantic.fields import FieldInfo
 
 from app.errors import InvalidInput, interval
+from app.sim.cells.parts import CELL_NAME
 
 
 def _integral(value: object) -> object:
@@ -31,7 +32,7 @@ Whole = Annotated[int, BeforeValidator(_integral)]
 """An integer; whole floats are accepted."""
 
 
-CellName = Annotated[str, Field(pattern=r"^[a-z][a-z0-9-]{0,63}$")]
+CellName = Annotated[str, Field(pattern=CELL_NAME)]
 """Name of a work cell; whether it exists is checked elsewhere."""
 
 

@@ -20,6 +20,7 @@ from pydantic import Field, ValidationError
 
 from app.errors import CheckpointMismatch, InvalidInput, NotFound
 from app.sim.cells.parts import (
+    CELL_NAME,
     CellData,
     CellSafety,
     GoalRegion,
@@ -42,7 +43,7 @@ MAX_TARGETS = 2000
 class Cell(CellData):
     """One work cell."""
 
-    name: str = Field(pattern=r"^[a-z][a-z0-9-]{0,63}$", description="name in requests")
+    name: str = Field(pattern=CELL_NAME, description="name in requests")
     title: Label = Field(description="name for people")
     table: TableGeometry
     robot: RobotMount

@@ -63,6 +63,8 @@ Radius = Annotated[float, Within(0.05, 1.0, "m")]
 Share = Annotated[float, Within(0.0, 1.0, "")]
 Seconds = Annotated[float, Within(0.0, 5.0, "s")]
 Uncertainty = Annotated[float, Within(0.0, 1.0, "m")]
+CELL_NAME = r"^[a-z][a-z0-9-]{0,63}$"
+"""Pattern of the names of cells."""
 Label = Annotated[str, Field(min_length=1, max_length=80)]
 Id = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_-]{0,31}$")]
 

@@ -63,12 +63,31 @@ def test_preset_without_a_field_is_refused():
         *(("cpu_s", value) for value in (True, None, "1", -0.5, [], np.inf, np.nan)),
         *(("versions", value) for value in (None, [], "3.11", {"python": 3.11}, {"a": None})),
         *(("commits", value) for value in (None, {}, "5b8bc9540cf0", [1], ["a", None])),
+        *(("cell", value) for value in ("", "Cell", "a b", "a\n", "a" * 65)),
+        *(("recalibration", value) for value in (None, [], "pick", 3)),
     ],
 )
 def test_values_that_no_training_writes_are_refused(field, value):
     with pytest.raises(InvalidInput) as caught:
         loaded("reach", **{field: value})
     assert caught.value.field == f"manifest.{field}"
+
+
+@pytest.mark.parametrize("alias", ["pick", "reach", "sorting-e0"])
+@pytest.mark.parametrize(
+    ("field", "change"),
+    [
+        *(("outcomes", {"outcomes": n}) for n in (None, [1], 3, {"success": 1.0})),
+        *(("outcomes", {"outcomes": {"success": n}}) for n in (-1, True, None, 2**63)),
+        *(("from", {"from": value}) for value in (None, 3, {})),
+    ],
+)
+def test_record_of_a_recalibration_counts_outcomes(alias, field, change):
+    record = {"from": "a" * 64, "outcomes": {"success": 40, "collision": 10, "timeout": 0}}
+    assert loaded(alias, recalibration=record).manifest["recalibration"] == record
+    with pytest.raises(InvalidInput) as caught:
+        loaded(alias, recalibration={**record, **change})
+    assert caught.value.field == f"manifest.recalibration.{field}"
 
 
 @pytest.mark.parametrize(

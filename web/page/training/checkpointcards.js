@@ -101,7 +101,7 @@ function facts(one) {
 /** Origin of recalibrated probabilities, if a checkpoint has them. */
 function recalibration(record) {
   if (!record) return {};
-  const n = Object.values(record.outcomes).reduce((sum, count) => sum + count, 0);
+  const n = Object.values(record.outcomes ?? {}).reduce((sum, count) => sum + count, 0);
   return { "Recalibrated by": `${format.count(n, "outcome")}, from ${format.short(record.from)}` };
 }
 
