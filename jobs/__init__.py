@@ -11,6 +11,7 @@ executor           Executor of attempts: one local process per attempt
 import_process     Import of a file in its own process: ``python -m jobs.import_process``
 inputs             Inputs of a job: its cell, checkpoint and recordings, and the files of its
                    replay memory
+job_changes        What can be changed of a posted job: labels and budgets
 recording_catalog  Stored recordings by name: files in, runs of the 18-DoF human model out
 recording_format   The stored form of a recording
 remote/            Workers that reach their job over HTTP, and the executor on Ray

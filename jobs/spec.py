@@ -10,10 +10,9 @@
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, TypeAdapter
+from pydantic import Field, TypeAdapter
 
 from app.errors import InvalidInput
-from app.one_line import ONE_LINE
 from app.policies.configs import presets
 from app.policies.configs.fields import entries
 from app.policies.evaluation.registry import (
@@ -26,6 +25,7 @@ from app.policies.evaluation.registry import (
 )
 from app.policies.report.page import evaluations
 from app.store.records import JobRecord, NewJob
+from jobs.job_changes import Budget, JobChanges, JobLabels, StrictModel
 
 MAX_SEED = 2**31 - 1
 """Greatest seed; every random stream accepts it."""
@@ -43,65 +43,10 @@ OBJECTIVES: Mapping[str, tuple[str, ...]] = {
     "sorting": ("sorting-grid", "sorting-tests"),
 }
 """Evaluations that a sweep can use, by scenario: each states rates in its first row."""
-MAX_STEPS = 1_000_000_000
-"""Greatest step budget."""
-MAX_TIME_S = 366 * 86_400.0
-"""Greatest time budget [s]."""
+
 
 Seed = Annotated[int, Field(ge=0, le=MAX_SEED)]
 Name = Annotated[str, Field(min_length=1, max_length=64)]
-
-
-class _Strict(BaseModel):
-    """Base without unknown fields, non-finite numbers and values of another JSON type."""
-
-    model_config = ConfigDict(extra="forbid", allow_inf_nan=False, frozen=True, strict=True)
-
-
-class JobLabels(_Strict):
-    """What people write on a job; it changes nothing of what the job computes."""
-
-    name: Annotated[str, Field(pattern=ONE_LINE, max_length=80)] | None = Field(
-        None, description="a name for people, one line"
-    )
-    notes: Annotated[str, Field(max_length=4000)] | None = Field(
-        None, description="text for people"
-    )
-    priority: Annotated[int, Field(ge=-100, le=100)] = Field(
-        0, description="queued jobs of a higher priority start first"
-    )
-
-    def labels(self) -> dict[str, Any]:
-        """Return the labels; an empty text counts as none."""
-        return {
-            "name": (self.name or "").strip() or None,
-            "notes": (self.notes or "").strip() or None,
-            "priority": self.priority,
-        }
-
-
-class Budget(_Strict):
-    """What a job may use before it ends and keeps its state; part of no spec."""
-
-    step_budget: Annotated[int, Field(ge=1, le=MAX_STEPS)] | None = Field(
-        None,
-        description="environment steps: the job ends at the first point of its curve at or "
-        "beyond it, and can be resumed with a larger one; null for none",
-    )
-    time_budget_s: Annotated[float, Field(ge=1, le=MAX_TIME_S)] | None = Field(
-        None,
-        description="run time of all attempts, without waiting in the queue [s]: the job ends "
-        "after the step in which it is reached; null for none",
-    )
-
-
-class JobChanges(JobLabels, Budget):
-    """What can be changed of a posted job."""
-
-    def given(self) -> dict[str, Any]:
-        """Return the given members; an empty text counts as none."""
-        members = {**self.labels(), **self.model_dump(include=set(Budget.model_fields))}
-        return {name: members[name] for name in members if name in self.model_fields_set}
 
 
 class _Spec(JobLabels):
@@ -185,7 +130,7 @@ class EvaluateSpec(_Spec):
         return NewJob(kind=self.kind, spec=spec, seed=self.seed, **self.labels())
 
 
-class Range(_Strict):
+class Range(StrictModel):
     """Values of one field of a sweep: from ``low`` to ``high``, or some ``choices``."""
 
     low: float | None = Field(None, description="least value")
@@ -218,7 +163,7 @@ class Range(_Strict):
         return {"low": self.low, "high": self.high}
 
 
-class Objective(_Strict):
+class Objective(StrictModel):
     """What the trials of a sweep are compared by: a rate of an evaluation."""
 
     protocol: Name = Field(description="an evaluation of the preset's scenario")

@@ -11,7 +11,7 @@ from playwright.sync_api import Page, Route, expect
 from app.sim.cells.cell import load_cell
 from tests.browser.conftest import show
 from tests.browser.test_drag import tell
-from tests.browser.test_training import GROWTH_MS, open_form
+from tests.browser.test_training import GROWTH_MS, open_form, stop
 from tests.support import patient_http
 
 pytestmark = pytest.mark.browser
@@ -84,6 +84,22 @@ def test_number_beyond_those_of_json_is_refused(open_page: Callable[..., Page]) 
     page.click("form.train [type=submit]")
     for name in ("step_budget", "time_budget_s"):
         expect(page.locator(f"#train-{name}-error")).to_be_visible()
+
+
+def test_limits_of_a_time_budget_in_minutes_have_their_unit(
+    open_page: Callable[..., Page],
+) -> None:
+    page = open_page((1280, 900), scene=False)
+    open_form(page)
+    expect(page.locator("#train-time_budget_s-help")).to_contain_text("1 s to 366 days.")
+    for minutes in ("0.01", "600000"):
+        page.fill("#train-time_budget_s", minutes)
+        page.click("form.train [type=submit]")
+        expect(page.locator("#train-time_budget_s-error")).to_have_text(
+            "Must lie in [1, 31622400] s."
+        )
+        page.fill("#train-time_budget_s", "")
+        expect(page.locator("#train-time_budget_s-error")).to_have_count(0)
 
 
 def test_phone_offers_letters_for_a_name_and_digits_for_a_number(
@@ -177,6 +193,47 @@ def test_focus_goes_to_the_next_job_when_one_is_deleted_and_then_to_the_heading(
     expect(page.locator("#jobs-title")).to_be_focused()
 
 
+SWEEP = {
+    "kind": "sweep",
+    "preset": "pick-td3",
+    "trials": 2,
+    "ranges": {"learning.gamma": {"low": 0.9, "high": 0.99}},
+    "objective": {"protocol": "pick-single", "quantity": "success"},
+}
+
+
+@pytest.mark.parametrize(
+    ("body", "loss"),
+    [
+        (
+            {"kind": "train", "preset": "pick-td3"},
+            "Its curve and its checkpoints without an alias go with it.",
+        ),
+        ({"kind": "evaluate", "protocol": "pick-single"}, "Its result goes with it."),
+        (
+            {"kind": "report", "measure": True},
+            "Its result goes with it; its evaluations become jobs of their own.",
+        ),
+        (SWEEP, "Its trials become jobs of their own."),
+    ],
+)
+def test_question_before_a_job_is_deleted_says_what_goes_with_it(
+    open_page: Callable[..., Page], server: str, body: dict[str, Any], loss: str
+) -> None:
+    posted = patient_http.post(f"{server}/v1/jobs", json=body)
+    assert posted.status_code == 202, posted.text
+    stop(server, posted.json())
+    page = open_page(scene=False)
+    page.click("#tab-training")
+    row = page.locator(f'[data-job="{posted.json()["id"]}"]')
+    if "is-open" not in (row.get_attribute("class") or ""):
+        row.locator(".job-head").click()
+    row.locator('[data-action="delete"]').click()
+    expect(row.locator(".confirm > span")).to_have_text(f"Delete it? {loss}")
+    row.locator('[data-action="delete-yes"]').click()
+    expect(row).to_have_count(0)
+
+
 def test_evaluation_is_started_with_choices_of_the_server(
     open_page: Callable[..., Page], server: str
 ) -> None:
@@ -214,6 +271,19 @@ def test_evaluation_is_started_with_choices_of_the_server(
 def job(server: str, job_id: str | None) -> dict[str, Any]:
     found: dict[str, Any] = patient_http.get(f"{server}/v1/jobs/{job_id}").json()
     return found
+
+
+def test_choice_of_a_drawn_field_keeps_the_focus(open_page: Callable[..., Page]) -> None:
+    page = open_page((1280, 900), scene=False)
+    open_form(page)
+    page.click('[data-kind="sweep"]')
+    page.click('[data-action="add-range"]')
+    for row in (page.locator(".drawn").first, page.locator(".drawn").last):
+        before = row.get_attribute("data-path")
+        row.locator("select").focus()
+        page.keyboard.press("ArrowDown")
+        expect(row).not_to_have_attribute("data-path", before or "")
+        expect(row.locator("select")).to_be_focused()
 
 
 def test_sweep_shows_its_trials_and_marks_the_best(

@@ -100,6 +100,12 @@ def test_broken_rule_names_field_and_rule(body: dict[str, Any], field: str, rule
     assert re.fullmatch(field, caught.value.field)
 
 
+@pytest.mark.parametrize("seconds", [0.6, 4e7])
+def test_limits_of_a_time_budget_have_their_unit(seconds: float) -> None:
+    with pytest.raises(ValidationError, match=r"must lie in \[1, 31622400\] s "):
+        parse_spec(TRAIN | {"time_budget_s": seconds})
+
+
 def test_evaluation_beside_recorded_people_names_stored_recordings() -> None:
     spec = parse_spec(RECORDED)
     assert isinstance(spec, EvaluateSpec)

@@ -21,7 +21,8 @@ from app.api.schemas.jobs import JobPublic
 from app.api.services import ServicesDep
 from app.api.validation import validated
 from app.store import job_actions, jobs
-from jobs.spec import Budget, JobChanges, budgets, merge, require_budgeted, spec_type
+from jobs.job_changes import Budget, JobChanges
+from jobs.spec import budgets, merge, require_budgeted, spec_type
 
 CHANGES = Body(
     description="fields that differ from the job's spec, as a JSON merge patch (RFC 7396): "

@@ -7,7 +7,8 @@ from app.api.schemas.jobs import JobList, JobPublic, MetricsPublic
 from app.api.schemas.presets import PresetList
 from app.api.schemas.protocols import ProtocolList
 from app.client.transport import StreamEvent, Transport
-from jobs.spec import Budget, EvaluateSpec, JobChanges, ReportSpec, SweepSpec, TrainSpec
+from jobs.job_changes import Budget, JobChanges
+from jobs.spec import EvaluateSpec, ReportSpec, SweepSpec, TrainSpec
 
 
 class JobsOperations(Transport):

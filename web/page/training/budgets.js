@@ -11,7 +11,7 @@ export const BUDGETS = [
   { name: "step_budget", title: "Step budget", unit: "env steps", default: "",
     help: "It ends at the first point of its curve beyond and can be resumed; empty for none" },
   { name: "time_budget_s", title: "Time budget", unit: "min", default: "",
-    help: "Run time, without waiting in the queue; it can be resumed; empty for none" },
+    help: "Run time, without waiting in the queue; it can be resumed; empty for none. 1 s to 366 days" },
 ];
 
 /** The budgets of a job as texts of a form. */

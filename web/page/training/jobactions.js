@@ -45,17 +45,24 @@ export function JobActions({ job, onChanged, onOpen, onClone }) {
     <${Fault} error=${again.error} />`;
 }
 
+/** What goes with a job that is deleted, by its kind. */
+function lossOf({ kind, spec }) {
+  if (kind === "train") return "Its curve and its checkpoints without an alias go with it.";
+  if (kind === "sweep") return "Its trials become jobs of their own.";
+  return `Its result goes with it${spec.measure ? "; its evaluations become jobs of their own" : ""}.`;
+}
+
 function Cancel({ job, onChanged }) {
   const cancelling = useAction(onChanged);
   if (job.state === "cancelling") return html`<span class="faint">Stopping …</span>`;
-  return html`<${Ask} name="cancel" label="Cancel …" question="Cancel it? Its checkpoints stay."
-    yes="Cancel the job" no="Keep going" action=${cancelling}
+  return html`<${Ask} name="cancel" label="Cancel …" yes="Cancel the job" no="Keep going" action=${cancelling}
+    question=${job.kind === "train" ? "Cancel it? Its checkpoints stay." : "Cancel it?"}
     onYes=${() => post(`v1/jobs/${job.id}/cancel`)} />`;
 }
 
 function Delete({ job, onDone }) {
   return html`<${Ask} name="delete" label="Delete …" yes="Delete the job" no="Keep it"
-    question="Delete it? Its curve and its checkpoints go with it." action=${useAction(onDone)}
+    question=${`Delete it? ${lossOf(job)}`} action=${useAction(onDone)}
     onYes=${() => remove(`v1/jobs/${job.id}`)} />`;
 }
 

@@ -6,6 +6,7 @@ import { byGroup, presetFor, shownCell } from "./fieldnames.js";
 import { Loading, OWN, parsed, presetField, protocolField, StartForm, useForm } from "./formfields.js";
 
 const MAX_RANGES = 8;
+const FIRST_RANGE = { id: 0, path: "learning.lr_start" }; // rows keep their id when their field changes
 const COUNTS = [
   { name: "trials", title: "Trials", default: 20, minimum: 2, maximum: 200,
     help: "Trainings with drawn fields, each evaluated" },
@@ -24,7 +25,7 @@ const PRUNE = { name: "prune", title: "Pruning", default: "true", choices: ["tru
 
 export function SweepForm({ protocols, presets: { items: presets, error }, cell, onStarted, onClose }) {
   const [name, setName] = useState(null);
-  const [ranges, setRanges] = useState([{ path: "learning.lr_start" }]);
+  const [ranges, setRanges] = useState([FIRST_RANGE]);
   const preset = presetFor(presets, name, cell);
   const total = preset?.fields.find((f) => f.name === "learning.total_steps");
   const own = [...OWN, ...COUNTS, QUANTITY, EPISODES, PRUNE].map((f) => f.name);
@@ -56,7 +57,7 @@ export function SweepForm({ protocols, presets: { items: presets, error }, cell,
     note="Its trainings wait in the queue like others." onClose=${onClose}>
     ${form.row(presetField(presets, preset), {}, (chosen) => {
       setName(chosen);
-      setRanges([{ path: "learning.lr_start" }]);
+      setRanges([FIRST_RANGE]);
       form.start({});
     })}
     ${OWN.map((field) => form.row(field))}
@@ -64,12 +65,12 @@ export function SweepForm({ protocols, presets: { items: presets, error }, cell,
     <fieldset class="field-list"><legend>Drawn fields</legend>
       <p class="field-help">Each trial draws its values from these ranges; log draws small and large
         ones alike.</p>
-      ${ranges.map((one, place) => html`<${RangeRow} key=${one.path} one=${one} drawable=${drawable} free=${free}
+      ${ranges.map((one, place) => html`<${RangeRow} key=${one.id} one=${one} drawable=${drawable} free=${free}
         fault=${form.faults[`ranges.${one.path}`]} onChange=${(more) => change(place, more)}
         onRemove=${ranges.length > 1 ? () => setRanges((now) => now.filter((_, k) => k !== place)) : null} />`)}
       ${form.faults.ranges && html`<p class="field-error" role="alert">${form.faults.ranges}</p>`}
       ${ranges.length < MAX_RANGES && html`<button type="button" class="tool" data-action="add-range"
-        onClick=${() => setRanges((now) => [...now, { path: free[0].name }])}>
+        onClick=${() => setRanges((now) => [...now, { id: now.at(-1).id + 1, path: free[0].name }])}>
         <${Icon} name="plus" />Add a field</button>`}
     </fieldset>
     ${COUNTS.map((field) => form.row(field))}
