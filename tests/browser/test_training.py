@@ -250,6 +250,26 @@ def test_jobs_are_compared_with_a_band_over_seeds(
     assert page.problems == []  # type: ignore[attr-defined]
 
 
+def test_groups_of_a_comparison_look_different(
+    open_page: Callable[..., Page], ended: dict[str, Any]
+) -> None:
+    jobs = [{**ended, "id": f"job-{n}", "number": n} for n in range(20)]
+    curve = {"mean": [0.1, 0.5], "low": [0.1, 0.5], "high": [0.1, 0.5], "n": [1, 1]}
+    groups = [{"label": "", "jobs": [job["id"]], **curve} for job in jobs]
+    rates = {"quantity": "success", "quantities": ["success"], "steps": [0, 100]}
+    answer = {"jobs": jobs, "groups": groups, "differences": [], **rates}
+    page = open_page((1280, 900), scene=False)
+    page.route("**/v1/comparison?*", lambda route: route.fulfill(json=answer))
+    page.click("#tab-training")
+    page.click('[data-action="compare"]')
+    page.check(f'[data-job="{ended["id"]}"] [data-role="compare"]')
+    page.click('[data-action="show-comparison"]')
+    marks = page.locator('[data-role="groups"] .line-mark')
+    expect(marks).to_have_count(20)
+    looks = marks.evaluate_all("all => all.map((one) => getComputedStyle(one).background)")
+    assert len(set(looks)) == 20
+
+
 def cancel(page: Page) -> None:
     page.get_by_role("button", name="Cancel …").click()
     page.get_by_role("button", name="Cancel the job").click()

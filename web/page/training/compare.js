@@ -14,6 +14,7 @@ const QUANTITIES = { success: "success [%]", collision: "collision [%]", timeout
   updates_per_s: "updates per s", steps_per_s: "steps per s" };
 const NAMED = 3; // fields that the name of a group lists
 const HEIGHT = 300;
+const PATTERN = [8, 4]; // line and gap of groups whose colour an earlier one has [px]
 
 const quantityName = (name) => QUANTITIES[name] ?? name.replaceAll("_", " ");
 
@@ -63,7 +64,7 @@ function Curves({ found, query, dialog, onQuantity }) {
       <span>${!Number.isInteger(at)
       ? "last point of each curve" : format.count(found.steps[at], "step")}</span></p>
     <ul class="groups" data-role="groups">${found.groups.map((group, i) => html`
-      <li key=${group.jobs[0]}><i class="line-mark" style=${{ background: colour(i) }}></i>
+      <li key=${group.jobs[0]}><i class="line-mark" style=${{ background: markOf(i) }}></i>
         <b>${group.label}</b> <span>${seedsOf(group, found)}</span>
         <span class="readout">${readout(group, at ?? lastOf(group), found.quantity)}</span></li>`)}</ul>
     <p class="field-help">Line: mean over the seeds. Band: from the least to the greatest
@@ -95,6 +96,18 @@ function colour(i, alpha = 1) {
   return GOALS[i % GOALS.length].replace(")", ` / ${alpha})`);
 }
 
+/** Lengths of line and gap of a group whose colour an earlier one has; [] for an unbroken line. */
+function patternOf(i) {
+  return i < GOALS.length ? [] : PATTERN;
+}
+
+/** The background of a group's mark in the legend. */
+function markOf(i) {
+  const [line, gap] = patternOf(i);
+  return line ? `repeating-linear-gradient(90deg, ${colour(i)} 0 ${line / 2}px, transparent 0 ${
+    (line + gap) / 2}px)` : colour(i);
+}
+
 function GroupPlot({ found, onHover }) {
   const theme = useTheme();
   const hover = useRef(onHover);
@@ -123,7 +136,7 @@ function groupOptions(theme, { groups, quantity }, hover) {
       axis(theme, { size: 52, space: 30, values: (_, t) => t.map(show) }),
     ],
     series: [{}, ...groups.flatMap((group, i) => [
-      { stroke: colour(i), width: 2, spanGaps: true,
+      { stroke: colour(i), width: 2, dash: patternOf(i), spanGaps: true,
         points: { show: (plot) => plot.data[0].length < 3, size: 5 } },
       edge, edge,
     ])],
@@ -198,8 +211,13 @@ function savePicture(dialog, found) {
   pen.drawImage(plot, margin, top);
   found.groups.forEach((group, i) => {
     const y = top + plot.height + line * (i + 1.5);
-    pen.fillStyle = colour(i);
-    pen.fillRect(margin, y - 6 * scale, 16 * scale, 3 * scale);
+    pen.strokeStyle = colour(i);
+    pen.lineWidth = 3 * scale;
+    pen.setLineDash(patternOf(i).map((v) => (v / 2) * scale));
+    pen.beginPath();
+    pen.moveTo(margin, y - 4.5 * scale);
+    pen.lineTo(margin + 16 * scale, y - 4.5 * scale);
+    pen.stroke();
     const last = readout(group, lastOf(group), found.quantity);
     write(`${group.label} · ${seedsOf(group, found)} · last ${last}`, margin + 26 * scale, y);
   });
