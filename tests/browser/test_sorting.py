@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterator
 
 import pytest
-from playwright.sync_api import Page, expect
+from playwright.sync_api import Page, Route, expect
 
 from app.sim.cells.cell import load_cell
 from tests.browser.conftest import show
@@ -121,6 +121,31 @@ def test_page_counts_the_commands_that_a_world_refuses(
     expect(page.locator(".banner.bad")).to_contain_text("cell7")
     expect(page.locator(".banner.bad")).to_contain_text("(2 commands)")
     assert [one["place"] for one in task(sorting)["blocks"]].count("cell7") == 1
+
+
+@pytest.mark.usefixtures("sorting")
+def test_row_of_benchmark_tasks_counts_those_of_the_cell(
+    open_page: Callable[..., Page],
+) -> None:
+    page = open_page(scene=False)
+    row = page.locator(".dock-cases")
+    expect(row).to_contain_text("6 sorting tests of the thesis")
+    kept = [1]
+
+    def fewer(route: Route) -> None:
+        answer = route.fetch()
+        cells = answer.json()
+        for one in cells["items"]:
+            one["sorting_tests"] = one["sorting_tests"][: kept[-1]]
+        route.fulfill(response=answer, json=cells)
+
+    page.route("**/v1/cells", fewer)
+    page.reload()
+    expect(row).to_contain_text("1 sorting test of the thesis")
+    kept.append(0)
+    page.reload()
+    expect(page.locator(".towers")).to_be_visible()
+    expect(row).to_have_count(0)
 
 
 def test_sorting_page_fits_a_phone(open_page: Callable[..., Page], sorting: str) -> None:

@@ -1,5 +1,6 @@
 // Controls of the cell: people, clock, goals, scenarios.
 import { html } from "../vendor/htm-preact-standalone.module.js";
+import { count } from "../format.js";
 import { Icon } from "../icons.js";
 import { People } from "./people.js";
 import { Presets } from "./presets.js";
@@ -9,6 +10,7 @@ import { ReachControls } from "../reach/reachcontrols.js";
 const SPEEDS = [1, 2, 4, 8];
 
 export function Controls({ world, cell, cases, send, colourOf, labelOf }) {
+  const tests = cell?.sorting_tests ?? [];
   return html`<section class="dock" aria-label="Controls of the cell">
     <${People} world=${world} send=${send}>
       <div class="transport" role="group" aria-label="Clock">
@@ -35,9 +37,9 @@ export function Controls({ world, cell, cases, send, colourOf, labelOf }) {
     ${world.reach ? html`<${ReachControls} world=${world} send=${send} />`
       : world.sorting
       ? html`<div class="dock-row dock-wrap"><${SafetyControls} world=${world} send=${send} /></div>
-        <${Presets} label="Benchmark tasks" items=${cell?.sorting_tests ?? []} tag="start-test"
+        ${tests.length > 0 && html`<${Presets} label="Benchmark tasks" items=${tests} tag="start-test"
           running=${world.sorting.test} send=${send}
-          hint="Six sorting tests of the thesis: the cell is set up and the robot sorts." />`
+          hint=${`${count(tests.length, "sorting test")} of the thesis: the cell is set up and the robot sorts.`} />`}`
       : html`<div class="dock-row">
           <span class="dock-label" id="goals-label">Goals</span>
           <${Goals} world=${world} cell=${cell} send=${send} colourOf=${colourOf}
@@ -46,7 +48,7 @@ export function Controls({ world, cell, cases, send, colourOf, labelOf }) {
         <div class="dock-row dock-wrap"><${SafetyControls} world=${world} send=${send} /></div>
         ${cases.length > 0 && html`<${Presets} label="Scenarios" items=${cases} tag="start-case"
           running=${world.case} send=${send}
-          hint="Four case studies of thesis table 5.3: the person reaches in, the robot selects the better goal." />`}`}
+          hint=${`${count(cases.length, "case study", "case studies")} of thesis table 5.3: the person reaches in, the robot selects the better goal.`} />`}`}
   </section>`;
 }
 
