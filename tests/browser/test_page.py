@@ -85,6 +85,22 @@ def test_values_of_another_cell_are_forgotten(open_page: Callable[..., Page]) ->
     assert kept == ["two"]
 
 
+def test_safety_layer_of_a_paused_cell_is_drawn_again_when_it_changes(
+    open_page: Callable[..., Page],
+) -> None:
+    page = open_page(scene=False)
+    drawn = page.evaluate("""async () => {
+      const { SafetyHistory } = await import("./static/live/safetyhistory.js");
+      const history = new SafetyHistory();
+      const versions = [[1, 1], [2, 0.5], [2, 0.5], [2, 0.25]].map(([tick, separation]) => {
+        history.add({ tick, t_s: tick / 20, safety: { separation } });
+        return history.version;
+      });
+      return [versions, history.columns([(one) => one.separation])[1]];
+    }""")
+    assert drawn == [[1, 2, 2, 3], [1, 0.25]]
+
+
 def test_long_names_of_goals_are_cut_beside_their_values_and_given_in_full(
     open_page: Callable[..., Page],
 ) -> None:

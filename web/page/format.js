@@ -6,6 +6,11 @@ const MINUS = "\u2212";
 const NB = "\u00a0"; // no line ends between a number and its unit
 const DAY_S = 24 * 3600;
 
+/** A finite number; null for anything else. */
+export function finite(v) {
+  return typeof v === "number" && Number.isFinite(v) ? v : null;
+}
+
 /** A critic's value with two decimals and a true minus sign. */
 export function value(v) {
   if (v === null || v === undefined || !Number.isFinite(v)) return "–";

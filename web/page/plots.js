@@ -115,7 +115,7 @@ export function CurvePlot({ rows, lines, height, label, unit, range, sync, onHov
   const options = useMemo(
     () => curveOptions(theme, lines, unit, range, sync, hover), [key, theme, unit, sync]);
   const data = useMemo(
-    () => [rows.map((r) => r.step), ...lines.map((l) => rows.map((r) => finite(r[l.key])))],
+    () => [rows.map((r) => r.step), ...lines.map((l) => rows.map((r) => format.finite(r[l.key])))],
     [rows, key]);
   return html`<${Plot} options=${options} data=${data} height=${height} label=${label} />`;
 }
@@ -150,8 +150,4 @@ function curveOptions(theme, lines, unit, range, sync, hover) {
     ],
     hooks: { setCursor: [(plot) => hover.current?.(plot.cursor.idx)] },
   };
-}
-
-function finite(v) {
-  return typeof v === "number" && Number.isFinite(v) ? v : null;
 }

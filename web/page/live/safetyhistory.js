@@ -1,4 +1,5 @@
 // The last seconds of override and separation, for the running plots of the safety layer.
+import { finite } from "../format.js";
 
 export const SAFETY_SPAN_S = 20;
 
@@ -10,16 +11,21 @@ export class SafetyHistory {
   constructor() {
     this.samples = [];
     this.tick = -1;
+    this.version = 0; // counts the changes of the samples
   }
 
-  /** Add what a snapshot says, once. */
+  /** Add what a snapshot says, once; a paused cell says more of the same tick while people are dragged. */
   add({ tick, t_s: t, safety }) {
-    if (tick === this.tick) return;
     const last = this.samples.at(-1);
-    if (tick < this.tick || (last && t < last.t)) this.samples = [];
+    const sample = { t, ...Object.fromEntries(KEYS.map((key) => [key, safety[key]])) };
+    if (tick === this.tick) {
+      if (KEYS.every((key) => sample[key] === last[key])) return;
+      this.samples.pop();
+    } else if (tick < this.tick || (last && t < last.t)) this.samples = [];
     else if (last && t - last.t > GAP_S) this.samples.push({ t: last.t + 1e-3 });
     this.tick = tick;
-    this.samples.push({ t, ...Object.fromEntries(KEYS.map((key) => [key, safety[key]])) });
+    this.version += 1;
+    this.samples.push(sample);
     while (this.samples[0].t < t - SAFETY_SPAN_S) this.samples.shift();
   }
 
@@ -35,8 +41,4 @@ export class SafetyHistory {
       ...functions.map((f) => this.samples.map((one) => finite(f(one)))),
     ];
   }
-}
-
-function finite(v) {
-  return typeof v === "number" && Number.isFinite(v) ? v : null;
 }

@@ -31,7 +31,7 @@ export function OverridePlot({ history, on }) {
     ],
   }), [theme, on]);
   const data = useMemo(() => history.columns([(s) => (on ? null : s.advised), (s) => s.override]),
-    [history.tick, on]);
+    [history.version, on]);
   const now = data[2].at(-1);
   const label = `Override over the last ${SAFETY_SPAN_S} seconds; now ` +
     `${Number.isFinite(now) ? Math.round(100 * now) : "unknown"} percent`;
@@ -69,7 +69,7 @@ export function SeparationPlot({ history }) {
     (s) => s.margin + s.robot_distance,
     (s) => (s.required === null ? null : s.margin),
     (s) => Math.max(0, s.separation),
-  ].map((f) => (s) => (Number.isFinite(s.separation) ? f(s) : null))), [history.tick]);
-  const label = `Distance to the nearest person over the last ${SAFETY_SPAN_S} seconds, over the terms of S_p`;
+  ].map((f) => (s) => (Number.isFinite(s.separation) ? f(s) : null))), [history.version]);
+  const label = `Separation distance of the person who limits the override, or would first, over the last ${SAFETY_SPAN_S} seconds and the terms of S_p`;
   return html`<${Plot} options=${options} data=${data} height=${HEIGHT.separation} label=${label} />`;
 }
