@@ -24,6 +24,11 @@ export function Segmented({ label, labelledby, value, items, onPick, mark }) {
   </div>`;
 }
 
+/** The data attribute of a choice's buttons, such as `data-choice="safety:off"`. */
+export function marked(name) {
+  return (one) => ({ "data-choice": `${name}:${one}` });
+}
+
 /** Index of the button that a key moves to from the one that has the focus, or null. */
 function next(key, group, n) {
   if (key === "Home") return 0;

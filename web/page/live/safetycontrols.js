@@ -1,6 +1,6 @@
 // Controls of the safety layer: whether it acts, and its assumptions.
 import { html } from "../vendor/htm-preact-standalone.module.js";
-import { Segmented } from "../choice.js";
+import { marked, Segmented } from "../choice.js";
 
 const OFF = ["off", "Disabled", "The robot moves without a safety layer"];
 const AMONG_CYLINDERS = [
@@ -34,8 +34,4 @@ function layerOf({ reach, safety }) {
   if (!safety.on) return "off";
   if (reach) return safety.use_measured_velocity ? "measured" : "assumed";
   return safety.pfl ? "pfl" : "assumed";
-}
-
-function marked(name) {
-  return (one) => ({ "data-choice": `${name}:${one}` });
 }

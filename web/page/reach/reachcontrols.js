@@ -1,6 +1,6 @@
 // Controls of a reach cell: goal, safety layer, inference mode.
 import { html, useRef } from "../vendor/htm-preact-standalone.module.js";
-import { Segmented } from "../choice.js";
+import { marked, Segmented } from "../choice.js";
 import { Icon } from "../icons.js";
 import { SafetyControls } from "../live/safetycontrols.js";
 
@@ -62,8 +62,4 @@ function switchesOf(mode) {
 function modeOf({ between, weighted, ahead }) {
   const parts = [weighted && "distance-weighted", between && "interpolated"].filter(Boolean);
   return (parts.join("-") || "direct") + (ahead ? "-rollout" : "");
-}
-
-function marked(name) {
-  return (one) => ({ "data-choice": `${name}:${one}` });
 }

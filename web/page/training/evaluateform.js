@@ -48,7 +48,7 @@ export function EvaluateForm({ link, presets, protocols, onStarted, onClose }) {
 }
 
 /** Stored checkpoints of the purpose of a protocol; empty is the protocol's own. */
-export function checkpointField(protocol, checkpoints, presets) {
+function checkpointField(protocol, checkpoints, presets) {
   const fitting = checkpoints.filter(({ purpose }) => purpose === protocol.purpose);
   const labels = Object.fromEntries(fitting.map((one) => [one.sha256,
     [one.aliases[0] ?? format.short(one.sha256),
