@@ -75,14 +75,11 @@ def _operation(api: Node, method: str, path: str, operation: Node) -> str:
             for one in parameters
         )
         parts.append(f"<h3>Parameters</h3><table>{rows}</table>")
-    body = operation.get("requestBody", {}).get("content", {}).get("application/json")
-    if body:
-        parts.append(f"<h3>Body</h3><table>{''.join(_fields(api, body['schema']))}</table>")
+    if body := operation.get("requestBody"):
+        parts.append(f"<h3>Body</h3>{_text(body)}{_content(api, body)}")
     for status, answer in operation["responses"].items():
-        schema = answer.get("content", {}).get("application/json", {}).get("schema", {})
         if status.startswith("2"):
-            rows = "".join(_fields(api, schema))
-            parts.append(f"<h3>Answer {escape(status)}</h3><table>{rows}</table>")
+            parts.append(f"<h3>Answer {escape(status)}</h3>{_content(api, answer)}")
     refusals = "".join(
         f"<tr><td>{status}<td>{escape(_resolved(api, answer)['description'])}</tr>"
         for status, answer in operation["responses"].items()
@@ -96,9 +93,26 @@ def _operation(api: Node, method: str, path: str, operation: Node) -> str:
     )
 
 
+def _content(api: Node, message: Node) -> str:
+    """Return what a body or an answer holds: fields of JSON, or the types of a file."""
+    content = message.get("content", {})
+    if "application/json" not in content:
+        unstated: Node = {"type": ""}
+        rows = (_row(kind, one.get("schema", unstated), "") for kind, one in content.items())
+        return f"<table>{''.join(rows)}</table>"
+    schema = content["application/json"]["schema"]
+    return f"{_text(schema)}<table>{''.join(_fields(api, schema))}</table>"
+
+
+def _text(node: Node) -> str:
+    """Return the description of a body or schema as a paragraph; nothing without one."""
+    text = node.get("description")
+    return f"<p>{escape(text)}</p>" if text else ""
+
+
 def _fields(api: Node, schema: Node, prefix: str = "", depth: int = 0) -> Iterator[str]:
     """Yield one row per field of a schema, nested ones with their path."""
-    schema = _resolved(api, schema)
+    schema = _resolved(api, _given(schema))
     for variant in schema.get("oneOf", []):
         yield from _fields(api, variant, prefix, depth)
     required = schema.get("required", [])
@@ -112,12 +126,14 @@ def _fields(api: Node, schema: Node, prefix: str = "", depth: int = 0) -> Iterat
 
 def _inside(api: Node, member: Node) -> Node:
     """Return the object schema of a member: itself, its items, or its non-null choice."""
-    for choice in member.get("anyOf", []):
-        if choice.get("type") != "null":
-            member = choice
-            break
-    member = _resolved(api, member)
+    member = _resolved(api, _given(member))
     return _resolved(api, member.get("items", member))
+
+
+def _given(schema: Node) -> Node:
+    """Return the first choice of a schema that is not null; the schema without choices."""
+    choices = (one for one in schema.get("anyOf", ()) if one.get("type") != "null")
+    return next(choices, schema)
 
 
 def _resolved(api: Node, schema: Node) -> Node:
@@ -130,7 +146,7 @@ def _resolved(api: Node, schema: Node) -> Node:
 
 
 def _row(name: str, schema: Node, text: str) -> str:
-    rule = " ".join(part for part in (_kind(schema), _limits(schema)) if part)
+    rule = " ".join(part for part in (_kind(schema), _limits(_given(schema))) if part)
     return (
         f"<tr><td><code>{escape(name)}</code><td class=faint>{escape(rule)}"
         f"<td>{escape(text)}</tr>"
@@ -146,6 +162,8 @@ def _kind(schema: Node) -> str:
         return " | ".join(_kind(one) for one in schema["anyOf"])
     if "$ref" in schema:
         return "object"
+    if schema.get("format") == "binary":
+        return "bytes"
     kind = str(schema.get("type", "any"))
     if "prefixItems" in schema:
         return "[" + ", ".join(_kind(one) for one in schema["prefixItems"]) + "]"
