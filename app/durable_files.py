@@ -40,6 +40,21 @@ def write_durably(path: Path, content: bytes) -> None:
         raise
 
 
+def read_stored(path: Path) -> bytes:
+    """Return the content of a file that must not pass for missing because a read fails.
+
+    Raises:
+        FileNotFoundError: It is missing.
+        StorageUnavailable: It cannot be read for now.
+    """
+    try:
+        return path.read_bytes()
+    except FileNotFoundError:
+        raise
+    except OSError as error:
+        raise StorageUnavailable(str(path), f"disk I/O: {error.strerror}") from error
+
+
 def sync_folder(path: Path) -> None:
     """Keep the names of a folder's files also after a power failure."""
     folder = os.open(path, os.O_RDONLY)

@@ -41,7 +41,7 @@ def train(inputs: JobInputs, worker: JobWorker) -> dict[str, Any]:
     job = worker.job
     assert job.preset is not None
     memory = MemoryFiles(inputs.memory, worker.wait_to)
-    state = worker.resume(partial(_usable, memory))
+    state = worker.resume(partial(usable, memory))
     resume = None if state is None else states.load(dict(state.manifest), state.tensors)
 
     def on_progress(progress: Progress) -> None:
@@ -74,7 +74,7 @@ def train(inputs: JobInputs, worker: JobWorker) -> dict[str, Any]:
     return {"checkpoint": saved[-1], "step": result.step}
 
 
-def _usable(memory: MemoryFiles, stored: ResumeState) -> bool:
+def usable(memory: MemoryFiles, stored: ResumeState) -> bool:
     """Return whether a state is of this program's format and its files are undamaged."""
     try:
         state = states.load(dict(stored.manifest), stored.tensors)

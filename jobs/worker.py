@@ -171,8 +171,8 @@ class JobWorker:
             return os.EX_TEMPFAIL
         return 0
 
-    def wait_to(self, write: Callable[[], None]) -> None:
-        """Write; where database or disk take no writes, repeat it until the runner must stop.
+    def wait_to(self, access: Callable[[], None]) -> None:
+        """Write or read; while database or disk fail, repeat it until the runner must stop.
 
         Raises:
             StorageFull: No room is left, and the runner must stop.
@@ -180,7 +180,7 @@ class JobWorker:
         """
         while True:
             try:
-                write()
+                access()
             except StorageDamaged:
                 raise
             except (StorageFull, StorageUnavailable) as error:

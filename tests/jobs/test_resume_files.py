@@ -2,17 +2,28 @@
 
 import logging
 import os
+import threading
 import time
+from functools import partial
+from hashlib import sha256
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from app.digests import digest
-from app.store import attempts, completion, jobs
+from app.policies.training import state as states
+from app.policies.training.file_store import FileFolder
+from app.policies.training.memory_files import MemoryFiles
+from app.store import attempts, checkpoints, completion, jobs, metrics
 from app.store.engine import Store
 from app.store.records import NewCheckpoint, NewJob, ResumeState
+from jobs.access import StoreAccess
 from jobs.resume_files import KEEP_UNKNOWN_S, folder_of, remove_unneeded
 from jobs.retention import MAX_JOBS_AT_ONCE, Retention
+from jobs.run import usable
+from jobs.worker import JobWorker
+from tests.jobs.machinery import wait_for
 from tests.support.databases import claimed
 
 
@@ -124,3 +135,57 @@ def test_log_that_cannot_be_deleted_is_stated_and_its_job_is_deleted_with_its_fi
     assert jobs.list_jobs(store).items == ()
     assert not any(folder_of(tmp_path, one).exists() for one in ids)
     assert [f"the log of job {one} stays" in caplog.text for one in ids] == [True] * 3
+
+
+@pytest.mark.parametrize("is_read_later", [True, False])
+def test_training_whose_files_cannot_be_read_for_now_waits_and_loses_nothing(
+    store: Store, tmp_path: Path, is_read_later: bool
+) -> None:
+    name = sha256(b"rows").hexdigest()
+    job_id = jobs.create_job(store, NewJob(kind="count", spec={})).id
+    claim, _ = claimed(store)
+    files = FileFolder(folder_of(tmp_path, job_id))
+    files.write(name, b"rows")
+    for step in (10, 20):
+        tensors = bytes([step])
+        policy = NewCheckpoint(sha256=digest({}, tensors), manifest={}, tensors=tensors)
+        attempts.record_progress(store, claim, step, {})
+        attempts.record_checkpoint(store, claim, step, policy, state_with_file(step, name))
+    completion.give_back(store, claim)
+    path = files.path(name)
+    path.unlink()
+    path.symlink_to(path)  # which the system refuses to follow
+    worker = JobWorker(StoreAccess(store, tmp_path, claimed(store)[0]))
+
+    def run(worker: JobWorker) -> dict[str, int]:
+        found = worker.resume(partial(usable, MemoryFiles(files, worker.wait_to)))
+        return {"resumed": -1 if found is None else found.step}
+
+    def let_go_on() -> None:
+        wait_for(store, job_id, lambda job: job.waiting == "disk error")
+        if is_read_later:
+            path.unlink()
+            path.write_bytes(b"rows")
+        else:
+            worker.interrupt()
+
+    beside = threading.Thread(target=let_go_on)
+    beside.start()
+    code = worker.execute(run)
+    beside.join()
+    assert code == (os.EX_OK if is_read_later else os.EX_TEMPFAIL)
+    job = jobs.get_job(store, job_id)
+    assert (job.state, job.result) == (
+        ("succeeded", {"resumed": 20}) if is_read_later else ("running", None)
+    )
+    assert [point.step for point in metrics.list_metrics(store, job_id)] == [10, 20]
+    made = checkpoints.list_checkpoints(store, job_id=job_id).items
+    assert [one.step for one in made] == [20, 10]
+    assert attempts.has_resume(store, job_id) != is_read_later
+
+
+def state_with_file(step: int, name: str) -> ResumeState:
+    manifest = {name: kind() for name, kind in states.REQUIRED.items()}
+    manifest |= {"step": step, "memory": [{"first": 0, "last": 3, "sha256": name}]}
+    state = states.pack(manifest, {"step": np.array([step])})
+    return ResumeState(step=step, manifest=state.manifest, tensors=state.tensors)

@@ -4,7 +4,7 @@ from collections.abc import Collection
 from pathlib import Path
 from typing import Protocol
 
-from app.durable_files import write_durably
+from app.durable_files import read_stored, write_durably
 
 SUFFIX = ".safetensors"
 
@@ -23,7 +23,8 @@ class FileStore(Protocol):
         """Return a file, which may be damaged.
 
         Raises:
-            OSError: It is missing or cannot be read.
+            FileNotFoundError: It is missing.
+            StorageUnavailable: It cannot be read for now.
         """
 
     def keep(self, names: Collection[str]) -> None:
@@ -50,7 +51,7 @@ class FileFolder:
 
     def read(self, sha256: str) -> bytes:
         """Return a file; see :class:`FileStore`."""
-        return self.path(sha256).read_bytes()
+        return read_stored(self.path(sha256))
 
     def keep(self, names: Collection[str]) -> None:
         """Delete all files except some; see :class:`FileStore`."""

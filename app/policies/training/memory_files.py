@@ -33,15 +33,16 @@ class MemoryFiles:
 
     Args:
         store: Holds the files.
-        write: Executes a write, and may repeat it where no room is left.
+        access: Executes a read or write of the store, and may repeat it while the disk is full
+            or fails.
     """
 
     def __init__(
         self,
         store: FileStore,
-        write: Callable[[Callable[[], None]], None] = lambda action: action(),
+        access: Callable[[Callable[[], None]], None] = lambda action: action(),
     ) -> None:
-        self._store, self._write = store, write
+        self._store, self._access = store, access
         self._files: Files = []
 
     def write(self, memory: ReplayBuffer, n_rows: int, following: NDArray[Any]) -> Files:
@@ -66,7 +67,7 @@ class MemoryFiles:
                 _rows_of(memory, row, last, following if last == n_rows else after)
             )
             entry = {"first": row, "last": last, "sha256": sha256(content).hexdigest()}
-            self._write(partial(self._store.write, entry["sha256"], content))
+            self._access(partial(self._store.write, entry["sha256"], content))
             self._files.append(entry)
         return [dict(one) for one in self._files]
 
@@ -75,6 +76,7 @@ class MemoryFiles:
 
         Raises:
             Damaged: A file is missing or changed, or rows are missing.
+            StorageUnavailable: A file cannot be read for now.
         """
         row = max(0, n_rows - memory.buffer_size)
         for entry in files:
@@ -97,6 +99,7 @@ class MemoryFiles:
 
         Raises:
             Damaged: A file is missing or changed.
+            StorageUnavailable: A file cannot be read for now.
         """
         for entry in files:
             self._content(entry)
@@ -108,13 +111,14 @@ class MemoryFiles:
         )
 
     def _content(self, entry: Mapping[str, Any]) -> bytes:
+        found: list[bytes] = []
         try:
-            content = self._store.read(entry["sha256"])
-        except OSError as error:
+            self._access(lambda: found.append(self._store.read(entry["sha256"])))
+        except FileNotFoundError as error:
             raise _damaged(entry["sha256"]) from error
-        if sha256(content).hexdigest() != entry["sha256"]:
+        if sha256(found[-1]).hexdigest() != entry["sha256"]:
             raise _damaged(entry["sha256"])
-        return content
+        return found[-1]
 
 
 def _damaged(name: str) -> Damaged:

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from app.digests import has_digest
-from app.durable_files import write_durably
+from app.durable_files import read_stored, write_durably
 from app.errors import Damaged, InvalidInput
 from app.policies.training.file_store import FileFolder
 from app.policies.training.memory_files import MemoryFiles
@@ -50,7 +50,11 @@ class StateFolder:
             old.unlink(missing_ok=True)
 
     def newest(self) -> TrainingState | None:
-        """Return the newest undamaged state; None where there is none."""
+        """Return the newest undamaged state; None where there is none.
+
+        Raises:
+            StorageUnavailable: A file cannot be read for now.
+        """
         return next(self._sound(), None)
 
     def remove(self) -> None:
@@ -60,13 +64,20 @@ class StateFolder:
     def _sound(self) -> Iterator[TrainingState]:
         for path in self._newest_first():
             try:
-                content = json.loads(path.read_bytes())
-                tensors = _tensors_of(path).read_bytes()
+                content = json.loads(read_stored(path))
+                tensors = read_stored(_tensors_of(path))
                 if not has_digest(content["sha256"], content["manifest"], tensors):
                     raise ValueError("its content does not match its checksum")
                 state = load(content["manifest"], tensors)
                 self.memory.check(state.manifest["memory"])
-            except (OSError, ValueError, KeyError, TypeError, Damaged, InvalidInput) as error:
+            except (
+                FileNotFoundError,
+                ValueError,
+                KeyError,
+                TypeError,
+                Damaged,
+                InvalidInput,
+            ) as error:
                 logger.warning("%s cannot be used, an earlier state is: %s", path, error)
             else:
                 yield state
