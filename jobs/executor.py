@@ -18,6 +18,8 @@ PROJECT_ROOT = Path(__file__).resolve().parent.parent
 """Working folder of child processes."""
 NO_CPU = "no free CPU in the Ray cluster"
 """Reason for which a job waits that was started on a busy cluster."""
+NO_CLUSTER = "no Ray cluster"
+"""Reason for which a job waits whose cluster does not answer."""
 TAIL_BYTES = 4000
 """Length of the end of a worker's output in an error [bytes]."""
 

@@ -8,7 +8,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -19,7 +19,7 @@ from app.store import attempts, jobs, metrics
 from app.store.engine import Store
 from jobs.executor import PROJECT_ROOT, LocalProcess, search_path
 from jobs.supervisor import Supervisor
-from tests.jobs.machinery import PATIENCE, supervised, wait_for, wait_until_final
+from tests.jobs.machinery import PATIENCE, supervised, wait_for, wait_until, wait_until_final
 from tests.jobs.remote.serving import TOKEN
 from tests.support.databases import SQLITE_ONLY
 from tests.support.trainings import made_by, train
@@ -83,10 +83,15 @@ def line_of(process: "subprocess.Popen[str]") -> str:
 
 
 def running_on(
-    ray_address: str, store: Store, folder: Path, address: str
+    ray_address: str,
+    store: Store,
+    folder: Path,
+    address: str,
+    variables: Mapping[str, str] | None = None,
 ) -> AbstractContextManager[Supervisor]:
     """Run a supervisor whose jobs run on a cluster."""
     settings = {"TANDEM_RAY": ray_address, "TANDEM_WORKER_URL": address, "TANDEM_TOKEN": TOKEN}
+    settings |= variables or {}
     executor = LocalProcess(store.url, folder, "jobs.remote.ray_driver", settings)
     return supervised(store, folder, executor=executor, timeouts=PATIENCE_OF_RAY)
 
@@ -101,6 +106,18 @@ def process_of(job_id: str, module: str = "jobs.remote.run") -> int | None:
         if module.encode() in words and job_id.encode() in words:
             return int(path.parent.name)
     return None
+
+
+def test_job_whose_cluster_does_not_answer_waits_and_counts_no_crash(
+    store: Store, tmp_path: Path, address: str
+) -> None:
+    impatient = {"RAY_NUM_REDIS_GET_RETRIES": "1", "RAY_gcs_rpc_server_connect_timeout_s": "1"}
+    with running_on("127.0.0.1:1", store, tmp_path, address, impatient) as supervisor:
+        job_id = train(store, **FIELDS)
+        wait_for(store, job_id, lambda job: job.waiting == "no Ray cluster")
+        wait_until(lambda: supervisor.waiting == "no Ray cluster")
+        job = wait_for(store, job_id, lambda job: job.attempt == 2 or job.failures > 0)
+    assert (job.attempt, job.failures) == (2, 0)
 
 
 def test_training_whose_worker_and_node_fail_ends_with_the_checkpoints_of_a_local_one(
