@@ -26,7 +26,8 @@ PREFIX = "urn:tandem:problem:"
 FOR_NOW = (408, 425, 429, 502, 503, 504)
 """Statuses of a server, or a proxy before it, that did not take a request for now.
 
-Tandem states its errors as problems: others below 500 are those of a proxy without a server.
+Tandem states its errors as problems and redirects no worker: others below 500 are those of a
+proxy without a server.
 """
 
 
@@ -80,7 +81,7 @@ class ServiceConnection:
             if not busy:
                 break
             time.sleep(PAUSE_S)
-        if answer.is_error:
+        if not answer.is_success:
             self._raise(answer, problem)
         return answer
 
@@ -97,7 +98,7 @@ class ServiceConnection:
 
     def _problem(self, answer: httpx.Response) -> dict[str, Any]:
         """Return the problem of an answer; empty where it has none."""
-        if not answer.is_error:
+        if answer.is_success:
             return {}
         try:
             found = answer.json()

@@ -312,7 +312,7 @@ def through_proxy(address: str, claim: Claim) -> Iterator[tuple[FailingProxy, Se
         yield proxy, ServiceAccess(service)
 
 
-@pytest.mark.parametrize("status", [404, 408, 429, 502])
+@pytest.mark.parametrize("status", [302, 307, 404, 408, 429, 502])
 def test_request_that_a_proxy_refused_for_now_is_repeated(
     address: str, claim: Claim, status: int
 ) -> None:
