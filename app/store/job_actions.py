@@ -46,7 +46,7 @@ def resume_job(
     """
     with store.writing() as connection:
         job = read_job(connection, job_id, for_update=True)
-        if job.ended_by is None:
+        if not job.is_final or job.ended_by is None:  # one that is pruned has it earlier
             require_repeatable(job, "resume")
         step = _newest_steps(connection, [job_id]).get(job_id)
         if step is None and job.kind in COMPOSITE_KINDS:

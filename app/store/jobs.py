@@ -72,8 +72,9 @@ def create_job(
 
     Raises:
         Conflict: The key was used for another submission.
-        NotFound: The parent was deleted.
-        WrongState: An equal repetition of its parent has not ended.
+        NotFound: The parent, or the job that it is part of, was deleted.
+        WrongState: An equal repetition of its parent has not ended, or the job that it is part
+            of has.
         InvalidInput: The key is empty or too long, or a reference is not stored.
         StorageFull: No room is left.
     """
@@ -278,10 +279,12 @@ def _insert(connection: sa.Connection, new: NewJob, key: _Key | None) -> JobReco
     """Insert a queued job with its first event.
 
     Raises:
-        WrongState: An equal repetition of its parent has not ended.
+        NotFound, WrongState: As for :func:`create_job`.
     """
     if new.parent is not None:
         _check_single(connection, new)
+    if new.part_of is not None:
+        _check_open(connection, new.part_of)
     values = {
         **asdict(new),
         "id": str(uuid.uuid4()),
@@ -311,6 +314,14 @@ def _check_single(connection: sa.Connection, new: NewJob) -> None:
                 "for it, or cancel it first"
             )
             raise WrongState("state", equal.state, rule, FINAL_STATES)
+
+
+def _check_open(connection: sa.Connection, whole_id: str) -> None:
+    """Refuse a part of a job that was cancelled or deleted since it was read."""
+    whole = read_job(connection, whole_id)
+    if whole.is_final:
+        rule = f"is final: {whole.kind} {whole.number} has ended and starts no more jobs"
+        raise WrongState("state", whole.state, rule, ("queued", "running"))
 
 
 def _cancel(connection: sa.Connection, job: JobRecord) -> None:

@@ -3,9 +3,10 @@
 import logging
 import time
 from abc import ABC, abstractmethod
+from contextlib import suppress
 from typing import ClassVar
 
-from app.errors import ServiceError
+from app.errors import NotFound, ServiceError
 from app.storage_errors import LeaseLost, StorageFull, StorageUnavailable
 from app.store import composed_jobs
 from app.store.engine import Store
@@ -63,4 +64,5 @@ class Composer(ABC):
 
     def _fail(self, store: Store, job: JobRecord, reason: str) -> None:
         logger.warning("%s", reason, extra={"job_id": job.id})
-        composed_jobs.end(store, job.id, "failed", error=reason)
+        with suppress(NotFound):  # it was deleted since
+            composed_jobs.end(store, job.id, "failed", error=reason)

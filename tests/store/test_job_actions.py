@@ -4,7 +4,7 @@ import pytest
 
 from app.errors import InvalidInput, NotFound, WrongState
 from app.storage_errors import StaleAttempt
-from app.store import attempts, completion, job_actions, jobs
+from app.store import attempts, completion, composed_jobs, job_actions, jobs
 from app.store.engine import Store
 from app.store.records import (
     Claim,
@@ -79,6 +79,19 @@ def test_second_click_on_resume_is_refused_with_the_state(store: Store, claim: C
     with pytest.raises(WrongState, match="'queued' must be cancelled or failed to resume") as e:
         job_actions.resume_job(store, claim.job_id)
     assert e.value.problem()["choices"] == ["cancelled", "failed"]
+
+
+def test_training_that_the_pruner_stops_is_not_resumed_before_its_end(
+    store: Store, claim: Claim
+) -> None:
+    save(store, claim, 10, policy(b"10"))
+    composed_jobs.mark_pruned(store, claim.job_id)
+    jobs.request_cancel(store, claim.job_id)
+    with pytest.raises(WrongState, match="'cancelling' must be cancelled or failed to resume"):
+        job_actions.resume_job(store, claim.job_id)
+    attempts.heartbeat(store, claim)
+    end(store, claim, "cancelled")
+    assert job_actions.resume_job(store, claim.job_id).state == "queued"
 
 
 def test_succeeded_job_keeps_no_state_and_is_not_resumed(store: Store, claim: Claim) -> None:

@@ -7,7 +7,15 @@ import sqlalchemy as sa
 
 from app.errors import InvalidInput, WrongState
 from app.policies.report.page import RESULTS, evaluations, page
-from app.store import attempts, completion, composed_jobs, job_actions, jobs, metrics
+from app.store import (
+    attempts,
+    completion,
+    composed_jobs,
+    job_actions,
+    jobs,
+    metrics,
+    retention,
+)
 from app.store.database import tables
 from app.store.engine import Store
 from app.store.records import JobRecord
@@ -162,3 +170,18 @@ def test_failed_report_cancels_its_evaluations_and_repeats_them_when_resumed(
 def test_spec_outside_its_limits_is_refused(changes: dict[str, Any]) -> None:
     with pytest.raises((InvalidInput, ValueError), match=r"episodes|parallel"):
         parse_spec({"kind": "report", **changes}).new_job()
+
+
+@pytest.mark.parametrize("is_deleted", [False, True])
+def test_report_that_is_cancelled_after_it_was_read_starts_nothing(
+    store: Store, monkeypatch: pytest.MonkeyPatch, is_deleted: bool
+) -> None:
+    report = post(store, measure=True)
+    jobs.request_cancel(store, report.id)
+    if is_deleted:
+        retention.delete_job(store, report.id, {})
+    with monkeypatch.context() as patch:  # a server that has read it before
+        patch.setattr(composed_jobs, "open_jobs", lambda *_: (report,))
+        Reports().advance(store)
+    assert jobs.list_jobs(store, part_of=report.id).items == ()
+    assert attempts.claim_next(store) is None

@@ -338,3 +338,18 @@ def test_bad_sweep_is_refused_by_field(changes: dict[str, Any], field: str) -> N
     with pytest.raises(InvalidInput) as refused:
         parse_spec({**SWEEP, **changes}).new_job()
     assert refused.value.field == field
+
+
+@pytest.mark.parametrize("is_deleted", [False, True])
+def test_sweep_that_is_cancelled_after_it_was_read_starts_nothing(
+    store: Store, monkeypatch: pytest.MonkeyPatch, is_deleted: bool
+) -> None:
+    sweep = post(store)
+    jobs.request_cancel(store, sweep.id)
+    if is_deleted:
+        retention.delete_job(store, sweep.id, {})
+    with monkeypatch.context() as patch:  # a server that has read it before
+        patch.setattr(composed_jobs, "open_jobs", lambda *_: (sweep,))
+        Sweeps().advance(store)
+    assert jobs.list_jobs(store, part_of=sweep.id).items == ()
+    assert attempts.claim_next(store) is None
