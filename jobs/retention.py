@@ -28,7 +28,7 @@ class Retention:
     """Removes checkpoints, and ended jobs with their output and their files to resume from."""
 
     store: Store
-    """The database."""
+    """The database, for requests."""
     logs: Path
     """Folder with the output of each job."""
     keep_jobs: int
@@ -93,16 +93,23 @@ class Retention:
             retention.delete_checkpoint(self.store, sha256, self.acting())
             self._note((sha256,))
 
-    def apply(self) -> bool:
+    def apply(self, store: Store) -> bool:
         """Remove what is beyond the numbers to keep, of at most ``MAX_JOBS_AT_ONCE`` jobs.
+
+        Args:
+            store: The database, on the condition of the supervisor: that it holds the lease.
 
         Returns:
             Whether there may be more.
+
+        Raises:
+            LeaseLost: Another server runs the jobs.
+            StorageFull: No room is left.
         """
         n_jobs = 0
         with self._lock:
             for job_id, removed in retention.prune(
-                self.store,
+                store,
                 keep_jobs=self.keep_jobs,
                 keep_states=self.keep_states,
                 acting=self.acting(),

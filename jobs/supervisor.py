@@ -290,7 +290,7 @@ class Supervisor:
         """Remove old jobs and files after the end of a worker, and once in a while."""
         if time.monotonic() >= self._retain_at:
             self._retain_at = time.monotonic() + self._timeouts.retain_s
-            if self._retention is not None and self._retention.apply():
+            if self._retention is not None and self._retention.apply(self._store):
                 self._retain_at = -math.inf  # the files in the last turn
                 return
             remove_unneeded(self._store, self._data_dir)

@@ -113,9 +113,9 @@ def test_jobs_beyond_those_to_keep_are_deleted_some_at_a_time(
     for _ in range(MAX_JOBS_AT_ONCE + 1):
         jobs.request_cancel(store, jobs.create_job(store, NewJob(kind="x", spec={})).id)
     keep = Retention(store=store, logs=tmp_path, keep_jobs=0, keep_states=0, acting=dict)
-    assert keep.apply()
+    assert keep.apply(store)
     assert len(jobs.list_jobs(store).items) == 1
-    assert not keep.apply()
+    assert not keep.apply(store)
     assert jobs.list_jobs(store).items == ()
 
 
@@ -131,7 +131,7 @@ def test_log_that_cannot_be_deleted_is_stated_and_its_job_is_deleted_with_its_fi
     keep = Retention(store=store, logs=logs, keep_jobs=0, keep_states=0, acting=dict)
     with caplog.at_level(logging.WARNING):
         keep.delete(ids[0])
-        keep.apply()
+        keep.apply(store)
     assert jobs.list_jobs(store).items == ()
     assert not any(folder_of(tmp_path, one).exists() for one in ids)
     assert [f"the log of job {one} stays" in caplog.text for one in ids] == [True] * 3

@@ -13,6 +13,7 @@ from app.store.database.lock import ServerLock
 from app.store.database.migrate import migrate
 from app.store.engine import Store
 from app.store.records import Claim, NewJob
+from jobs.retention import Retention
 from tests.support.databases import POSTGRESQL_ONLY, wait_until_lease_expires
 
 
@@ -75,6 +76,9 @@ WRITES: dict[str, Callable[[Store, Claim], object]] = {
     "fail": lambda store, claim: completion.fail(store, claim, "stale"),
     "give back": lambda store, claim: completion.give_back(store, claim),
     "orphans": lambda store, _: completion.requeue_orphans(store),
+    "remove old": lambda store, _: Retention(
+        store=Store(store.url), logs=Path("logs"), keep_jobs=0, keep_states=0, acting=dict
+    ).apply(store),
     "reserve": lambda store, _: reserve.fill_reserve(store),
 }
 
@@ -85,7 +89,8 @@ def test_server_without_the_lease_can_change_nothing(
 ) -> None:
     lease, _lock = server(store, tmp_path)
     migrate(store, lease)
-    queued = jobs.create_job(store, NewJob(kind="count", spec={}))
+    queued, ended = (jobs.create_job(store, NewJob(kind="count", spec={})) for _ in range(2))
+    jobs.request_cancel(store, ended.id)
     with store.writing() as connection:
         connection.execute(sa.text("UPDATE leases SET token = 'other', epoch = 7"))
     before = jobs.list_jobs(store)

@@ -197,7 +197,7 @@ def test_what_was_deleted_before_the_disk_is_full_is_deleted_completely(
 
     removed: list[str] = []
     retention = Retention(
-        store=store.fenced(fill),
+        store=store,
         logs=tmp_path,
         keep_jobs=1,
         keep_states=1,
@@ -205,7 +205,7 @@ def test_what_was_deleted_before_the_disk_is_full_is_deleted_completely(
         on_removed=removed.extend,
     )
     with pytest.raises(StorageFull):
-        retention.apply()
+        retention.apply(store.fenced(fill))
     kept = {job.id for job in jobs.list_jobs(store).items}
     assert {one.stem for one in tmp_path.glob("*.log")} == kept
     assert removed == [sha256 for job_id, sha256 in made.items() if job_id not in kept] != []

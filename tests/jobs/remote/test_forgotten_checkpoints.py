@@ -29,7 +29,7 @@ def test_checkpoint_that_goes_with_an_old_job_is_forgotten(
     with serving(store, tmp_path) as (_, services):
         assert services.task_policies.load(made.sha256).checkpoint == made.sha256
         services.checkpoints.mark_damaged(Damaged("checkpoint", "old", "", made.sha256))
-        replace(services.retention, keep_jobs=0).apply()
+        replace(services.retention, keep_jobs=0).apply(services.store)
         assert services.checkpoints.damaged == ()
         with pytest.raises(InvalidInput, match="is no stored checkpoint"):
             services.task_policies.load(made.sha256)
