@@ -76,7 +76,7 @@ _FULL = ("disk is full", "no space left", "disk full", "quota exceeded")
 _NO_RIGHTS = "42501"
 _LOST = ("25P03", "25006")
 """SQLSTATE of a transaction that was ended in a pause, and of a write to a replica."""
-_DAMAGED = ("malformed", "not a database")
+_DAMAGED = ("disk image is malformed", "malformed database schema", "not a database")
 
 
 class Store:

@@ -160,9 +160,12 @@ def list_evaluations(
         InvalidInput: The cursor or limit is invalid.
     """
     where = [jobs.c.state == "succeeded", jobs.c.kind == "evaluate", jobs.c.result.is_not(None)]
+    result = jobs.c.result
+    if store.sqlite_path is not None:  # which ends a query at text that is no JSON
+        result = sa.case((sa.func.json_valid(result) == 1, result))
     for name, value in (("protocol", protocol), ("checkpoint", checkpoint)):
         if value is not None:
-            where.append(jobs.c.result[name].as_string() == value)
+            where.append(result[name].as_string() == value)
     return _page(store, cursor, limit, where)
 
 

@@ -15,10 +15,10 @@ from app.storage_errors import StorageUnavailable
 from app.store import attempts, cells, checkpoints, completion, jobs, metrics, recordings
 from app.store.database.migrate import alembic_config, migrate
 from app.store.engine import Store
-from app.store.records import Claim, NewCheckpoint, NewRecording, ResumeState
+from app.store.records import Claim, NewCheckpoint, NewJob, NewRecording, ResumeState
 from tests.store.test_attempts import claim_again
 from tests.support.damage import JSON, TENSORS, Change, cut, damage, flip
-from tests.support.databases import SQLITE_ONLY
+from tests.support.databases import SQLITE_ONLY, claimed
 
 pytestmark = SQLITE_ONLY  # PostgreSQL's files are not ours to damage
 
@@ -179,6 +179,21 @@ def test_damaged_job_keeps_no_other_from_being_read(
     harm(store, "jobs", column, lambda content: change(b'{"a": "bcdefgh"}'))
     assert jobs.get_job(store, claim.job_id).id == claim.job_id
     assert len(jobs.list_jobs(store).items) == 1
+
+
+@pytest.mark.parametrize("change", [JSON["cut"], JSON["a bit that leaves UTF-8"]])
+def test_damaged_result_keeps_no_other_evaluation_from_being_selected(
+    store: Store, change: Change
+) -> None:
+    ended = []
+    for _ in range(2):
+        jobs.create_job(store, NewJob(kind="evaluate", spec={}))
+        claim, _job = claimed(store)
+        completion.finish(store, claim, result={"protocol": "pick-single"})
+        ended.append(claim.job_id)
+    harm(store, "jobs", "result", change, f"id = '{ended[0]}'")
+    found = jobs.list_evaluations(store, protocol="pick-single").items
+    assert [job.id for job in found] == [ended[1]]
 
 
 @pytest.mark.parametrize("change", [cut, flip(4, 6), flip(1, 7), lambda _: b""])
