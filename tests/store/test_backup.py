@@ -71,9 +71,7 @@ def test_backup_is_restored_exactly_and_the_database_before_is_kept(
     assert kept is not None and dump(kept) == later
     assert (data / "memory/a/one.bin").read_bytes() == CONTENT
     assert attempts.load_resume(store, claim.job_id) == resume(10, CONTENT)
-    assert not list(tmp_path.glob("**/*.part.part")) and not list(
-        tmp_path.glob(".unfinished-*")
-    )
+    assert not list(tmp_path.glob("**/.unfinished-*"))
 
 
 def test_backup_goes_to_another_folder_that_has_no_database(
@@ -163,7 +161,7 @@ def test_damaged_backup_is_named_and_changes_nothing(
     with pytest.raises(InvalidInput, match=r"b\.tar"):
         restore_backup(store, data, file)
     assert dump(path_of(store)) == before
-    assert not list(data.glob("*.kept")) and not list(data.glob("*.db.part"))
+    assert not list(data.glob("*.kept")) and not list(data.glob(".unfinished-*"))
 
 
 def write_edited(
@@ -296,6 +294,49 @@ def test_disk_error_leaves_no_half_backup(
     else:
         assert dump(path_of(store)) == before
     assert not list(data.glob(".unfinished-*"))
+
+
+def test_folder_of_a_job_that_ends_during_a_backup_is_left_out(
+    store: Store, data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    gone, scan, seen = data / "resume/ended", os.scandir, []
+    gone.mkdir(parents=True)
+
+    def remove_and_scan(path: Any) -> Any:
+        seen.append(str(path))
+        if seen[-1] == str(gone):
+            gone.rmdir()
+        return scan(path)
+
+    monkeypatch.setattr(os, "scandir", remove_and_scan)
+    assert write_backup(store, data, tmp_path / "b.tar").n_files == 1
+    assert str(gone) in seen and str(data / "kernels") not in seen
+
+
+def test_file_that_cannot_be_read_is_named(
+    store: Store, data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(file: Path, _name: Path) -> None:
+        raise OSError(errno.EIO, os.strerror(errno.EIO), str(file))
+
+    monkeypatch.setattr(os, "link", fail)
+    with pytest.raises(InvalidInput, match=r"memory/a/one\.bin' cannot be read or written"):
+        write_backup(store, data, tmp_path / "b.tar")
+
+
+@pytest.mark.parametrize("number", [errno.EPERM, errno.EOPNOTSUPP, errno.ENOSYS])
+def test_file_system_without_links_is_backed_up_and_restored(
+    store: Store, data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, number: int
+) -> None:
+    def fail(*_: object) -> None:
+        raise OSError(number, os.strerror(number))
+
+    monkeypatch.setattr(os, "link", fail)
+    before = dump(path_of(store))
+    assert write_backup(store, data, tmp_path / "b.tar").n_files == 1
+    store.close()
+    _, kept = restore_backup(store, data, tmp_path / "b.tar")
+    assert kept is not None and dump(kept) == dump(path_of(store)) == before
 
 
 def test_head_says_what_is_inside(store: Store, data: Path, tmp_path: Path) -> None:

@@ -12,7 +12,7 @@ import shutil
 import sqlite3
 import tarfile
 from collections.abc import Iterator, Mapping
-from contextlib import closing, contextmanager
+from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path, PurePath, PurePosixPath
@@ -50,6 +50,10 @@ NOT_KEPT = (
 )
 """Names in the data folder that no backup contains and none restores, as patterns; compiled
 kernels are code."""
+
+
+_WITHOUT_LINKS = (errno.EPERM, errno.EOPNOTSUPP, errno.ENOSYS, errno.EMLINK)
+"""Errors of a file system that has no links, or not for this file."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -201,11 +205,12 @@ def _file_errors(place: Path) -> Iterator[None]:
             raise StorageFull(str(place.parent)) from error
         raise StorageUnavailable(str(place), str(error)) from error
     except OSError as error:
+        is_named = isinstance(error.filename, str)
+        found = Path(error.filename) if is_named else place
         if error.errno in (errno.ENOSPC, errno.EDQUOT):
-            raise StorageFull(str(place.parent)) from error
-        raise InvalidInput(
-            "FILE", str(place), f"cannot be written: {error.strerror}"
-        ) from error
+            raise StorageFull(str(found.parent)) from error
+        rule = f"cannot be read or written: {error.strerror}"
+        raise InvalidInput("file" if is_named else "FILE", str(found), rule) from error
 
 
 def _link_files(folder: Path, held: Path, database: Path) -> None:
@@ -215,21 +220,35 @@ def _link_files(folder: Path, held: Path, database: Path) -> None:
         if link.exists():
             continue
         link.parent.mkdir(parents=True, exist_ok=True)
-        try:
-            os.link(file, link)
-        except FileNotFoundError:
-            continue  # removed since, and not referred to by a later state
-        except OSError:  # a file system without links
-            shutil.copyfile(file, link)
+        with suppress(FileNotFoundError):  # removed since: no later state refers to it
+            _link(file, link)
+
+
+def _link(file: Path, name: Path) -> None:
+    """Give a file a second name; on a file system without links, copy it."""
+    try:
+        os.link(file, name)
+    except OSError as error:
+        if error.errno not in _WITHOUT_LINKS:
+            raise
+        shutil.copyfile(file, name)
+        with name.open("rb+") as copy:
+            os.fsync(copy.fileno())
 
 
 def _files(folder: Path, database: Path) -> Iterator[tuple[str, Path]]:
     """Yield the files of a folder that a backup contains, each with its relative name."""
-    for file in sorted(folder.rglob("*")):
-        name = file.relative_to(folder)
-        kept = _is_kept(name) and file.is_file() and not file.is_symlink()
-        if kept and not _is_of_database(file, database) and not is_backup(file):
-            yield name.as_posix(), file
+    for place, folders, names in os.walk(folder, onerror=_raise_unless_removed):
+        folders[:] = sorted(one for one in folders if _is_kept(PurePath(one)))
+        for file in (Path(place, one) for one in sorted(names)):
+            kept = _is_kept(PurePath(file.name)) and file.is_file() and not file.is_symlink()
+            if kept and not _is_of_database(file, database) and not is_backup(file):
+                yield file.relative_to(folder).as_posix(), file
+
+
+def _raise_unless_removed(error: OSError) -> None:
+    if not isinstance(error, FileNotFoundError):
+        raise error
 
 
 def _is_kept(name: PurePath) -> bool:
@@ -310,7 +329,7 @@ def _keep(target: Path) -> Path | None:
     for suffix in ("", "-wal"):
         present = target.with_name(target.name + suffix)
         if present.exists():
-            os.link(present, kept.with_name(kept.name + suffix))
+            _link(present, kept.with_name(kept.name + suffix))
     for suffix in ("-wal", "-shm"):
         target.with_name(target.name + suffix).unlink(missing_ok=True)
     return kept
