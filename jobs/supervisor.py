@@ -130,13 +130,11 @@ class Supervisor:
 
         Raises:
             Conflict: Another server uses this folder or database, or a newer version wrote it.
+            StorageFull: No room is left for the tables, or for their upgrade.
         """
         self._lock.acquire()
         try:
-            self._take_lease()
-        except StorageFull as error:  # the thread takes the lease once there is room
-            check_schema(self._database)
-            self._wait_for(error.short, error.message)
+            self._take_lease_or_wait()
         except BaseException:
             self._guarded(self._lease.release)
             self._lock.release()
@@ -168,6 +166,19 @@ class Supervisor:
     def is_alive(self) -> bool:
         """Whether the thread runs."""
         return self._thread is not None and self._thread.is_alive()
+
+    def _take_lease_or_wait(self) -> None:
+        """Take the lease; on a full disk let the thread take it once there is room."""
+        try:
+            self._take_lease()
+        except StorageFull as error:
+            try:
+                check_schema(self._database)
+            except StorageFull:
+                pass  # SQLite cannot read either
+            except Conflict:
+                raise error from None
+            self._wait_for(error.short, error.message)
 
     def _take_lease(self) -> None:
         migrate(self._database, self._lease)

@@ -73,6 +73,9 @@ _PRAGMAS = (
 _SECRETS = ("password", "sslpassword")
 """Parameters of a URL that no message contains."""
 _FULL = ("disk is full", "no space left", "disk full", "quota exceeded")
+_NO_INDEX = "SQLITE_IOERR_SHMSIZE"
+"""Name of SQLite's error where no room is left for the index of the write-ahead log, which the
+first connection makes; its text is that of a disk error."""
 _NO_RIGHTS = "42501"
 _LOST = ("25P03", "25006")
 """SQLSTATE of a transaction that was ended in a pause, and of a write to a replica."""
@@ -206,7 +209,8 @@ class Store:
     def _explained(self, error: DatabaseError) -> ServiceError | None:
         """Return the storage error of a driver's error; None for another kind of error."""
         reason = str(error.orig).strip()
-        if any(text in reason.lower() for text in _FULL):
+        name = getattr(error.orig, "sqlite_errorname", None)
+        if name == _NO_INDEX or any(text in reason.lower() for text in _FULL):
             return StorageFull(self.shown_url)
         if any(text in reason for text in _DAMAGED):
             return StorageDamaged(self.shown_url, reason)

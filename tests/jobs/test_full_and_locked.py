@@ -6,17 +6,20 @@ import sqlite3
 import threading
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, closing, contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 import sqlalchemy as sa
+from alembic import command
 from sqlalchemy import event
 from sqlalchemy.pool import PoolProxiedConnection
 
-from app.storage_errors import StaleAttempt
+from app.storage_errors import StaleAttempt, StorageFull
 from app.store import attempts, completion, jobs
+from app.store.database.lock import ServerLock
+from app.store.database.migrate import alembic_config
 from app.store.engine import Store
 from app.store.records import Claim
 from jobs import worker as jobs_worker
@@ -34,7 +37,9 @@ from tests.jobs.machinery import (
     wait_until,
     wait_until_final,
 )
+from tests.store.test_engine import fill_up
 from tests.support.databases import SQLITE_ONLY, claimed
+from tests.support.full_disk import files_up_to
 
 pytestmark = SQLITE_ONLY  # its limits and locks are those of a file
 
@@ -88,6 +93,36 @@ def test_job_in_a_full_database_waits_and_goes_on(
     assert_counted_once(store, full, steps=100, seed=3)
     assert wait_until_final(store, following).state == "succeeded"
     assert supervisor.waiting is None
+
+
+def test_start_on_a_full_disk_waits_for_room(
+    store: Store, tmp_path: Path, executor: LocalProcess
+) -> None:
+    job_id = queue(store, steps=20)
+    store.close()  # as after a clean stop
+    with ExitStack() as block:
+        with files_up_to(1000):
+            started = supervised(store, tmp_path, executor=executor)
+            supervisor = block.enter_context(started)
+            assert supervisor.waiting == "disk full"
+        assert wait_until_final(store, job_id).state == "succeeded"
+
+
+@pytest.mark.parametrize("revision", ["0003", "base"])
+def test_upgrade_on_a_full_disk_is_refused_with_this_reason(
+    store: Store, tmp_path: Path, revision: str
+) -> None:
+    config = alembic_config()
+    with store.writing() as connection:
+        config.attributes["connection"] = connection
+        command.downgrade(config, revision)
+    with closing(sqlite3.connect(str(store.sqlite_path))) as database:
+        database.execute("VACUUM")
+    fill_up(store, spare_pages=0)
+    supervisor = Supervisor(store, tmp_path)
+    with pytest.raises(StorageFull):
+        supervisor.start()
+    ServerLock(store, tmp_path).acquire()  # which the supervisor has released
 
 
 @pytest.mark.parametrize("end", ["cancel", "SIGTERM"])

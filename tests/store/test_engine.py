@@ -16,6 +16,7 @@ from app.store.database.reserve import fill_reserve
 from app.store.engine import Store
 from app.store.records import Claim, NewCheckpoint, NewJob, ResumeState
 from tests.support.databases import POSTGRESQL_ONLY, SQLITE_ONLY
+from tests.support.full_disk import files_up_to
 from tests.support.postgresql_server import PostgresqlServer
 
 
@@ -189,6 +190,14 @@ def test_full_database_keeps_the_earlier_resume_state(store: Store, claim: Claim
         later = ResumeState(step=20, manifest={}, tensors=content * 2)
         attempts.record_checkpoint(store, claim, 20, policy, later)
     assert attempts.load_resume(store, claim.job_id) == earlier
+
+
+@SQLITE_ONLY
+def test_disk_without_room_for_the_index_of_the_log_is_full(store: Store) -> None:
+    store.close()  # the last connection removes the index
+    with files_up_to(1000), pytest.raises(StorageFull):
+        jobs.list_jobs(store)
+    assert jobs.list_jobs(store).items == ()
 
 
 def test_reserve_is_filled_once(store: Store) -> None:

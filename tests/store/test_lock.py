@@ -9,6 +9,7 @@ from app.errors import Conflict, InvalidInput
 from app.store.database.lock import ServerLock
 from app.store.engine import Store
 from tests.support.databases import SQLITE_ONLY
+from tests.support.full_disk import files_up_to
 
 HOLDER = """
 import sys, time
@@ -84,3 +85,16 @@ def test_folder_that_cannot_be_made_is_named(store: Store, tmp_path: Path) -> No
     (tmp_path / "file").write_text("in the way")
     with pytest.raises(InvalidInput, match=r"TANDEM_DATA = '.*file/data' must be a folder"):
         ServerLock(store, tmp_path / "file" / "data").acquire()
+
+
+def test_lock_of_a_full_disk_is_held_without_the_process_id(
+    store: Store, tmp_path: Path
+) -> None:
+    first, second = ServerLock(store, tmp_path), ServerLock(store, tmp_path)
+    with files_up_to(0):
+        first.acquire()
+    with pytest.raises(Conflict, match=r"process unknown\) already uses"):
+        second.acquire()
+    first.release()
+    second.acquire()
+    second.release()

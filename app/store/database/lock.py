@@ -13,6 +13,8 @@ from app.errors import Conflict, InvalidInput
 from app.store.engine import Store
 
 _BOOT_ID = Path("/proc/sys/kernel/random/boot_id")
+_LENGTH = 32
+"""Length of the process id in the file, which replaces an earlier one without growing it."""
 
 
 class ServerLock:
@@ -71,12 +73,14 @@ def _lock(path: Path) -> int:
     try:
         fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except OSError as error:
-        holder = os.read(file, 32).decode(errors="replace").strip() or "unknown"
+        holder = os.read(file, _LENGTH).decode(errors="replace").strip() or "unknown"
         os.close(file)
         raise Conflict(
             f"another Tandem server (process {holder}) already uses {path.parent}: stop it, or "
             "set another folder with TANDEM_DATA"
         ) from error
-    os.ftruncate(file, 0)
-    os.pwrite(file, f"{os.getpid()}\n".encode(), 0)
+    try:
+        os.pwrite(file, f"{os.getpid()}\n".ljust(_LENGTH).encode(), 0)
+    except OSError:  # no room is left; the lock does not need it
+        os.ftruncate(file, 0)
     return file
