@@ -10,6 +10,7 @@ import yaml
 
 from app.cli.uvicorn_server import GRACE_S
 from app.main import RAY_SHUTDOWN_S, STOP_S
+from app.policies.report.page import RESULTS
 from app.settings import Settings, check_access, load_settings
 from app.traces import EXPORT_S
 from jobs.timeouts import Timeouts
@@ -91,3 +92,9 @@ def test_build_has_every_file_that_it_copies() -> None:
     for one in files:
         assert (ROOT / one).is_file() and is_sent_to_the_build(one), one
     assert not is_sent_to_the_build("data/tandem.db")
+
+
+def test_build_has_the_results_that_reports_state() -> None:
+    files = [path.relative_to(ROOT).as_posix() for path in RESULTS.glob("*.json")]
+    assert files and all(is_sent_to_the_build(one) for one in files)
+    assert not is_sent_to_the_build("docs/setup.md")

@@ -70,7 +70,12 @@ def page(results: Path, measured: Mapping[str, Json] | None = None) -> tuple[str
     Args:
         results: Folder of the result files.
         measured: Results in place of files, by the name of the file without ``.json``.
+
+    Raises:
+        InvalidInput: There is no such folder, or a file is no result file.
     """
+    if not results.is_dir():  # as beside an installed package, which has no documents
+        raise InvalidInput("results", str(results), "must be a folder of result files")
     find = partial(_find, results, measured or {})
     head, *sections = re.split(r"^(?=##)", TEXT, flags=re.MULTILINE)
     parts, missing = [head, MEASURED if measured else ""], []

@@ -1,5 +1,6 @@
 """Reports, looked at by a new server each time; their evaluations are ended by the test."""
 
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -19,6 +20,7 @@ from app.store import (
 from app.store.database import tables
 from app.store.engine import Store
 from app.store.records import JobRecord
+from jobs.composed import reports
 from jobs.composed.reports import Reports
 from jobs.spec import parse_spec
 from tests.support.databases import claimed
@@ -53,6 +55,15 @@ def test_report_of_stored_results_is_the_page_of_the_command(store: Store) -> No
     assert report.state == "succeeded" and not parts_of(store, report)
     assert report.result is not None
     assert (report.result["markdown"], report.result["missing"]) == page(RESULTS)
+
+
+def test_report_without_the_folder_of_stored_results_fails(
+    store: Store, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(reports, "RESULTS", tmp_path / "none")
+    report = look(store, post(store))
+    assert report.state == "failed" and report.error is not None
+    assert "none' must be a folder of result files" in report.error
 
 
 def test_evaluations_are_queued_a_few_at_once_and_fill_the_page(store: Store) -> None:
