@@ -103,7 +103,7 @@ def crash(store: Store, claim: Claim, error: str, *, max_failures: int) -> JobRe
             _requeue(connection, claim.job_id, changes)
         else:
             text = f"Failed after {failures} attempts. Last error: {error}"
-            _end(connection, claim, "failed", {"error": _shown(text)})
+            _end(connection, claim, "failed", {"error": _shown(text), "failures": failures})
         return read_job(connection, claim.job_id)
 
     return write_with_reserve(store, end)
@@ -207,8 +207,8 @@ def _requeue_killed(connection: sa.Connection, job_id: str) -> None:
         f"{job.attempt}. A job that exhausts the memory of the machine ends like this: the "
         "log of the system names the reason"
     )
-    _end(connection, Claim(job_id=job_id, attempt=job.attempt), "failed", {"error": error})
-    connection.execute(sa.update(jobs).where(jobs.c.id == job_id).values(kills=kills))
+    changes = {"error": error, "kills": kills}
+    _end(connection, Claim(job_id=job_id, attempt=job.attempt), "failed", changes)
 
 
 def _requeue(connection: sa.Connection, job_id: str, changes: Mapping[str, Any]) -> None:

@@ -11,7 +11,7 @@ from typing import Any, Literal
 import sqlalchemy as sa
 
 from app.errors import NotFound, WrongState
-from app.store.database.tables import jobs, metrics
+from app.store.database.tables import events, jobs, metrics
 from app.store.engine import Store
 from app.store.events import append_event
 from app.store.fencing import change_state
@@ -46,7 +46,8 @@ def start(store: Store, job_id: str) -> None:
 def record(store: Store, job_id: str, done: int, values: Mapping[str, float | None]) -> None:
     """Add a point to the curve of a job, where the number of its ended parts has changed.
 
-    It falls when parts are repeated: later points are deleted, as when a training is resumed.
+    It falls when parts are repeated: later points and their events are deleted, as when a
+    training is resumed.
 
     Args:
         done: Number of ended trials or evaluations.
@@ -56,9 +57,15 @@ def record(store: Store, job_id: str, done: int, values: Mapping[str, float | No
         job = read_job(connection, job_id, for_update=True)
         if done == job.step or job.is_final:
             return
-        repeated = sa.and_(metrics.c.job_id == job_id, metrics.c.step >= done)
-        connection.execute(sa.delete(metrics).where(repeated))
+        for table in (metrics, events):
+            repeated = sa.and_(table.c.job_id == job_id, table.c.step >= done)
+            connection.execute(sa.delete(table).where(repeated))
         event = job.last_event + 1
+        if done < job.step:  # which revokes the points of readers
+            data = {"state": job.state, "attempt": job.attempt}
+            data |= {"resumed_from_step": max(done - 1, 0)}
+            append_event(connection, job_id, event, "state", data=data)
+            event += 1
         statement = sa.update(jobs).where(jobs.c.id == job_id)
         connection.execute(statement.values(step=done, last_event=event))
         row = {"job_id": job_id, "step": done, "values": dict(values)}

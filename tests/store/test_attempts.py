@@ -259,7 +259,7 @@ def test_job_fails_with_its_third_crash(store: Store, claim: Claim) -> None:
         assert completion.crash(store, claim, "boom", max_failures=3).state == "queued"
         claim = claim_again(store)
     job = completion.crash(store, claim, "boom: the last words", max_failures=3)
-    assert job.state == "failed" and job.error is not None
+    assert (job.state, job.failures) == ("failed", 3) and job.error is not None
     assert "Failed after 3 attempts" in job.error and "the last words" in job.error
 
 

@@ -12,6 +12,7 @@ from app.store import (
     attempts,
     completion,
     composed_jobs,
+    events,
     job_actions,
     jobs,
     metrics,
@@ -137,6 +138,10 @@ def test_report_with_failed_evaluations_repeats_these_when_resumed(store: Store)
     assert (report.result["failed"], report.result["measured"]) == ([], len(evaluations()))
     points = [point.step for point in metrics.list_metrics(store, report.id)]
     assert points == sorted(set(points)) and points[-1] == report.step == len(evaluations())
+    found = events.list_events(store, report.id)
+    assert [one.data["step"] for one in found if one.kind == "progress"] == points
+    revoked = [one.data.get("resumed_from_step") for one in found if one.kind == "state"]
+    assert len(evaluations()) - 2 in revoked
     with pytest.raises(WrongState, match="resume job 1: clone it"):
         job_actions.resume_job(store, report.id)
 
