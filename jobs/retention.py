@@ -115,7 +115,8 @@ class Retention:
                 acting=self.acting(),
             ):
                 self._note(removed)
-                logger.info("job %s is deleted: the newest %d are kept", job_id, self.keep_jobs)
+                text = "job %s is deleted: the newest %d are kept"
+                logger.info(text, job_id, self.keep_jobs, extra={"job_id": job_id})
                 self._remove_files(job_id)
                 n_jobs += 1
                 if n_jobs == MAX_JOBS_AT_ONCE:
@@ -131,4 +132,5 @@ class Retention:
         try:
             (self.logs / f"{job_id}.log").unlink(missing_ok=True)
         except OSError as error:  # the job is deleted all the same
-            logger.warning("the log of job %s stays: %s", job_id, error)
+            text, about = "the log of job %s stays: %s", {"job_id": job_id}
+            logger.warning(text, job_id, error, extra=about)

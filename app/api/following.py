@@ -107,7 +107,8 @@ def _refreshed(
     try:
         now, choices = _updated(follow, world, choices, services)
     except (StorageFull, StorageUnavailable) as error:
-        logger.warning("job %d cannot be looked at for now: %s", follow.number, error.message)
+        text, about = "job %d cannot be looked at for now: %s", {"job_id": follow.job}
+        logger.warning(text, follow.number, error.message, extra=about)
         return follow, choices
     except ServiceError as error:
         return _ended(follow, error.message), choices
@@ -149,7 +150,8 @@ def _updated(
 
 
 def _ended(follow: FollowPublic, reason: str) -> FollowPublic:
-    logger.info("job %d is followed no longer: %s", follow.number, reason)
+    text, about = "job %d is followed no longer: %s", {"job_id": follow.job}
+    logger.info(text, follow.number, reason, extra=about)
     return follow.model_copy(update={"active": False, "reason": reason})
 
 

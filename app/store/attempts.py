@@ -24,8 +24,8 @@ from app.store.records import COMPOSITE_KINDS, Claim, JobRecord, NewCheckpoint, 
 
 logger = logging.getLogger(__name__)
 
-MAX_RESUME = 900 * 1024 * 1024
-"""Largest resume state; SQLite holds blobs of at most 1e9 bytes [bytes]."""
+MAX_RESUME = 256 * 1024 * 1024
+"""Largest tensors of a resume state [bytes]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -59,7 +59,7 @@ def claim_next(store: Store) -> tuple[Claim, JobRecord] | None:
         if connection.execute(first.limit(1)).scalar() is None:
             return None
     with store.writing() as connection:
-        job_id = connection.execute(first.limit(1).with_for_update(skip_locked=True)).scalar()
+        job_id = connection.execute(first.limit(1)).scalar()
         if job_id is None:
             return None
         step = _forget_beyond_resume(connection, job_id)
@@ -351,4 +351,5 @@ def _sound_states(
             "job %s: its state at step %d is damaged, it resumes from an earlier one",
             job_id,
             row.step,
+            extra={"job_id": job_id},
         )

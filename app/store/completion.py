@@ -212,7 +212,7 @@ def _requeue_killed(connection: sa.Connection, job_id: str) -> None:
 
 
 def _requeue(connection: sa.Connection, job_id: str, changes: Mapping[str, Any]) -> None:
-    job = read_job(connection, job_id, for_update=True)
+    job = read_job(connection, job_id)
     data: dict[str, Any] = {"attempt": job.attempt}
     changes = {**changes, "step": _steps_done(connection, job_id), "waiting": None}
     if job.cancel_requested:

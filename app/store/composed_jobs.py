@@ -36,7 +36,7 @@ def parts_of(store: Store, job_id: str) -> tuple[JobRecord, ...]:
 def start(store: Store, job_id: str) -> None:
     """Let a queued job run."""
     with store.writing() as connection:
-        job = read_job(connection, job_id, for_update=True)
+        job = read_job(connection, job_id)
         if job.state == "queued":
             now = datetime.now(UTC)
             changes = {"started_at": job.started_at or now, "attempt": job.attempt + 1}
@@ -54,7 +54,7 @@ def record(store: Store, job_id: str, done: int, values: Mapping[str, float | No
         values: Named numbers; None where not defined.
     """
     with store.writing() as connection:
-        job = read_job(connection, job_id, for_update=True)
+        job = read_job(connection, job_id)
         if done == job.step or job.is_final:
             return
         for table in (metrics, events):
@@ -85,7 +85,7 @@ def end(
     """End a job; the parts of one that fails are cancelled in the same transaction."""
     changes = {"result": result, "error": error, "ended_by": ended_by, **ended_now()}
     with store.writing() as connection:
-        job = read_job(connection, job_id, for_update=True)
+        job = read_job(connection, job_id)
         if not job.is_final:
             data = {"attempt": job.attempt} | ({"error": error} if error else {})
             change_state(connection, job_id, state, changes, data)

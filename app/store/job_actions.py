@@ -45,7 +45,7 @@ def resume_job(
         InvalidInput: A budget is spent already, or a reference is not stored.
     """
     with store.writing() as connection:
-        job = read_job(connection, job_id, for_update=True)
+        job = read_job(connection, job_id)
         if not job.is_final or job.ended_by is None:  # one that is pruned has it earlier
             require_repeatable(job, "resume")
         step = _newest_steps(connection, [job_id]).get(job_id)
@@ -125,7 +125,7 @@ def change_labels(store: Store, job_id: str, changes: Mapping[str, Any]) -> JobR
         InvalidInput: A budget is spent already.
     """
     with store.writing() as connection:
-        job = read_job(connection, job_id, for_update=True)
+        job = read_job(connection, job_id)
         budgets = {name: changes[name] for name in BUDGETS if name in changes}
         if budgets and job.state == "succeeded":
             rule = f"must not be succeeded to change a budget of job {job.number}: resume it"

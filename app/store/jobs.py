@@ -17,7 +17,6 @@ from datetime import UTC, datetime
 from typing import Any, NamedTuple, get_args
 
 import sqlalchemy as sa
-from sqlalchemy.exc import IntegrityError
 
 from app.digests import digest
 from app.errors import Conflict, InvalidInput, NotFound, WrongState
@@ -84,17 +83,11 @@ def create_job(
     key = None
     if idempotency_key is not None:
         key = _Key(idempotency_key, digest(_members(new) if submitted is None else submitted))
-    try:
-        with store.writing() as connection:
-            earlier = _by_key(connection, key)
-            if earlier is None:
-                require_stored(connection, references)
-                return _insert(connection, new, key)
-    except IntegrityError:  # another server process was faster with the same key
-        with store.reading() as connection:
-            earlier = _by_key(connection, key)
+    with store.writing() as connection:
+        earlier = _by_key(connection, key)
         if earlier is None:
-            raise
+            require_stored(connection, references)
+            return _insert(connection, new, key)
     assert key is not None
     return _same_submission(earlier, new, key)
 
@@ -160,7 +153,7 @@ def list_evaluations(
         InvalidInput: The cursor or limit is invalid.
     """
     where = [jobs.c.state == "succeeded", jobs.c.kind == "evaluate", jobs.c.result.is_not(None)]
-    result = jobs.c.result
+    result: sa.ColumnElement[Any] = jobs.c.result
     if store.sqlite_path is not None:  # which ends a query at text that is no JSON
         result = sa.case((sa.func.json_valid(result) == 1, result))
     for name, value in (("protocol", protocol), ("checkpoint", checkpoint)):
@@ -206,7 +199,7 @@ def request_cancel(store: Store, job_id: str) -> JobRecord:
     """
 
     def cancel(connection: sa.Connection) -> JobRecord:
-        job = read_job(connection, job_id, for_update=True)
+        job = read_job(connection, job_id)
         if job.state in ("succeeded", "failed"):
             rule = f"is final: job {job.number} has ended and cannot be cancelled"
             raise WrongState("state", job.state, rule, ("queued", "running"))
@@ -217,16 +210,13 @@ def request_cancel(store: Store, job_id: str) -> JobRecord:
     return write_with_reserve(store, cancel)
 
 
-def read_job(connection: sa.Connection, job_id: str, *, for_update: bool = False) -> JobRecord:
-    """Return one job in a transaction; lock its row for an update.
+def read_job(connection: sa.Connection, job_id: str) -> JobRecord:
+    """Return one job in a transaction.
 
     Raises:
         NotFound: There is no such job.
     """
-    query = sa.select(jobs).where(jobs.c.id == job_id)
-    if for_update:  # SQLite has no row locks: there is one writer at a time
-        query = query.with_for_update()
-    row = connection.execute(query).mappings().first()
+    row = connection.execute(sa.select(jobs).where(jobs.c.id == job_id)).mappings().first()
     if row is None:
         raise NotFound("job", job_id)
     return _record(row)
@@ -246,7 +236,7 @@ def cancel_parts(connection: sa.Connection, job_id: str) -> None:
         jobs.c.part_of == job_id, jobs.c.state.not_in(FINAL_STATES)
     )
     for part_id in connection.execute(parts.order_by(jobs.c.number)).scalars().all():
-        part = read_job(connection, part_id, for_update=True)
+        part = read_job(connection, part_id)
         if part.state in ("queued", "running"):
             _cancel(connection, part)
 
@@ -254,7 +244,7 @@ def cancel_parts(connection: sa.Connection, job_id: str) -> None:
 def ended_now() -> dict[str, Any]:
     """Return the columns of a job that ends: the time, and the next number of an end.
 
-    The clock may step back. PostgreSQL may give jobs that end at once the same number.
+    The clock may step back.
     """
     other = jobs.alias()
     last = sa.select(sa.func.coalesce(sa.func.max(other.c.end_number), 0)).scalar_subquery()
@@ -308,7 +298,7 @@ def _insert(connection: sa.Connection, new: NewJob, key: _Key | None) -> JobReco
 
 def _check_single(connection: sa.Connection, new: NewJob) -> None:
     """Refuse a second repetition of a job while an equal one waits or runs."""
-    read_job(connection, str(new.parent), for_update=True)  # one at a time
+    read_job(connection, str(new.parent))  # which may be deleted
     active = jobs.c.state.in_(("queued", "running"))
     for equal in select_jobs(connection, jobs.c.parent == new.parent, active):
         if dict(equal.spec) == dict(new.spec):

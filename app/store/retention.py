@@ -41,7 +41,7 @@ def delete_job(store: Store, job_id: str, acting: Mapping[str, str]) -> tuple[st
     """
 
     def delete(connection: sa.Connection) -> tuple[str, ...]:
-        job = read_job(connection, job_id, for_update=True)
+        job = read_job(connection, job_id)
         if not job.is_final:
             rule = f"must be final to delete job {job.number}: cancel it first"
             raise WrongState("state", job.state, rule, FINAL_STATES)
@@ -104,7 +104,7 @@ def prune(
         StorageFull: No room is left.
     """
     newest = sa.select(jobs.c.id).where(_ENDED)
-    newest = newest.order_by(jobs.c.end_number.desc(), jobs.c.number.desc())
+    newest = newest.order_by(jobs.c.end_number.desc())
     with_state = newest.where(jobs.c.id.in_(sa.select(resume_states.c.job_id)))
     with store.reading() as connection:
         old = connection.execute(newest.offset(keep_jobs)).scalars().all()
@@ -121,7 +121,8 @@ def prune(
         try:
             yield job_id, delete_job(store, job_id, acting)
         except WrongState as error:
-            logger.info("job %s is kept: %s", job_id, error.message)
+            about = {"job_id": job_id}
+            logger.info("job %s is kept: %s", job_id, error.message, extra=about)
         except NotFound:
             pass  # deleted by a request since
 

@@ -27,9 +27,7 @@ from jobs.resume_files import folder_of
 
 MAX_STATE_MANIFEST = 4 * 1024 * 1024
 """Longest manifest of a state, which has the values that are no arrays [bytes]."""
-MAX_STATE = 256 * 1024 * 1024
-"""Largest tensors of a state [bytes]."""
-MAX_UPLOAD = MAX_POLICY + MAX_STATE_MANIFEST + 1 + MAX_STATE
+MAX_UPLOAD = MAX_POLICY + MAX_STATE_MANIFEST + 1 + attempts.MAX_RESUME
 """Largest file of a policy and a state [bytes]."""
 MAX_MEMORY_FILE = 96 * 1024 * 1024
 """Largest file of a replay memory; three times the size at which a file is closed [bytes]."""
@@ -61,8 +59,8 @@ def read_state(content: bytes) -> ResumeState:
     if not isinstance(step, int) or isinstance(step, bool) or not isinstance(manifest, dict):
         rule = "must be an object with an integer, step, and an object, manifest"
         raise InvalidInput("state", type(head).__name__, rule)
-    if len(tensors) > MAX_STATE:
-        rule = f"bytes exceed the limit of {MAX_STATE} bytes"
+    if len(tensors) > attempts.MAX_RESUME:
+        rule = f"bytes exceed the limit of {attempts.MAX_RESUME} bytes"
         raise InvalidInput("state.tensors", len(tensors), rule)
     _require_safetensors("state.tensors", tensors)
     return ResumeState(step=step, manifest=manifest, tensors=tensors)

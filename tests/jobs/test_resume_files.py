@@ -129,12 +129,20 @@ def test_log_that_cannot_be_deleted_is_stated_and_its_job_is_deleted_with_its_fi
         folder_of(tmp_path, ids[-1]).mkdir(parents=True)
         (logs / f"{ids[-1]}.log").mkdir(parents=True)
     keep = Retention(store=store, logs=logs, keep_jobs=0, keep_states=0, acting=dict)
-    with caplog.at_level(logging.WARNING):
+    with caplog.at_level(logging.INFO):
         keep.delete(ids[0])
         keep.apply(store)
     assert jobs.list_jobs(store).items == ()
     assert not any(folder_of(tmp_path, one).exists() for one in ids)
-    assert [f"the log of job {one} stays" in caplog.text for one in ids] == [True] * 3
+    stays, deleted = (
+        [vars(one)["job_id"] for one in caplog.records if text in one.message]
+        for text in ("the log of job", "is deleted: the newest 0 are kept")
+    )
+    assert sorted(stays) == sorted(ids) and sorted(deleted) == sorted(ids[1:])
+
+
+def test_store_and_trainings_have_one_limit_of_states() -> None:
+    assert states.MAX_BYTES == attempts.MAX_RESUME
 
 
 @pytest.mark.parametrize("is_read_later", [True, False])
