@@ -107,6 +107,7 @@ const REMEDIES = {
     + "backup is lost.",
   "no free resources": `The machine can start no further process. ${KEPT}`,
   "disk error": "The disk of the data folder reports errors: check it. The jobs resume once it can be used.",
+  "no Ray cluster": `They start as soon as the cluster answers. ${KEPT}`,
   "no free CPU in the Ray cluster": `They start as soon as a node has a free CPU. ${KEPT}`,
   [OTHER_SERVER]: "It holds the lease of the database; this server takes over once that one has ended.",
   "server unreachable": `A worker on another machine does not reach this server. ${KEPT}`,
