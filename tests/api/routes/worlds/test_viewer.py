@@ -160,12 +160,14 @@ def enter_when_free(address: str, stack: ExitStack) -> ClientConnection:
 def test_frame_that_is_too_large_ends_its_own_connection_only(
     address: str, frame: bytes | str
 ) -> None:
+    """A frame that is not read to its end may reset the connection before the code arrives."""
     with open_socket(address) as other, open_socket(address) as socket:
-        socket.send(frame)
         with pytest.raises(ConnectionClosed) as closed:
+            socket.send(frame)
             while True:
                 socket.recv(timeout=10.0)
-        assert closed.value.rcvd is not None and closed.value.rcvd.code == 1009
+        code = None if closed.value.rcvd is None else closed.value.rcvd.code
+        assert code == 1009 or (code is None and len(frame) > MAX_MESSAGE_BYTES)
         assert isinstance(other.recv(timeout=10.0), bytes)
 
 
