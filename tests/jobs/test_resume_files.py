@@ -142,7 +142,7 @@ def test_log_that_cannot_be_deleted_is_stated_and_its_job_is_deleted_with_its_fi
 
 
 def test_store_and_trainings_have_one_limit_of_states() -> None:
-    assert states.MAX_BYTES == attempts.MAX_RESUME
+    assert states.MAX_STATE_BYTES == attempts.MAX_RESUME
 
 
 @pytest.mark.parametrize("is_read_later", [True, False])

@@ -188,7 +188,9 @@ def test_unknown_world_is_not_found(client: TestClient) -> None:
 
 
 def test_world_restarts_in_a_cell_of_the_user(client: TestClient) -> None:
-    client.post("/v1/cells", json=workshop.definition(title="Nobody has trained here"))
+    slower = {**workshop.definition()["robot"], "qd_max": [0.4] * 6}
+    cell = workshop.definition(title="Nobody has trained here", robot=slower)
+    client.post("/v1/cells", json=cell)
     try:
         answer = client.put(f"{WORLD}/cell", json={"cell": "workshop"})
         assert answer.status_code == 200

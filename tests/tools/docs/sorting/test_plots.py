@@ -69,7 +69,7 @@ def test_the_table_of_the_grid_has_a_line_per_measure() -> None:
     assert both["pairs below 98 %"] == "0"
     assert both["moves / minimum"] == "1.0012 (1.0010-1.0015)"
     assert (both["riskier picks"], both["return"], both["n"]) == ("", "0.457", "6,000")
-    assert "evaluate sorting-grid --checkpoint sorting-e1`, episodes 1000" in lines[-1]
+    assert "evaluate sorting-grid --checkpoint FILE`, episodes 1000" in lines[-1]
 
 
 def test_the_table_of_the_six_tests_has_a_line_per_row() -> None:
@@ -78,7 +78,7 @@ def test_the_table_of_the_six_tests_has_a_line_per_row() -> None:
     shown = table(result(protocol="sorting-tests", results=[row], settings=settings))
     lines = shown.splitlines()
     assert lines[2].startswith("| `test-1` | 1,000 | 99.70 % (99.60-99.70) | 99.00 %")
-    assert "evaluate sorting-tests`" in lines[-1]
+    assert "evaluate sorting-tests --checkpoint FILE`" in lines[-1]
 
 
 def test_the_table_of_full_tasks_has_a_column_per_rule_and_per_difference() -> None:
