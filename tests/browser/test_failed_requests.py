@@ -114,6 +114,7 @@ def test_list_of_jobs_says_that_it_is_old_or_not_complete(
     ]
     page = open_page(scene=False)
     page.route("**/v1/jobs?*", lambda route: route.fulfill(json=page_of(jobs, route)))
+    page.reload()  # or a job of the server stays open
     page.click("#tab-training")
     expect(page.locator(".job")).to_have_count(259)
     expect(page.locator("#tab-training .count")).to_have_text("259")
