@@ -189,23 +189,23 @@ def test_unknown_world_is_not_found(client: TestClient) -> None:
 
 def test_world_restarts_in_a_cell_of_the_user(client: TestClient) -> None:
     slower = {**workshop.definition()["robot"], "qd_max": [0.4] * 6}
-    cell = workshop.definition(title="Nobody has trained here", robot=slower)
-    client.post("/v1/cells", json=cell)
+    cell = workshop.definition(name="untrained", robot=slower)
+    client.post("/v1/cells", json=cell).raise_for_status()
     try:
-        answer = client.put(f"{WORLD}/cell", json={"cell": "workshop"})
+        answer = client.put(f"{WORLD}/cell", json={"cell": "untrained"})
         assert answer.status_code == 200
-        assert (answer.json()["cell"], answer.json()["checkpoint"]) == ("workshop", None)
+        assert (answer.json()["cell"], answer.json()["checkpoint"]) == ("untrained", None)
         shown = until(client, lambda world: world["tick"] > 1)
         assert (shown["status"], shown["selected"][0]) == ("no policy", "part0")
         assert client.get("/viewer/main/").status_code == 200
-        assert client.delete("/v1/cells/workshop").status_code == 409
+        assert client.delete("/v1/cells/untrained").status_code == 409
         refused = send(client, tag="set-policy", checkpoint="pick")
         assert refused.status_code == 422
         assert send(client, tag="start-case", id="case-1").status_code == 422
     finally:
         back = client.put(f"{WORLD}/cell", json={"cell": "pick-and-place"})
     assert back.json()["checkpoint"] is not None
-    assert client.delete("/v1/cells/workshop").status_code == 204
+    assert client.delete("/v1/cells/untrained").status_code == 204
     until(client, lambda world: world["chosen"] is not None)
 
 
