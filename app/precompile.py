@@ -53,7 +53,7 @@ def _moving() -> None:
         world = LiveReachWorld(cell, live, seed=0)
         world.step()
         world.apply(AddPerson())
-        for mode in live.inference_modes:  # each command plans anew, beside two people
+        for mode in live.inference_modes:  # each command plans again, beside two people
             world.apply(SetInferenceMode(inference_mode=mode))
     new_world(load_cell(REACH_CELL), None, seed=0).step()
 
