@@ -8,13 +8,19 @@ from fastapi import Depends, Header, Response
 
 from app.api.schemas.jobs import JobList, JobPublic
 from app.api.services import Services, ServicesDep
+from app.errors import InvalidInput
 from app.policies.configs import presets
-from app.policies.evaluation.registry import WITHOUT_CHECKPOINT, check_task
-from app.sim.cells.cell import cell_names
+from app.policies.evaluation.registry import (
+    OF_CHOICE,
+    WITHOUT_CHECKPOINT,
+    check_task,
+    lacks_for_choice,
+)
+from app.sim.cells.cell import Cell, cell_names
 from app.store import job_actions, jobs, metrics
 from app.store.records import JobRecord, JobState, MetricRow, NewJob, References
 from app.store.references import references_of
-from jobs.spec import AnySpec, EvaluateSpec
+from jobs.spec import AnySpec, EvaluateSpec, SweepSpec
 
 
 class PageQuery(NamedTuple):
@@ -75,8 +81,17 @@ def checked(body: AnySpec, services: Services) -> NewJob:
         services.recordings.check(body.recordings)
     if new.preset is not None:
         preset = presets.resolve(new.preset, new.overrides or {})
-        services.cells.to_train_in(preset)
+        cell = services.cells.to_train_in(preset)
+        if isinstance(body, SweepSpec):
+            _check_objective(body.objective.protocol, cell)
     return new
+
+
+def _check_objective(protocol: str, cell: Cell) -> None:
+    """Check that the policies of a sweep can be evaluated in their cell."""
+    if protocol in OF_CHOICE and (lack := lacks_for_choice(cell)) is not None:
+        rule = f"cannot be run in the cell {cell.name!r}: it {lack}"
+        raise InvalidInput("objective.protocol", protocol, rule)
 
 
 def queued(

@@ -32,6 +32,7 @@ from app.policies.evaluation.safety.ssm import run_safety
 from app.policies.evaluation.sorting.cycle_time import run_cycle_time
 from app.policies.evaluation.sorting.people import run_sorting_people
 from app.policies.evaluation.sorting.runs import run_grid, run_tests
+from app.sim.cells.cell import Cell
 from app.sim.mocap.importer import Motion
 from app.sim.pick.cases import CASES_CELL
 
@@ -211,13 +212,18 @@ def check_task(name: str, manifest: Mapping[str, Any], found: str) -> None:
     if name in OF_CASES and manifest["cell"] != CASES_CELL:
         rule = f"must be of the cell {CASES_CELL!r} for {name}, not of {manifest['cell']!r}"
         raise InvalidInput("checkpoint", found, rule)
-    most = CANDIDATES[1]
-    if name in OF_CHOICE and (n := len(cell_of(manifest).pick_stations)) < most:
-        rule = f"must be of a cell with at least {most} cubes and docks for {name}, not {n}"
+    if name in OF_CHOICE and (lack := lacks_for_choice(cell_of(manifest))) is not None:
+        rule = f"must be of another cell for {name}: its cell {lack}"
         raise InvalidInput("checkpoint", found, rule)
     if name == "reach-oracle" and manifest["preset"]["episode"]["collision"] == "blocks":
         rule = f"must be of a policy whose episodes end at contacts for {name}"
         raise InvalidInput("checkpoint", found, rule)
+
+
+def lacks_for_choice(cell: Cell) -> str | None:
+    """Return what a cell lacks for protocols that offer several stations; None: nothing."""
+    most, n = CANDIDATES[1], len(cell.pick_stations)
+    return None if n >= most else f"has {n} cubes and docks, of which {most} are needed"
 
 
 def check_motions(

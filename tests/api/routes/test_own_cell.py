@@ -93,3 +93,24 @@ def test_live_world_shows_the_own_cell_with_the_policy_trained_there(
     back = client.put("/v1/worlds/main/cell", json={"cell": "pick-and-place"})
     assert (shown.json()["cell"], shown.json()["checkpoint"]) == ("workshop", checkpoint)
     assert back.json()["cell"] == "pick-and-place"
+
+
+def test_sweep_by_choices_is_refused_where_a_cell_has_too_few_stations(
+    client: TestClient,
+) -> None:
+    small = workshop.definition(name="small-workshop")
+    small["stations"] = small["stations"][-2:]
+    client.post("/v1/cells", json=small).raise_for_status()
+    sweep = {
+        "kind": "sweep",
+        "preset": "pick-td3",
+        "overrides": {"cell": "small-workshop"},
+        "ranges": {"learning.n_steps": {"low": 1, "high": 5}},
+        "trials": 2,
+        "objective": {"protocol": "pick-choice"},
+    }
+    refused = client.post("/v1/jobs", json=sweep)
+    client.delete("/v1/cells/small-workshop")
+    assert refused.status_code == 422, refused.json()
+    assert refused.json()["field"] == "objective.protocol"
+    assert "has 2 cubes and docks, of which 3 are needed" in refused.json()["detail"]

@@ -97,7 +97,8 @@ def test_case_studies_are_of_one_cell(name):
 @pytest.mark.parametrize("name", sorted(OF_CHOICE))
 def test_choices_need_a_cell_with_as_many_stations_as_they_offer(name):
     two = shipped_pick_of("cube0", "dock1").manifest
-    with pytest.raises(InvalidInput, match=f"at least 3 cubes and docks for {name}, not 2"):
+    lack = "its cell has 2 cubes and docks, of which 3 are needed"
+    with pytest.raises(InvalidInput, match=f"for {name}: {lack}"):
         check_task(name, two, "mine")
     check_task(name, shipped_pick_of("cube0", "cube1", "dock1").manifest, "mine")
     check_task("pick-single", two, "mine")
