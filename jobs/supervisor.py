@@ -12,6 +12,7 @@ import logging
 import math
 import os
 import shutil
+import signal
 import threading
 import time
 from collections.abc import Callable
@@ -308,10 +309,12 @@ class Supervisor:
 
     def _settle(self, claim: Claim, worker: _Worker, ended: Exit) -> None:
         """Record the end of an attempt, if its worker has not."""
-        had_to_leave, wrote = worker.leaving_since is not None, ended.code != os.EX_TEMPFAIL
-        if not wrote:  # the database took no writes
+        had_to_leave = worker.leaving_since is not None
+        # The database takes no writes, or a service manager stops the workers, too.
+        gave_up = ended.code in (os.EX_TEMPFAIL, -signal.SIGTERM)
+        if gave_up and not had_to_leave:
             self._not_before = time.monotonic() + self._timeouts.retry_s
-        if had_to_leave or not wrote:
+        if had_to_leave or gave_up:
             self._give_back(claim)
             return
         failures = self._timeouts.max_failures

@@ -24,7 +24,8 @@ class Timeouts:
     lock_s: float = 30.0
     """Time for the heartbeat of a silent worker once the database takes writes again [s]."""
     retry_s: float = 5.0
-    """Time until the next start after a worker that could not start or write [s]."""
+    """Time until the next start after a worker that could not start or write, or was
+    terminated [s]."""
     retain_s: float = 60.0
     """Time until old jobs are removed after one that ended without a worker [s]."""
     max_failures: int = 3

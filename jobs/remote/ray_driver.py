@@ -4,7 +4,8 @@ Runs on the machine of the server in place of a local worker, so that the superv
 watches and stops both alike, and no failure of Ray reaches the server. It starts a process on a
 free CPU of a node (``jobs.remote.ray_node``), copies its output, passes SIGTERM on, and ends
 with its exit status. Ray ends that process when this one is killed. Until the process has
-started, a cluster that fails queues the job again; afterwards it counts as a crash.
+started, a cluster that fails queues the job again; afterwards it counts as a crash. A process
+that SIGTERM ended, as when the node's machine shuts down, is queued again.
 """
 
 import argparse
@@ -138,17 +139,25 @@ class RayDriver:
                 output, code = ray.get(node.poll.remote())
                 copy_output(output)
                 if code is not None:
-                    return self._exit_status(code)
+                    return exit_status(code)
             if self._stopped.is_set() and not sent:
                 node.stop.remote()
                 sent = True
             time.sleep(POLL_S)
 
-    def _exit_status(self, code: int) -> int:
-        if code >= 0:
-            return code
-        logger.error("%s", Exit(code=code, tail="").reason)
-        return os.EX_SOFTWARE
+
+def exit_status(code: int) -> int:
+    """Return the exit status of an attempt whose process on a node has ended.
+
+    ``EX_TEMPFAIL``, which queues the job again, where SIGTERM ended it.
+
+    Args:
+        code: Exit status of the process; negative: the signal that killed it.
+    """
+    if code >= 0:
+        return code
+    logger.error("%s", Exit(code=code, tail="").reason)
+    return os.EX_TEMPFAIL if code == -signal.SIGTERM else os.EX_SOFTWARE
 
 
 def main() -> int:

@@ -2,9 +2,10 @@
 
 Overrides of a counting job: ``steps`` (to do), ``hold_at`` (list: attempt n waits at the n-th
 of these steps until it is stopped or killed), ``deaf`` (it never asks whether to stop),
-``raise_at`` (raises an exception at that step), ``refuse_at`` (the same with an InvalidInput),
-``padding`` (extra bytes per checkpoint), ``max_pages`` (a file with the size limit of the
-database in this process [pages], read at each transaction).
+``at_once`` (it ends at SIGTERM, as evaluations do), ``raise_at`` (raises an exception at that
+step), ``refuse_at`` (the same with an InvalidInput), ``padding`` (extra bytes per checkpoint),
+``max_pages`` (a file with the size limit of the database in this process [pages], read at each
+transaction).
 """
 
 import os
@@ -33,6 +34,8 @@ def count(worker: JobWorker) -> dict[str, int]:
     """Step a random-number generator ``steps`` times; progress every GRID steps."""
     wish = worker.job.overrides
     limit_database(worker, wish.get("max_pages"))
+    if wish.get("at_once"):
+        worker.end_at_once()
     resume = worker.resume()
     step, value = (0, 1 + worker.job.seed) if resume is None else load(resume)
     while step < wish["steps"] and not asked_to_stop(worker):

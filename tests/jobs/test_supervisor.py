@@ -65,6 +65,20 @@ def test_killed_worker_goes_on_from_its_checkpoint(store: Store) -> None:
     assert_counted_once(store, job_id, steps=100, seed=5)
 
 
+def test_worker_that_a_service_manager_terminates_is_no_crash(
+    store: Store, tmp_path: Path, executor: LocalProcess
+) -> None:
+    timeouts = replace(PATIENCE, retry_s=0.1)
+    with supervised(store, tmp_path, executor=executor, timeouts=timeouts):
+        job_id = queue(store, steps=100, hold_at=[27, 67, 87], at_once=True)
+        for goal in (25, 65, 85):
+            wait_for(store, job_id, lambda job, goal=goal: job.step == goal)
+            (pid,) = worker_pids(os.getpid())
+            os.kill(pid, signal.SIGTERM)
+        job = wait_until_final(store, job_id)
+    assert (job.state, job.attempt, job.failures) == ("succeeded", 4, 0)
+
+
 @pytest.mark.usefixtures("supervisor")
 def test_job_that_always_crashes_fails_with_its_last_words(store: Store) -> None:
     job_id = queue(store, steps=40, raise_at=25)
