@@ -53,7 +53,10 @@ class Settings(BaseSettings):
         1000, ge=1, description="Ended jobs to keep; older ones are deleted with their files."
     )
     keep_states: int = Field(
-        5, ge=0, description="Cancelled or failed jobs that can be resumed, the newest."
+        5,
+        ge=0,
+        description="Jobs that can be resumed, the newest that were cancelled, failed or were "
+        "ended by a budget.",
     )
     root_path: str = Field(
         "",

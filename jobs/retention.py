@@ -34,7 +34,7 @@ class Retention:
     keep_jobs: int
     """Number of ended jobs to keep."""
     keep_states: int
-    """Number of cancelled or failed jobs whose states to resume from are kept."""
+    """Number of ended jobs whose states to resume from are kept; pruned trials come last."""
     acting: Callable[[], Mapping[str, str]]
     """Returns the SHA-256 of each checkpoint that acts, with its place."""
     on_removed: Callable[[Collection[str]], object] = lambda _: None

@@ -19,6 +19,8 @@ logger = logging.getLogger(__name__)
 _ENDED = jobs.c.state.in_(FINAL_STATES)
 _OPEN = sa.select(jobs.c.id).where(sa.not_(_ENDED), jobs.c.kind.in_(COMPOSITE_KINDS))
 """The sweeps and reports that still need their parts."""
+_IS_PRUNED = sa.case((jobs.c.ended_by == "pruned", 1), else_=0)
+"""1 for a trial that the pruner of a sweep has cancelled, 0 for any other job."""
 
 
 def delete_job(store: Store, job_id: str, acting: Mapping[str, str]) -> tuple[str, ...]:
@@ -91,6 +93,7 @@ def prune(
     """Delete ended jobs beyond the newest, and states to resume from beyond the newest.
 
     A job with a checkpoint in use stays, and so do the parts of a job that has not ended.
+    States of trials that the pruner of a sweep has cancelled go before all others.
 
     Args:
         keep_states: Number of ended jobs whose states are kept.
@@ -103,20 +106,19 @@ def prune(
     Raises:
         StorageFull: No room is left.
     """
-    newest = sa.select(jobs.c.id).where(_ENDED)
-    newest = newest.order_by(jobs.c.end_number.desc())
-    with_state = newest.where(jobs.c.id.in_(sa.select(resume_states.c.job_id)))
+    ended, by_end = sa.select(jobs.c.id).where(_ENDED), jobs.c.end_number.desc()
+    newest = ended.order_by(by_end)
+    with_state = ended.where(jobs.c.id.in_(sa.select(resume_states.c.job_id)))
+    with_state = with_state.order_by(_IS_PRUNED, by_end)
     with store.reading() as connection:
         old = connection.execute(newest.offset(keep_jobs)).scalars().all()
         needed = sa.select(jobs.c.id).where(jobs.c.part_of.in_(_OPEN))
         parts = set(connection.execute(needed).scalars())
         stale = connection.execute(with_state.offset(keep_states)).scalars().all()
     if stale:
-        ended = sa.select(jobs.c.id).where(_ENDED, jobs.c.id.in_(stale))
+        dropped = resume_states.c.job_id.in_(ended.where(jobs.c.id.in_(stale)))
         with store.writing() as connection:
-            connection.execute(
-                sa.delete(resume_states).where(resume_states.c.job_id.in_(ended))
-            )
+            connection.execute(sa.delete(resume_states).where(dropped))
     for job_id in (one for one in old if one not in parts):
         try:
             yield job_id, delete_job(store, job_id, acting)

@@ -140,6 +140,23 @@ def test_newest_ended_jobs_and_states_are_kept(store: Store, claim: Claim) -> No
     assert not list(retention.prune(store, keep_jobs=2, keep_states=1, acting={acts: "w"}))
 
 
+def test_pruned_trials_take_no_state_from_other_jobs(store: Store, claim: Claim) -> None:
+    save(store, claim, 1, b"0")
+    completion.finish(store, claim, ended_by="time budget")
+    pruned = []
+    for k in range(1, 4):
+        trial = second_job(store)
+        save(store, trial, 1, bytes([k]))
+        composed_jobs.mark_pruned(store, trial.job_id)
+        jobs.request_cancel(store, trial.job_id)
+        completion.finish(store, trial, state="cancelled")
+        pruned.append(trial.job_id)
+    for keep, kept in ((2, [claim.job_id, pruned[2]]), (1, [claim.job_id])):
+        list(retention.prune(store, keep_jobs=9, keep_states=keep, acting={}))
+        found = [one for one in (claim.job_id, *pruned) if attempts.has_resume(store, one)]
+        assert found == kept
+
+
 def test_job_that_ended_last_is_kept_though_the_clock_stepped_back(
     store: Store, claim: Claim
 ) -> None:
