@@ -43,6 +43,12 @@ OBJECTIVES: Mapping[str, tuple[str, ...]] = {
     "sorting": ("sorting-grid", "sorting-tests"),
 }
 """Evaluations that a sweep can use, by scenario: each states rates in its first row."""
+QUANTITIES: Mapping[str, tuple[str, ...]] = {
+    "pick": ("success", "collision", "timeout"),
+    "reach": ("success", "collision", "timeout"),
+    "sorting": ("success", "timeout"),
+}
+"""Rates that these evaluations state, by scenario."""
 
 
 Seed = Annotated[int, Field(ge=0, le=MAX_SEED)]
@@ -168,7 +174,9 @@ class Objective(StrictModel):
 
     protocol: Name = Field(description="an evaluation of the preset's scenario")
     quantity: Literal["success", "collision", "timeout"] = Field(
-        "success", description="a rate; success is maximised, the others are minimised"
+        "success",
+        description="a rate of `quantities` of the preset; success is maximised, the others "
+        "are minimised",
     )
     row: Name | None = Field(None, description="row of the result; the first if null")
     episodes: int | None = Field(None, ge=1, description="the protocol's own if null")
@@ -245,6 +253,10 @@ class SweepSpec(_Spec):
         if protocol not in fitting:
             rule = f"must be an evaluation that sweeps of {scenario} presets can use"
             raise InvalidInput("objective.protocol", protocol, rule, fitting)
+        stated, quantity = QUANTITIES[scenario], self.objective.quantity
+        if quantity not in stated:
+            rule = f"must be a rate that evaluations of {scenario} policies state"
+            raise InvalidInput("objective.quantity", quantity, rule, stated)
         most = most_episodes(protocol)
         if self.objective.episodes is not None and self.objective.episodes > most:
             rule = f"must lie in [1, {most}]"

@@ -141,6 +141,16 @@ def _outcome(
     return "failed", None, f"{wanted} of the evaluation, which has the rows {names}"
 
 
+def _lack_of_objective(trial: SweepTrial) -> str | None:
+    """Return why no trial of the sweep can have a value; None: this one has no such fault."""
+    evaluation = trial.evaluation
+    if trial.value is not None or evaluation is None or evaluation.state != "succeeded":
+        return None
+    if not (evaluation.result or {}).get("results"):
+        return None  # damaged; those of other trials may be read
+    return f"no trial can have a value; trial {trial.number}: {trial.error}"
+
+
 class Sweeps(Composer):
     """Starts, prunes and ends the trials of the open sweeps."""
 
@@ -158,6 +168,10 @@ class Sweeps(Composer):
             return
         if job.state == "queued":
             composed_jobs.start(store, job.id)
+        lack = next(filter(None, map(_lack_of_objective, trials)), None)
+        if lack is not None:
+            composed_jobs.end(store, job.id, "failed", error=lack)
+            return
         for one in trials:
             if one.state == "evaluating" and one.evaluation is None:
                 _evaluate(store, job, spec, one)

@@ -13,6 +13,13 @@ EVALUATE = {"kind": "evaluate", "protocol": "pick-single", "episodes": 10, "seed
 WITHOUT_POLICY = EVALUATE | {"protocol": "safety-ssm"}
 NARROW = {"networks": {"width": 64}}
 TRAIN = {"kind": "train", "preset": "pick-td3", "seed": 1, "overrides": NARROW}
+SORTING_SWEEP = {
+    "kind": "sweep",
+    "preset": "sorting-e0-dqn",
+    "ranges": {"learning.gamma": {"low": 0.9, "high": 0.99}},
+    "trials": 2,
+    "objective": {"protocol": "sorting-grid", "quantity": "collision"},
+}
 RECORDED = {"kind": "evaluate", "protocol": "pick-mocap", "recordings": ["wave", "walk"]}
 
 
@@ -92,6 +99,7 @@ def test_unknown_kind_is_refused(kind: object) -> None:
         ({"kind": "evaluate", "protocol": "pick-mocap"}, "recordings", "at least one"),
         (RECORDED | {"recordings": ["a", "b", "a"]}, r"recordings\[2\]", "be named once"),
         (RECORDED | {"protocol": "pick-single"}, "recordings", "must not be given to pick-"),
+        (SORTING_SWEEP, "objective.quantity", "state; choices: success, timeout"),
     ],
 )
 def test_broken_rule_names_field_and_rule(body: dict[str, Any], field: str, rule: str) -> None:

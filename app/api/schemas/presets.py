@@ -8,7 +8,7 @@ from pydantic import Field
 from app.api.schemas.numbers import Answer
 from app.policies.configs.fields import PresetEntry, entries
 from app.policies.configs.presets import PRESETS, TITLES
-from jobs.spec import OBJECTIVES
+from jobs.spec import OBJECTIVES, QUANTITIES
 
 
 class PresetField(Answer):
@@ -51,6 +51,7 @@ class PresetPublic(Answer):
     cell: str = Field(description="work cell of the training")
     fields: list[PresetField]
     objectives: Sequence[str] = Field(description="protocols that a sweep can use")
+    quantities: Sequence[str] = Field(description="rates that these protocols state")
 
     @classmethod
     def from_name(cls, name: str, cells: Sequence[str]) -> Self:
@@ -74,9 +75,14 @@ class PresetPublic(Answer):
                 choices=list(cells),
             )
             listed.insert(0, choice)
-        objectives = OBJECTIVES.get(name.partition("-")[0], ())
+        scenario = name.partition("-")[0]
         return cls(
-            name=name, title=TITLES[name], cell=own, fields=listed, objectives=objectives
+            name=name,
+            title=TITLES[name],
+            cell=own,
+            fields=listed,
+            objectives=OBJECTIVES.get(scenario, ()),
+            quantities=QUANTITIES.get(scenario, ()),
         )
 
 

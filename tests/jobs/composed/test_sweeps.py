@@ -222,6 +222,22 @@ def test_sweep_without_any_value_fails_with_the_reason(store: Store) -> None:
     assert (job.state, job.error) == ("failed", "no trial has a value; trial 2: out of memory")
 
 
+def test_sweep_whose_evaluation_lacks_the_row_ends_at_once(store: Store) -> None:
+    objective = {**SWEEP["objective"], "row": "other"}
+    sweep = post(store, trials=4, parallel=2, objective=objective)
+    for _ in range(2):
+        look(store, sweep)
+    run_one(store, 0.5)
+    second, _ = claimed(store)
+    look(store, sweep)
+    assert run_one(store, 0.5).kind == "evaluate"
+    job, trials = look(store, sweep)
+    rule = "no success in row 'other' of the evaluation, which has the rows pick"
+    assert (job.state, len(trials)) == ("failed", 2)
+    assert job.error == f"no trial can have a value; trial 1: {rule}"
+    assert jobs.get_job(store, second.job_id).state == "cancelling"
+
+
 def test_sweep_that_cannot_go_on_fails_alone(store: Store) -> None:
     damaged, taken, sound = (post(store) for _ in range(3))
     other = NewJob(kind="count", spec={"kind": "count"})

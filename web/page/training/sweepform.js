@@ -14,7 +14,6 @@ const COUNTS = [
     help: "Queued or run at once" },
 ];
 const QUANTITY = { name: "objective.quantity", title: "Objective", default: "success",
-  choices: ["success", "collision", "timeout"],
   labels: { success: "most success", collision: "least collision",
     timeout: "least timeout" } };
 const EPISODES = { name: "objective.episodes", title: "Episodes", default: "",
@@ -76,7 +75,7 @@ export function SweepForm({ protocols, presets: { items: presets, error }, cell,
     ${COUNTS.map((field) => form.row(field))}
     ${form.row({ name: "objective.protocol", title: "Evaluation",
       ...protocolField(protocols.items, preset.objectives, preset.objectives[0]) })}
-    ${[QUANTITY, EPISODES, PRUNE].map((field) => form.row(field))}
+    ${[{ ...QUANTITY, choices: preset.quantities }, EPISODES, PRUNE].map((field) => form.row(field))}
   </${StartForm}>`;
 }
 
