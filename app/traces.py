@@ -30,7 +30,7 @@ def provider_of_environment() -> TracerProvider | None:
         export = importlib.import_module("opentelemetry.sdk.trace.export")
         otlp = importlib.import_module("opentelemetry.exporter.otlp.proto.http.trace_exporter")
     except ImportError:
-        remedy = "pip install 'tandem[otel]', or unset OTEL_EXPORTER_OTLP_ENDPOINT"
+        remedy = ".venv/bin/pip install '.[otel]', or unset OTEL_EXPORTER_OTLP_ENDPOINT"
         raise MissingPackage("opentelemetry-sdk", "the export of traces", remedy) from None
     os.environ.setdefault("OTEL_SERVICE_NAME", "tandem")
     provider: TracerProvider = sdk.TracerProvider()

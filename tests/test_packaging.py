@@ -93,6 +93,13 @@ def test_makefile_installs_the_declared_torch() -> None:
     assert f"TORCH ?= {torch.removeprefix('torch==')}\n" in (ROOT / "Makefile").read_text()
 
 
+def test_extras_are_installed_from_the_checkout_not_from_an_index() -> None:
+    named = re.compile(r"install\s+['\"]?tandem\b|['\"]tandem\[")
+    texts = [*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md")]
+    texts += [path for folder in ROOTS for path in (ROOT / folder).rglob("*.py")]
+    assert [path for path in texts if named.search(path.read_text(encoding="utf-8"))] == []
+
+
 def test_every_data_file_belongs_to_the_package() -> None:
     data = PROJECT["tool"]["setuptools"]["package-data"]
     packaged = {

@@ -28,7 +28,7 @@ def export(
     except ModuleNotFoundError as error:
         if error.name != "onnx":
             raise
-        remedy = "pip install 'tandem[onnx]'"
+        remedy = ".venv/bin/pip install '.[onnx]'"
         raise MissingPackage("onnx", "the export", remedy) from None
     file = Path(checkpoint)
     name = file.stem if file.suffix == ".safetensors" else checkpoint

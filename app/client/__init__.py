@@ -1,4 +1,4 @@
-"""Python client of a running server; ``pip install tandem[client]``.
+"""Python client of a running server; needs the extra ``client``.
 
 transport    Requests, problems and event streams over HTTP
 operations/  One method per operation of the OpenAPI document; written by ``make client``
