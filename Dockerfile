@@ -44,5 +44,5 @@ RUN python -m app setup
 VOLUME /data
 EXPOSE 8000
 HEALTHCHECK --interval=10s --timeout=3s --start-period=60s --retries=3 \
-    CMD python -c "import os, urllib.request as u; u.urlopen(f'http://127.0.0.1:{os.environ[\"TANDEM_PORT\"]}/readyz', timeout=2)"
+    CMD python -c "import os, urllib.request as u; u.urlopen(f'http://127.0.0.1:{os.environ[\"TANDEM_PORT\"]}/healthz', timeout=2)"
 CMD ["python", "-m", "app", "serve"]

@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 import yaml
 
+from app.api.routes.health import HEALTH, READY
 from app.cli.uvicorn_server import GRACE_S
 from app.main import RAY_SHUTDOWN_S, STOP_S
 from app.policies.report.page import RESULTS
@@ -50,6 +51,11 @@ def test_its_variables_are_settings_that_protect_the_service(
     assert settings.secret == SECRETS["TANDEM_TOKEN"] and not settings.is_loopback
     assert services["tandem"]["ports"] == [f"127.0.0.1:8000:{settings.port}"]
     assert services["tandem"]["volumes"] == [f"data:{settings.data}"]
+
+
+def test_image_that_compiles_its_kernels_is_healthy() -> None:
+    check = (ROOT / "Dockerfile").read_text().partition("HEALTHCHECK")[2]
+    assert f"{HEALTH}'" in check and READY not in check
 
 
 def test_its_database_is_the_one_that_it_starts(
