@@ -87,7 +87,8 @@ class Settings(BaseSettings):
     @property
     def database(self) -> str:
         """The effective database URL."""
-        return self.database_url or f"sqlite:///{self.data.resolve() / 'tandem.db'}"
+        path = str(self.data.resolve() / "tandem.db").replace("%", "%25").replace("?", "%3F")
+        return self.database_url or f"sqlite:///{path}"
 
     @property
     def worker_address(self) -> str:

@@ -5,6 +5,7 @@ import pytest
 from app.errors import InvalidInput
 from app.main import executor_of
 from app.settings import Settings, check_access, load_settings
+from app.store.engine import Store
 
 
 @pytest.fixture(autouse=True)
@@ -26,6 +27,14 @@ def test_defaults_are_loopback_port_8000_and_a_file_in_the_data_folder() -> None
     settings = load_settings()
     assert (settings.host, settings.port, settings.is_loopback) == ("127.0.0.1", 8000, True)
     assert settings.database == f"sqlite:///{Path('data').resolve() / 'tandem.db'}"
+
+
+@pytest.mark.parametrize("name", ["a?b", "p%41q", "100%", "a b+c#d", "ü"])
+def test_database_lies_in_the_data_folder_whatever_its_name(tmp_path: Path, name: str) -> None:
+    data = tmp_path / name
+    data.mkdir()
+    store = Store(load_settings(data=data).database)
+    assert store.sqlite_path == Store(store.url).sqlite_path == data.resolve() / "tandem.db"
 
 
 def test_variables_are_read(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
