@@ -13,8 +13,11 @@ from app.store.engine import Store
 
 
 def has_database(settings: Settings) -> bool:
-    """Whether a database is configured, or its file exists."""
-    return settings.database_url is not None or (settings.data / "tandem.db").exists()
+    """Whether the file of the database exists; true for a database that is no file."""
+    if settings.database_url is None:
+        return (settings.data / "tandem.db").exists()
+    path = Store(settings.database_url).sqlite_path
+    return path is None or path.exists()
 
 
 @contextmanager

@@ -324,7 +324,7 @@ def test_file_that_cannot_be_read_is_named(
         write_backup(store, data, tmp_path / "b.tar")
 
 
-@pytest.mark.parametrize("number", [errno.EPERM, errno.EOPNOTSUPP, errno.ENOSYS])
+@pytest.mark.parametrize("number", [errno.EPERM, errno.EOPNOTSUPP, errno.ENOSYS, errno.EXDEV])
 def test_file_system_without_links_is_backed_up_and_restored(
     store: Store, data: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, number: int
 ) -> None:

@@ -52,8 +52,8 @@ NOT_KEPT = (
 kernels are code."""
 
 
-_WITHOUT_LINKS = (errno.EPERM, errno.EOPNOTSUPP, errno.ENOSYS, errno.EMLINK)
-"""Errors of a file system that has no links, or not for this file."""
+_WITHOUT_LINKS = (errno.EPERM, errno.EOPNOTSUPP, errno.ENOSYS, errno.EMLINK, errno.EXDEV)
+"""Errors of a file system that has no links, or not for this file, or is another one."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -91,7 +91,7 @@ def write_backup(store: Store, data_dir: Path, path: Path) -> BackupSummary:
     if path.exists():
         raise _exists(path)
     with (
-        _file_errors(path),
+        _file_errors(path, store.shown_url),
         closing(TemporaryFolder(TEMPORARY, data_dir)) as links,
         closing(TemporaryFolder(TEMPORARY, path.parent)) as folder,
     ):
@@ -144,7 +144,7 @@ def restore_backup(
     lock.acquire()
     try:
         with (
-            _file_errors(target),
+            _file_errors(target, store.shown_url),
             opened(path) as (archive, head),
             closing(TemporaryFolder(TEMPORARY, target.parent)) as folder,
         ):
@@ -196,21 +196,33 @@ def _publish(part: Path, path: Path) -> None:
 
 
 @contextmanager
-def _file_errors(place: Path) -> Iterator[None]:
-    """Raise the project's error of a file or database error."""
+def _file_errors(place: Path, database: str) -> Iterator[None]:
+    """Raise the project's error of a file or database error.
+
+    Args:
+        place: The file that is written.
+        database: The database in messages.
+    """
     try:
         yield
     except sqlite3.OperationalError as error:
         if "full" in str(error):
             raise StorageFull(str(place.parent)) from error
-        raise StorageUnavailable(str(place), str(error)) from error
+        raise StorageUnavailable(database, str(error)) from error
     except OSError as error:
         is_named = isinstance(error.filename, str)
-        found = Path(error.filename) if is_named else place
+        found = _without_temporary(Path(error.filename)) if is_named else place
         if error.errno in (errno.ENOSPC, errno.EDQUOT):
-            raise StorageFull(str(found.parent)) from error
+            raise StorageFull(str(found if found.is_dir() else found.parent)) from error
         rule = f"cannot be read or written: {error.strerror}"
         raise InvalidInput("file" if is_named else "FILE", str(found), rule) from error
+
+
+def _without_temporary(path: Path) -> Path:
+    """Return the folder in which a backup has its temporary folder, for a path in this one."""
+    places = (n for n, part in enumerate(path.parts) if part.startswith(TEMPORARY))
+    place = next(places, None)
+    return path if place is None else Path(*path.parts[:place])
 
 
 def _link_files(folder: Path, held: Path, database: Path) -> None:
@@ -238,12 +250,24 @@ def _link(file: Path, name: Path) -> None:
 
 def _files(folder: Path, database: Path) -> Iterator[tuple[str, Path]]:
     """Yield the files of a folder that a backup contains, each with its relative name."""
-    for place, folders, names in os.walk(folder, onerror=_raise_unless_removed):
+    for place, folders, names in _walk(folder):
         folders[:] = sorted(one for one in folders if _is_kept(PurePath(one)))
         for file in (Path(place, one) for one in sorted(names)):
             kept = _is_kept(PurePath(file.name)) and file.is_file() and not file.is_symlink()
             if kept and not _is_of_database(file, database) and not is_backup(file):
                 yield file.relative_to(folder).as_posix(), file
+
+
+def _walk(folder: Path) -> Iterator[tuple[str, list[str], list[str]]]:
+    """Yield the folders below a folder as ``os.walk``; links in it to other folders, too.
+
+    A link to a folder that contains this one is left out.
+    """
+    above = folder.resolve()
+    linked = [one for one in sorted(folder.iterdir()) if one.is_symlink() and one.is_dir()]
+    others = [one for one in linked if not above.is_relative_to(one.resolve())]
+    for top in (folder, *(one for one in others if _is_kept(PurePath(one.name)))):
+        yield from os.walk(top, onerror=_raise_unless_removed)
 
 
 def _raise_unless_removed(error: OSError) -> None:
