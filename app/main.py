@@ -95,7 +95,7 @@ def create_app(settings: Settings, traces: TracerProvider | None = None) -> Fast
         try:
             service = await run_in_threadpool(Service, settings, counts, tracer)
         except ServiceError as error:
-            app.state.failure = error.message
+            app.state.failure = error
             raise
         app.state.services = service.parts
         try:

@@ -2,11 +2,11 @@
 
 Results go to standard output (``--json``: one object), logs and errors to standard error.
 Exit status: 0 whatever the result, 1 where this machine is in the way (port taken, database
-in use, disk full, folder read-only, library missing), 2 for a wrong call.
+in use, disk full, folder that cannot be made, library missing, start failed), 2 for a wrong
+call, such as a file that cannot be read or a data folder without write access.
 """
 
 import io
-import os
 import sys
 from collections.abc import Sequence
 
@@ -56,8 +56,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except ServiceError as error:
         print(f"tandem: {error.message}", file=sys.stderr)
         return 2 if isinstance(error, InvalidInput | NotFound) else 1
-    except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     except ImportError as error:
         if "cannot open shared object file" not in str(error):
             raise

@@ -19,6 +19,7 @@ from app.api.sockets import MAX_MESSAGE_BYTES
 from app.cli.http_limits import LimitedHttp
 from app.cli.preflight import address_of
 from app.cli.socket_limits import LimitedSocket
+from app.errors import InvalidInput, ServiceError
 from app.settings import Settings
 from app.traces import finish, provider_of_environment
 
@@ -89,14 +90,20 @@ def _with_brief_failure(app: FastAPI) -> ASGIApp:
 
     async def brief(scope: Scope, receive: Receive, send: Send) -> None:
         async def send_briefly(message: Message) -> None:
-            failure = getattr(app.state, "failure", None)
+            failure = failure_of(app)
             if message["type"] == "lifespan.startup.failed" and failure is not None:
-                message["message"] = failure
+                message["message"] = failure.message
             await send(message)
 
         await app(scope, receive, send_briefly if scope["type"] == "lifespan" else send)
 
     return brief
+
+
+def failure_of(app: FastAPI) -> ServiceError | None:
+    """Return the expected failure of an application's start; None: there was none."""
+    failure: ServiceError | None = getattr(app.state, "failure", None)
+    return failure
 
 
 def run(settings: Settings, sock: socket.socket, report: Callable[[str], None]) -> None:
@@ -107,6 +114,9 @@ def run(settings: Settings, sock: socket.socket, report: Callable[[str], None]) 
         sock: Listening socket.
         report: Called with the address at the start and once the service is ready, or with the
             reason why it cannot decide.
+
+    Raises:
+        SystemExit: The start failed: 2 for a setting, 1 for another reason.
     """
     gc.disable()  # a sixth of the time of imports: they make many objects and drop few
     import torch
@@ -133,4 +143,7 @@ def run(settings: Settings, sock: socket.socket, report: Callable[[str], None]) 
         reported = services.readiness.ready or services.readiness.failed
 
     server = new_server(app, report_readiness, root_path=settings.root_path, traces=traces)
-    server.run(sockets=[sock])
+    try:
+        server.run(sockets=[sock])
+    except SystemExit:  # the start failed, for which uvicorn has a status of its own
+        raise SystemExit(2 if isinstance(failure_of(app), InvalidInput) else 1) from None

@@ -1,0 +1,26 @@
+"""Starts of the server that fail."""
+
+from pathlib import Path
+
+import pytest
+import sqlalchemy as sa
+
+from app.store.database.migrate import migrate
+from app.store.engine import Store
+from tests.cli.test_commands import run
+
+
+@pytest.mark.parametrize(
+    ("setting", "status", "reason"),
+    [({"TANDEM_RAY": "lab:6379"}, 2, "TANDEM_WORKER_URL"), ({}, 1, "schema 9999")],
+)
+def test_start_that_fails_ends_with_the_status_of_its_reason(
+    tmp_path: Path, setting: dict[str, str], status: int, reason: str
+) -> None:
+    store = Store(f"sqlite:///{tmp_path}/tandem.db")
+    migrate(store)
+    with store.writing() as connection:
+        connection.execute(sa.text("UPDATE alembic_version SET version_num = '9999'"))
+    ended = run("serve", data=tmp_path, TANDEM_PORT="0", **setting)
+    assert (ended.returncode, "Traceback" in ended.stderr) == (status, False)
+    assert reason in ended.stderr
