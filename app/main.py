@@ -40,6 +40,7 @@ from app.policies.inference.motion_decision import MotionDecider
 from app.policies.inference.reach_policy import ReachPolicy
 from app.policies.inference.sorting_policy import SortingPolicy
 from app.policies.inference.task_selection import TaskChooser
+from app.provenance import VERSION
 from app.settings import Settings, check_access
 from app.sim.cells.cell import Cell, load_cell
 from app.sim.pick.task_policy import TaskPolicy
@@ -64,7 +65,6 @@ from web.viewer.loop import LiveCell
 
 logger = logging.getLogger(__name__)
 
-VERSION = "0.1.0"
 WORLD_ID = "main"
 LIVE_CELL = "pick-and-place"
 STOP_S = 5.0

@@ -1,4 +1,4 @@
-"""Machine, versions and commit of a measurement, printed with every result."""
+"""Version of Tandem; machine, versions and commit of a measurement, printed with its result."""
 
 import os
 import platform
@@ -7,6 +7,8 @@ from functools import cache
 from importlib import metadata
 from pathlib import Path
 
+VERSION = "0.1.0"
+"""Version of Tandem, as in ``pyproject.toml``."""
 PACKAGES = ("numpy", "numba", "torch", "stable-baselines3", "pin", "python-fcl", "mujoco")
 """Packages with an effect on measurements."""
 

@@ -10,6 +10,8 @@ from pathlib import Path
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
+from app.provenance import VERSION
+
 ROOT = Path(__file__).resolve().parent.parent
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 ROOTS = ("app", "jobs", "web")
@@ -40,6 +42,11 @@ def imported_roots(path: Path) -> set[str]:
 
 def names_in(lines: list[str]) -> set[str]:
     return {canonicalize_name(Requirement(line).name) for line in lines}
+
+
+def test_every_place_states_the_same_version() -> None:
+    assert PROJECT["project"]["version"] == VERSION
+    assert f"note   = {{Version {VERSION}," in (ROOT / "README.md").read_text(encoding="utf-8")
 
 
 def test_every_imported_package_is_declared() -> None:

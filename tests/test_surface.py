@@ -60,6 +60,8 @@ def requests() -> dict[str, Any]:
 def check_call(words: list[str]) -> None:
     command: Any = get_command(command_line)
     while hasattr(command, "commands"):
+        if words[0] in {name for one in command.params for name in one.opts}:
+            return  # an option before any command
         name, *words = words
         command = command.commands[name]
     command.make_context(None, words)

@@ -9,6 +9,7 @@ call, such as a file that cannot be read or a data folder without write access.
 import io
 import sys
 from collections.abc import Sequence
+from typing import Annotated
 
 import typer
 
@@ -16,12 +17,35 @@ from app import logs
 from app.cli import backup, cells, evaluate, export, recordings, serve, train
 from app.cli.report import report
 from app.errors import InvalidInput, NotFound, ServiceError
+from app.provenance import VERSION, describe
 
 app = typer.Typer(
     help="Decisions and motions of a robot arm that shares its work cell with people.",
     add_completion=False,
     rich_markup_mode=None,
 )
+
+
+def print_version(asked: bool) -> None:
+    """Print the version and end the command, where the option is given."""
+    if asked:
+        commit = describe()["commit"]
+        print(f"Tandem {VERSION}" + (f", commit {commit}" if commit else ""))
+        raise typer.Exit
+
+
+@app.callback()
+def options(
+    version: Annotated[
+        bool,
+        typer.Option(
+            "--version", callback=print_version, is_eager=True, help="Print the version."
+        ),
+    ] = False,
+) -> None:
+    """Take the options before a command."""
+
+
 app.command()(serve.serve)
 app.command()(serve.setup)
 app.command()(backup.backup)

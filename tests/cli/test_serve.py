@@ -1,10 +1,12 @@
-"""Starts of the server that fail."""
+"""Starts of the server that fail, and its version."""
 
 from pathlib import Path
 
 import pytest
 import sqlalchemy as sa
 
+from app.cli.entry import main
+from app.provenance import VERSION
 from app.store.database.migrate import migrate
 from app.store.engine import Store
 from tests.cli.test_commands import run
@@ -24,3 +26,8 @@ def test_start_that_fails_ends_with_the_status_of_its_reason(
     ended = run("serve", data=tmp_path, TANDEM_PORT="0", **setting)
     assert (ended.returncode, "Traceback" in ended.stderr) == (status, False)
     assert reason in ended.stderr
+
+
+def test_version_is_printed(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["--version"]) == 0
+    assert capsys.readouterr().out.startswith(f"Tandem {VERSION}")
