@@ -5,8 +5,11 @@ not compressed: compression costs more time than it saves.
 """
 
 import gc
+import ipaddress
+import os
 import socket
 from collections.abc import Awaitable, Callable
+from contextlib import suppress
 from types import FrameType
 
 import uvicorn
@@ -81,8 +84,28 @@ def new_server(
         callback_notify=on_tick,
         timeout_notify=0,
         server_header=False,
+        forwarded_allow_ips=trusted_proxies(os.environ.get("FORWARDED_ALLOW_IPS")),
     )
     return Server(config, app, traces)
+
+
+def trusted_proxies(given: str | None) -> list[str]:
+    """Return the proxies whose ``X-Forwarded-*`` headers count.
+
+    A socket of all IPv6 addresses shows an IPv4 address as ``::ffff:A.B.C.D``: both forms of
+    each address are among them.
+
+    Args:
+        given: Addresses and networks, separated by commas; None: those of this machine.
+    """
+    listed = "127.0.0.1,::1" if given is None else given
+    hosts = [one.strip() for one in listed.split(",")]
+    mapped = []
+    for host in hosts:
+        with suppress(ValueError):  # a name, or an IPv6 address
+            network = ipaddress.IPv4Network(host)
+            mapped.append(f"::ffff:{network.network_address}/{96 + network.prefixlen}")
+    return [*hosts, *mapped]
 
 
 def _with_brief_failure(app: FastAPI) -> ASGIApp:

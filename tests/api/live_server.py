@@ -22,10 +22,14 @@ WARM_UP_S = 900.0
 
 @contextlib.contextmanager
 def running(
-    app: FastAPI, *, root_path: str = "", traces: TracerProvider | None = None
+    app: FastAPI,
+    *,
+    host: str = "127.0.0.1",
+    root_path: str = "",
+    traces: TracerProvider | None = None,
 ) -> Iterator[tuple[Server, str]]:
     """Run ``app`` on a free port; yields the server and its address."""
-    sock = listen("127.0.0.1", 0)
+    sock = listen(host, 0)
     server = new_server(app, root_path=root_path, traces=traces)
     thread = threading.Thread(target=server.run, kwargs={"sockets": [sock]})
     thread.start()

@@ -1,18 +1,25 @@
+import asyncio
 import re
 from collections.abc import Iterator, Sequence
+from pathlib import Path
 from typing import Any
 
 import pytest
 from fastapi.testclient import TestClient
 from starlette.routing import Mount, Route, WebSocketRoute
+from starlette.types import Receive, Scope, Send
 from starlette.websockets import WebSocketDisconnect
+from uvicorn.middleware.proxy_headers import ProxyHeadersMiddleware
 
 from app.api.security import COOKIE, headers_of, session_value
+from app.cli.uvicorn_server import trusted_proxies
 from app.errors import InvalidInput
 from app.main import create_app
 from app.settings import Settings
 from tests.api.answers import problem_of
 from tests.api.conftest import services_of
+from tests.api.live_server import running
+from tests.support import patient_http
 
 TOKEN = "a-token-of-some-length"
 OPEN_FOR = {
@@ -265,6 +272,40 @@ def test_browser_gets_a_page_to_sign_in_and_then_a_cookie(guarded: TestClient) -
     assert guarded.get("/v1/jobs").status_code == 200
     guarded.cookies.clear()
     assert guarded.get("/v1/jobs").status_code == 401
+
+
+def test_cookie_behind_a_proxy_with_tls_is_secure_on_sockets_of_ipv6(tmp_path: Path) -> None:
+    settings = Settings(host="::", data=tmp_path, token=TOKEN)
+    with running(create_app(settings), host="::") as (_, address):
+        assert address.startswith("http://127.0.0.1:")
+        for scheme in ("https", "http"):
+            headers = {"X-Forwarded-Proto": scheme}
+            url = f"{address}/session"
+            answer = patient_http.post(url, json={"token": TOKEN}, headers=headers)
+            assert ("secure" in answer.headers["set-cookie"].lower()) == (scheme == "https")
+
+
+@pytest.mark.parametrize(
+    ("given", "peer", "counts"),
+    [
+        (None, "::ffff:127.0.0.1", True),
+        (None, "::1", True),
+        (None, "::ffff:10.0.0.2", False),
+        ("10.0.0.2, 10.1.0.0/16", "::ffff:10.1.2.3", True),
+        ("10.0.0.2, 10.1.0.0/16", "127.0.0.1", False),
+        ("*", "192.0.2.7", True),
+    ],
+)
+def test_headers_of_listed_proxies_count(given: str | None, peer: str, counts: bool) -> None:
+    async def app(scope: Scope, _receive: Receive, _send: Send) -> None:
+        schemes.append(scope["scheme"])
+
+    schemes: list[str] = []
+    layer = ProxyHeadersMiddleware(app, trusted_proxies(given))
+    headers = [(b"x-forwarded-proto", b"https")]
+    scope = {"type": "http", "scheme": "http", "client": (peer, 1), "headers": headers}
+    asyncio.run(layer(scope, None, None))
+    assert schemes == ["https" if counts else "http"]
 
 
 def test_foreign_origin_is_refused_in_spite_of_the_token(guarded: TestClient) -> None:
