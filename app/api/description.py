@@ -13,7 +13,7 @@ from pydantic import BaseModel
 
 from app.api.bodies import FILE_TYPES
 from app.api.problems import MEDIA_TYPE, Problem
-from app.api.security import COOKIE
+from app.api.security import COOKIE, cookie_name
 
 PROBLEMS = {
     400: ("BadRequest", "The body is no JSON or incomplete, or the request no HTTP/1.1"),
@@ -95,14 +95,19 @@ def install(app: FastAPI) -> None:
     def openapi() -> dict[str, Any]:
         document = plain()
         if "responses" not in document["components"]:
-            _complete(document)
+            token: str | None = app.state.token
+            _complete(document, COOKIE if token is None else cookie_name(token))
         return document
 
     app.openapi = openapi  # type: ignore[method-assign]
 
 
-def _complete(document: dict[str, Any]) -> None:
-    """Add the problems of every operation, their schema and the kinds of access."""
+def _complete(document: dict[str, Any], cookie: str) -> None:
+    """Add the problems of every operation, their schema and the kinds of access.
+
+    Args:
+        cookie: Name of the session cookie.
+    """
     parts = document["components"]
     schema = Problem.model_json_schema(ref_template="#/components/schemas/{model}")
     parts["schemas"] |= schema.pop("$defs") | {Problem.__name__: schema}
@@ -111,7 +116,7 @@ def _complete(document: dict[str, Any]) -> None:
     }
     parts["securitySchemes"] = {
         "token": {"type": "http", "scheme": "bearer", "description": _ACCESS},
-        "session": {"type": "apiKey", "in": "cookie", "name": COOKIE, "description": _ACCESS},
+        "session": {"type": "apiKey", "in": "cookie", "name": cookie, "description": _ACCESS},
     }
     document["security"] = [{"token": []}, {"session": []}, {}]
     for path, operations in document["paths"].items():

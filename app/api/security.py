@@ -21,6 +21,7 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 from app.api.problems import problem
 
 COOKIE = "tandem_session"
+"""Start of the name of the session cookie."""
 SESSION_PATH = "/session"
 _HEADERS_KEY = "tandem.headers"
 """Key of the decoded headers in the scope of a request."""
@@ -59,6 +60,15 @@ def headers_of(scope: Scope) -> dict[str, str]:
 def session_value(token: str) -> str:
     """Return the content of the session cookie: a proof of the token, not the token."""
     return hmac.new(token.encode(), b"tandem session", hashlib.sha256).hexdigest()
+
+
+def cookie_name(token: str) -> str:
+    """Return the name of the session cookie, another one for each token.
+
+    Browsers send the cookies of a host name to all its ports, and so to several servers.
+    """
+    mark = hmac.new(token.encode(), b"tandem cookie", hashlib.sha256).hexdigest()
+    return f"{COOKIE}_{mark[:8]}"
 
 
 @lru_cache(maxsize=64)
@@ -141,7 +151,7 @@ class AccessMiddleware:
         if scheme.lower() == "bearer":
             return hmac.compare_digest(given.strip().encode(), self.token.encode())
         # Other services of this host set cookies, too, of any form.
-        proof = cookie_parser(headers.get("cookie", "")).get(COOKIE, "")
+        proof = cookie_parser(headers.get("cookie", "")).get(cookie_name(self.token), "")
         return hmac.compare_digest(proof.encode(), session_value(self.token).encode())
 
 

@@ -11,7 +11,7 @@ from starlette.types import Receive, Scope, Send
 from starlette.websockets import WebSocketDisconnect
 from uvicorn.middleware.proxy_headers import ProxyHeadersMiddleware
 
-from app.api.security import COOKIE, headers_of, session_value
+from app.api.security import cookie_name, headers_of, session_value
 from app.cli.uvicorn_server import trusted_proxies
 from app.errors import InvalidInput
 from app.main import create_app
@@ -189,15 +189,16 @@ def test_bearer_token_is_answered(guarded: TestClient) -> None:
 @pytest.mark.parametrize(
     "cookie",
     [
-        b"tandem_session=\xff\xfe",
-        "tandem_session=\u00e4".encode(),
-        b"tandem_session=" + b"x" * 5000,
-        b"\xed\xa0\x80=1; tandem_session=",
-        b'tandem_session="\\377"',
+        b"%s=\xff\xfe",
+        b"%s=\xc3\xa4",
+        b"%s=" + b"x" * 5000,
+        b"\xed\xa0\x80=1; %s=",
+        b'%s="\\377"',
     ],
 )
 def test_cookie_of_any_bytes_is_refused(guarded: TestClient, cookie: bytes) -> None:
-    answer = guarded.get("/v1/jobs", headers={b"Cookie": cookie})
+    named = cookie % cookie_name(TOKEN).encode()
+    answer = guarded.get("/v1/jobs", headers={b"Cookie": named})
     assert answer.status_code == 401
     assert answer.headers["content-type"] == "application/problem+json"
 
@@ -208,7 +209,7 @@ def test_cookie_of_any_bytes_is_refused(guarded: TestClient, cookie: bytes) -> N
 def test_cookie_is_read_beside_those_of_other_services(
     guarded: TestClient, other: bytes
 ) -> None:
-    cookie = f"{COOKIE}={session_value(TOKEN)}".encode()
+    cookie = f"{cookie_name(TOKEN)}={session_value(TOKEN)}".encode()
     for header in (other + b"; " + cookie, cookie + b"; " + other):
         assert guarded.get("/v1/jobs", headers={b"Cookie": header}).status_code == 200
 
@@ -306,6 +307,22 @@ def test_headers_of_listed_proxies_count(given: str | None, peer: str, counts: b
     scope = {"type": "http", "scheme": "http", "client": (peer, 1), "headers": headers}
     asyncio.run(layer(scope, None, None))
     assert schemes == ["https" if counts else "http"]
+
+
+def test_cookies_of_two_servers_of_a_host_name_do_not_replace_each_other(
+    guarded: TestClient, tmp_path: Path
+) -> None:
+    token, set_cookies = "another-token-of-some-length", dict[str, str]()
+    settings = Settings(host="0.0.0.0", data=tmp_path, token=token)
+    other = TestClient(create_app(settings), base_url="http://robot.example:8001")
+    for one, its_token in ((guarded, TOKEN), (other, token)):
+        one.post("/session", json={"token": its_token}).raise_for_status()
+        set_cookies |= dict(one.cookies)
+        one.cookies.clear()
+    header = "; ".join(f"{name}={value}" for name, value in set_cookies.items())
+    for one in (guarded, other):
+        assert one.get("/v1/nothing", headers={"Cookie": header}).status_code == 404
+        assert one.get("/v1/nothing").status_code == 401
 
 
 def test_foreign_origin_is_refused_in_spite_of_the_token(guarded: TestClient) -> None:

@@ -7,7 +7,7 @@ from urllib.parse import parse_qs
 from fastapi import APIRouter, Request
 from starlette.responses import HTMLResponse, RedirectResponse, Response
 
-from app.api.security import COOKIE, SESSION_PATH, session_value, sign_in_page
+from app.api.security import SESSION_PATH, cookie_name, session_value, sign_in_page
 from app.errors import InvalidInput
 
 COOKIE_AGE_S = 30 * 24 * 3600
@@ -34,7 +34,7 @@ async def sign_in(request: Request) -> Response:
     answer = RedirectResponse("/", 303) if is_form else Response(status_code=204)
     if token is not None:
         answer.set_cookie(
-            COOKIE,
+            cookie_name(token),
             session_value(token),
             max_age=COOKIE_AGE_S,
             path=request.scope.get("root_path") or "/",
