@@ -64,7 +64,7 @@ class BodyMiddleware:
         if refused is None and _has_body(headers) and not takes_file and not _is_form(headers):
             body, messages = await read_whole(receive, max_bytes)
             receive = repeating(messages, receive)
-            refused = _refused_json(body, path, max_bytes)
+            refused = _refused_json(body, scope["path"], max_bytes)
         else:
             receive = _counted(receive, max_bytes)
         if refused is not None:
@@ -83,13 +83,13 @@ def _refused_head(
     scope: Scope, headers: Mapping[str, str], takes_file: bool, max_bytes: int
 ) -> ProblemResponse | None:
     """Return the problem of address, size, encoding or type; None where there is none."""
-    path = path_of(scope)
+    path, instance = path_of(scope), scope["path"]
     fault = fault_in_address(path, scope["query_string"])
     if fault is not None:
-        return member_problem(422, "invalid-input", fault, path)
+        return member_problem(422, "invalid-input", fault, instance)
     length = headers.get("content-length", "")
     if length.isdecimal() and _exceeds(length, max_bytes):
-        return _too_large(f"{length} bytes", max_bytes, path)
+        return _too_large(f"{length} bytes", max_bytes, instance)
     if not _has_body(headers):
         return None
     encoding, given = headers.get("content-encoding", ""), headers.get("content-type", "")
@@ -97,12 +97,12 @@ def _refused_head(
         rule = "must be identity: bodies are sent uncompressed"
         fault = member("Content-Encoding", repr(encoding), rule, ["identity"])
         return member_problem(
-            415, "wrong-encoding", fault, path, {"Accept-Encoding": "identity"}
+            415, "wrong-encoding", fault, instance, {"Accept-Encoding": "identity"}
         )
     if takes_file and given and _media_type(given) not in FILE_TYPES:
-        return _wrong_type(given, "must be a file's", FILE_TYPES, path)
+        return _wrong_type(given, "must be a file's", FILE_TYPES, instance)
     if not takes_file and path.startswith(JSON_ONLY_PREFIX) and not is_json(given):
-        return _wrong_type(given, "must be JSON", ("application/json",), path)
+        return _wrong_type(given, "must be JSON", ("application/json",), instance)
     return None
 
 
@@ -140,12 +140,12 @@ def repeating(messages: list[Message], receive: Receive) -> Receive:
     return receive_again
 
 
-def _refused_json(body: bytes, path: str, max_bytes: int) -> ProblemResponse | None:
+def _refused_json(body: bytes, instance: str, max_bytes: int) -> ProblemResponse | None:
     """Return the problem of a body; None where there is none."""
     if len(body) > max_bytes:
-        return _too_large(f"more than {max_bytes} bytes", max_bytes, path)
+        return _too_large(f"more than {max_bytes} bytes", max_bytes, instance)
     fault = fault_in_json(body)
-    return None if fault is None else member_problem(422, "invalid-input", fault, path)
+    return None if fault is None else member_problem(422, "invalid-input", fault, instance)
 
 
 def _counted(receive: Receive, max_bytes: int) -> Receive:
@@ -179,12 +179,14 @@ def is_json(content_type: str) -> bool:
     )
 
 
-def _too_large(value: str, max_bytes: int, path: str) -> ProblemResponse:
+def _too_large(value: str, max_bytes: int, instance: str) -> ProblemResponse:
     rule = f"must be at most {max_bytes} bytes"
     fault = member("body", value, rule)
-    return member_problem(413, "body-too-large", fault, path, {"Connection": "close"})
+    return member_problem(413, "body-too-large", fault, instance, {"Connection": "close"})
 
 
-def _wrong_type(given: str, rule: str, choices: tuple[str, ...], path: str) -> ProblemResponse:
+def _wrong_type(
+    given: str, rule: str, choices: tuple[str, ...], instance: str
+) -> ProblemResponse:
     fault = member("Content-Type", repr(given), rule, choices)
-    return member_problem(415, "wrong-media-type", fault, path)
+    return member_problem(415, "wrong-media-type", fault, instance)

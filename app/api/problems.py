@@ -96,7 +96,7 @@ class Problem(BaseModel):
     title: str = Field(description="phrase of the status")
     status: int
     detail: str = Field(description="a sentence on this occurrence")
-    instance: str = Field(description="path of the request")
+    instance: str = Field(description="path of the request, with the root path")
     request_id: str | None = Field(None, description="id of the request, as in `X-Request-ID`")
     field: str | None = Field(None, description="path of the faulty value; see `errors`")
     value: str | None = None

@@ -121,12 +121,11 @@ class ResponseMiddleware:
         try:
             await self.app(scope, receive, send_complete)
         except Exception:
-            path = path_of(scope)
-            logger.exception("%s %s could not be answered", scope["method"], path)
+            logger.exception("%s %s could not be answered", scope["method"], path_of(scope))
             if started:
                 raise
             detail = "an unexpected error; the server's log has the trace"
-            await problem(500, detail, instance=path)(scope, receive, send_complete)
+            await problem(500, detail, instance=scope["path"])(scope, receive, send_complete)
 
     def _count(
         self, scope: Scope, status: int, headers: list[tuple[bytes, bytes]], seconds: float

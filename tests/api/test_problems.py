@@ -1,6 +1,7 @@
 import gzip
 import json
 import logging
+from typing import Any
 
 import pytest
 from fastapi import FastAPI
@@ -259,3 +260,32 @@ def test_address_with_a_trailing_slash_is_not_found(
 ) -> None:
     answer = client.request(method, path, follow_redirects=False)
     assert problem_of(answer, 404)["instance"] == path
+
+
+@pytest.mark.parametrize(
+    ("method", "path", "given", "status"),
+    [
+        ("GET", "/v1/nothing", {}, 404),
+        ("GET", "/v1/jobs?limit=%00", {}, 422),
+        ("POST", "/v1/jobs", {"content": b" " * ((1 << 20) + 1)}, 413),
+        ("POST", "/v1/jobs", {"content": b"a=1"}, 415),
+        ("POST", "/v1/jobs", {"json": {"kind": "\0"}}, 422),
+        ("POST", "/v1/jobs", {"json": {"kind": "dream"}}, 422),
+        ("GET", "/v1/jobs", {"headers": {"Host": "evil.example"}}, 421),
+    ],
+)
+def test_instance_is_the_path_below_the_root_path(
+    client: TestClient, method: str, path: str, given: dict[str, Any], status: int
+) -> None:
+    below = TestClient(client.app, base_url=str(client.base_url), root_path="/tandem")
+    answer = below.request(method, f"/tandem{path}", **given)
+    assert problem_of(answer, status)["instance"] == f"/tandem{path.partition('?')[0]}"
+
+
+def test_instance_of_a_socket_is_its_path_below_the_root_path(client: TestClient) -> None:
+    below = TestClient(client.app, base_url=str(client.base_url), root_path="/tandem")
+    path = "/tandem/v1/motion/stream"
+    with below.websocket_connect(f"ws://127.0.0.1:8000{path}") as socket:
+        for text in ("{", "{}"):
+            socket.send_text(text)
+            assert socket.receive_json()["instance"] == path

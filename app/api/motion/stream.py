@@ -184,16 +184,17 @@ class MotionSocket:
                 left_out=left_out,
             )
 
+        instance: str = self._client.scope["path"]
         body: object = None
         try:
-            refused, body = _malformed(request.text)
+            refused, body = _malformed(request.text, instance)
             if refused is None:
                 asked, left_out = _reduced(MotionRequest.model_validate(body), left_out)
                 found = await answer(asked, self._services)
                 found["stream"] = use(left_out, 200)
                 return str(to_json(found, inf_nan_mode="null"), "utf-8")
         except Exception as error:
-            refused = _problem(error)
+            refused = _problem(error, instance)
         content: dict[str, object] = json.loads(bytes(refused.body))
         return json.dumps(
             {**content, "stream": use([], refused.status_code).model_dump(), **_stamp_of(body)}
@@ -215,8 +216,11 @@ def _reduced(
     return request.model_copy(update=changes), left_out
 
 
-def _malformed(text: str | None) -> tuple[ProblemResponse | None, object]:
+def _malformed(text: str | None, instance: str) -> tuple[ProblemResponse | None, object]:
     """Return the problem of a message that is no JSON, or None, and its request or data.
+
+    Args:
+        instance: Path of the socket.
 
     Raises:
         json.JSONDecodeError: It is no JSON.
@@ -225,9 +229,9 @@ def _malformed(text: str | None) -> tuple[ProblemResponse | None, object]:
         rule = f"must be JSON text of at most {MAX_MESSAGE} characters"
         if text is None:
             binary = member("body", "<bytes>", rule)
-            return member_problem(400, "malformed-json", binary, PATH), None
+            return member_problem(400, "malformed-json", binary, instance), None
         long = member("body", f"{len(text)} characters", rule)
-        return member_problem(413, "body-too-large", long, PATH), None
+        return member_problem(413, "body-too-large", long, instance), None
     fault = fault_in_json(text.encode())
     if fault is None:
         with suppress(ValidationError):
@@ -238,25 +242,29 @@ def _malformed(text: str | None) -> tuple[ProblemResponse | None, object]:
         if fault is None:
             raise
         body = None
-    return None if fault is None else member_problem(422, "invalid-input", fault, PATH), body
+    if fault is None:
+        return None, body
+    return member_problem(422, "invalid-input", fault, instance), body
 
 
-def _problem(error: Exception) -> ProblemResponse:
+def _problem(error: Exception, instance: str) -> ProblemResponse:
     """Return the problem of a request that cannot be answered."""
     if isinstance(error, ServiceError):
-        return service_problem(error, PATH)
+        return service_problem(error, instance)
     if isinstance(error, ValidationError):
         wrong = [
             {**dict(one), "loc": ("body", *one["loc"])}
             for one in error.errors(include_url=False)
         ]
-        return validation_problem(wrong, [MotionRequest], PATH)
+        return validation_problem(wrong, [MotionRequest], instance)
     if isinstance(error, json.JSONDecodeError):
         malformed = {"type": "json_invalid", "loc": ("body", error.pos), "msg": ""}
         context = {"error": error.msg}
-        return validation_problem([{**malformed, "ctx": context}], [MotionRequest], PATH)
-    logger.error("a message on %s could not be answered", PATH, exc_info=error)
-    return problem(500, "an unexpected error; the server's log has the trace", instance=PATH)
+        return validation_problem([{**malformed, "ctx": context}], [MotionRequest], instance)
+    logger.error("a message on %s could not be answered", instance, exc_info=error)
+    return problem(
+        500, "an unexpected error; the server's log has the trace", instance=instance
+    )
 
 
 def _stamp_of(body: object) -> dict[str, object]:
