@@ -43,6 +43,7 @@ from app.policies.inference.task_selection import TaskChooser
 from app.provenance import VERSION
 from app.settings import Settings, check_access
 from app.sim.cells.cell import Cell, load_cell
+from app.sim.core.kernel_cache import kernel_cache
 from app.sim.pick.task_policy import TaskPolicy
 from app.sim.sorting.decision import warm_up as warm_up_sorting
 from app.sim.sorting.sorting_values import SortingValues
@@ -50,6 +51,7 @@ from app.storage_errors import StorageDamaged, StorageFull, StorageUnavailable
 from app.store.checkpoints import find_damaged
 from app.store.database.backup import remove_unfinished
 from app.store.engine import Store
+from app.unused_kernels import remove_unused
 from jobs.cell_catalog import CellCatalog
 from jobs.checkpoints import shipped
 from jobs.composed.reports import Reports
@@ -206,6 +208,7 @@ class Service:
             gc.freeze()
             readiness.ready, readiness.reason = True, "ready"
             logger.info("ready: %s decides in the live cell", policy.title)
+            remove_unused(kernel_cache(self.parts.data))
             self._look_for_damage()
         except ServiceError as error:
             readiness.failed, readiness.reason = True, error.message
