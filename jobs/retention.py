@@ -2,7 +2,9 @@
 
 import logging
 import threading
+import time
 from collections.abc import Callable, Collection, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TypeVar
@@ -12,10 +14,14 @@ from app.policies.checkpoints import pretrained
 from app.store import retention
 from app.store.checkpoints import get_checkpoint
 from app.store.engine import Store
+from app.store.jobs import job_ids
 from jobs import resume_files
+from jobs.resume_files import KEEP_UNKNOWN_S
 
 logger = logging.getLogger(__name__)
 
+UNKNOWN = ".unknown-job"
+"""Ending of an empty file beside the log of an unknown job, with the time of the first look."""
 MAX_JOBS_AT_ONCE = 20
 """Jobs that are deleted at once; the supervisor renews its lease in between."""
 
@@ -121,7 +127,12 @@ class Retention:
                 n_jobs += 1
                 if n_jobs == MAX_JOBS_AT_ONCE:
                     return True
+        remove_unknown_logs(store, self.logs)
         return False
+
+    def log_of(self, job_id: str) -> Path:
+        """Return the file with the output of a job."""
+        return self.logs / f"{job_id}.log"
 
     def _note(self, removed: Collection[str]) -> None:
         self._removals += 1
@@ -130,7 +141,33 @@ class Retention:
     def _remove_files(self, job_id: str) -> None:
         resume_files.remove(resume_files.folder_of(self.logs.parent, job_id))
         try:
-            (self.logs / f"{job_id}.log").unlink(missing_ok=True)
+            self.log_of(job_id).unlink(missing_ok=True)
         except OSError as error:  # the job is deleted all the same
             text, about = "the log of job %s stays: %s", {"job_id": job_id}
             logger.warning(text, job_id, error, extra=about)
+
+
+def remove_unknown_logs(store: Store, folder: Path) -> None:
+    """Delete logs of jobs that the database does not know.
+
+    A server that was killed while it deleted a job has left them. They may belong to another
+    database: they are deleted ``KEEP_UNKNOWN_S`` after the first look at them, as files to
+    resume from are.
+    """
+    logs = {log.stem: log for log in folder.glob("*.log")}
+    marks = {mark.stem: mark for mark in folder.glob(f"*{UNKNOWN}")}
+    unknown = logs.keys() - job_ids(store) if logs else set()
+    for job_id in marks.keys() - unknown:
+        with suppress(OSError):
+            marks[job_id].unlink()
+    for job_id in unknown:
+        with suppress(OSError):  # one that cannot be changed keeps no other from its turn
+            _remove_unknown_log(logs[job_id], logs[job_id].with_suffix(UNKNOWN))
+
+
+def _remove_unknown_log(log: Path, mark: Path) -> None:
+    if not mark.exists():
+        mark.touch()
+    elif time.time() - mark.stat().st_mtime > KEEP_UNKNOWN_S:
+        log.unlink()
+        mark.unlink()

@@ -189,6 +189,12 @@ def count_jobs(store: Store) -> dict[JobState, int]:
     return found
 
 
+def job_ids(store: Store) -> frozenset[str]:
+    """Return the ids of all jobs."""
+    with store.reading() as connection:
+        return frozenset(connection.execute(sa.select(jobs.c.id)).scalars())
+
+
 def request_cancel(store: Store, job_id: str) -> JobRecord:
     """Cancel a queued job at once; request the stop of a running one.
 

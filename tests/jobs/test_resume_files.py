@@ -192,6 +192,27 @@ def test_training_whose_files_cannot_be_read_for_now_waits_and_loses_nothing(
     assert attempts.has_resume(store, job_id) != is_read_later
 
 
+def test_log_of_an_unknown_job_is_deleted_a_week_after_the_first_look(
+    store: Store, tmp_path: Path
+) -> None:
+    known = jobs.create_job(store, NewJob(kind="count", spec={})).id
+    logs, long_ago = tmp_path / "logs", time.time() - KEEP_UNKNOWN_S - 60.0
+    logs.mkdir()
+    for name in (f"{known}.log", "gone.log", "later.log", "notes.txt"):
+        (logs / name).write_text("a line")
+        os.utime(logs / name, (long_ago, long_ago))
+    keep = Retention(store=store, logs=logs, keep_jobs=9, keep_states=9, acting=dict)
+    before = {one.name for one in logs.iterdir()}
+    assert keep.apply(store) is False
+    marks = {"gone.unknown-job", "later.unknown-job"}
+    assert {one.name for one in logs.iterdir()} == before | marks
+    os.utime(logs / "gone.unknown-job", (long_ago, long_ago))
+    (logs / f"{known}.unknown-job").touch()  # as with another database before
+    keep.apply(store)
+    left = before - {"gone.log"} | {"later.unknown-job"}
+    assert {one.name for one in logs.iterdir()} == left
+
+
 def state_with_file(step: int, name: str) -> ResumeState:
     manifest = {name: kind() for name, kind in states.REQUIRED.items()}
     manifest |= {"step": step, "memory": [{"first": 0, "last": 3, "sha256": name}]}
