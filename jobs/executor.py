@@ -125,11 +125,21 @@ class LocalProcess:
 
 def _tail(handle: LocalHandle) -> str:
     """Return the end of what an attempt logged; empty once its job was deleted."""
+    return end_of_log(handle.log, TAIL_BYTES, handle.log_start).strip()
+
+
+def end_of_log(log: Path, n_bytes: int, start: int = 0) -> str:
+    """Return the end of a log as text; empty where there is no log.
+
+    Args:
+        n_bytes: Largest length [bytes].
+        start: Place in the log before which nothing is read [bytes].
+    """
     try:
-        with handle.log.open("rb") as log:
-            end = log.seek(0, os.SEEK_END)
-            log.seek(max(handle.log_start, end - TAIL_BYTES))
-            return log.read().decode(errors="replace").strip()
+        with log.open("rb") as file:
+            end = file.seek(0, os.SEEK_END)
+            file.seek(max(start, end - n_bytes))
+            return file.read(n_bytes).decode(errors="replace")
     except FileNotFoundError:
         return ""
 

@@ -5,6 +5,7 @@ from collections.abc import AsyncIterator
 from typing import Annotated
 
 from fastapi import APIRouter, Body, Header, Query, Response
+from fastapi.responses import PlainTextResponse
 from fastapi.sse import EventSourceResponse, ServerSentEvent
 from starlette.concurrency import run_in_threadpool
 
@@ -24,10 +25,13 @@ from app.api.services import ServicesDep
 from app.store import events, jobs, metrics
 from app.store.cursors import MAX_INTEGER
 from app.store.records import JobEvent, JobState
+from jobs.executor import end_of_log
 from jobs.spec import JobSpec
 
 POLL_S = 0.3
 """How often an open stream looks for news [s]."""
+LOG_BYTES, MAX_LOG_BYTES = 1 << 20, 1 << 24
+"""Length of a log in an answer by default, and the greatest one [bytes]."""
 
 router = APIRouter(prefix="/v1/jobs", tags=["jobs"])
 
@@ -91,6 +95,23 @@ def get_job_metrics(
     """Return the points beyond a step, in order of steps."""
     rows = metrics.list_metrics(services.store, job.id, after_step=after_step, limit=limit)
     return MetricsPublic.from_domain(rows)
+
+
+@router.get("/{job_id}/log", summary="A job's output", response_class=PlainTextResponse)
+def get_job_log(
+    job: JobDep,
+    services: ServicesDep,
+    tail: Annotated[
+        int, Query(ge=1, le=MAX_LOG_BYTES, description="at most so many bytes, the last ones")
+    ] = LOG_BYTES,
+) -> PlainTextResponse:
+    """Return the output of all attempts of a job, as far as this server has run them.
+
+    Bytes that are no UTF-8 are replaced. It is empty before the first attempt, and for jobs
+    that are made of others.
+    """
+    log = services.retention.log_of(job.id)
+    return PlainTextResponse(end_of_log(log, tail))
 
 
 @router.get(

@@ -70,6 +70,10 @@ class JobsOperations(Transport):
             query={"after_step": after_step, "limit": limit},
         )
 
+    def get_job_log(self, job_id: str, *, tail: int | None = None) -> str:
+        """A job's output."""
+        return self._send("GET", "/v1/jobs/{}/log", job_id, query={"tail": tail}).text
+
     def stream_job(
         self, job_id: str, *, last_event_id: int | None = None
     ) -> Iterator[StreamEvent]:

@@ -204,11 +204,27 @@ def test_bad_query_is_refused_by_field(client: TestClient, query: str, field: st
 
 
 def test_unknown_job_is_not_found_on_every_route(client: TestClient) -> None:
-    for path in ("", "/metrics", "/events"):
+    for path in ("", "/metrics", "/events", "/log"):
         answer = client.get(f"/v1/jobs/nothing{path}")
         assert answer.status_code == 404
         assert answer.headers["content-type"] == "application/problem+json"
     assert client.post("/v1/jobs/nothing/cancel").status_code == 404
+
+
+def test_output_of_a_job_is_text_of_which_the_end_can_be_asked_for(
+    client: TestClient, queued: dict[str, Any]
+) -> None:
+    path = f"/v1/jobs/{queued['id']}/log"
+    log = services_of(client).data / "logs" / f"{queued['id']}.log"
+    log.unlink(missing_ok=True)
+    assert client.get(path).text == ""
+    log.parent.mkdir(exist_ok=True)
+    log.write_bytes("first\ngr\u00fc\u00dfe ".encode() + b"\xff\n")
+    answer = client.get(path)
+    assert answer.headers["content-type"] == "text/plain; charset=utf-8"
+    assert answer.text == "first\ngr\u00fc\u00dfe \ufffd\n"
+    assert client.get(f"{path}?tail=4").text == "e \ufffd\n"
+    assert problem_of(client.get(f"{path}?tail=0"))["field"] == "tail"
 
 
 def test_stream_of_a_job_can_be_resumed_and_ends_with_it(client: TestClient) -> None:
