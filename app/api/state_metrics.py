@@ -1,6 +1,8 @@
 """Metrics that are read from the service at a scrape: live worlds, trackers, sockets, jobs."""
 
+import shutil
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,6 +14,7 @@ from app.api.services import MAX_VIEWERS, Services
 from app.live.snapshot import WorldSnapshot
 from app.storage_errors import StorageFull, StorageUnavailable
 from app.store.cursors import MAX_PAGE
+from app.store.database.size import size_of
 from app.store.jobs import count_jobs, list_jobs
 from app.store.records import JobRecord
 
@@ -121,6 +124,11 @@ def _running(services: Services) -> Iterator[JobRecord]:
         more = cursor is not None
 
 
+def _free_space(services: Services) -> Samples:
+    with suppress(OSError):  # a disk with errors has no value
+        yield (), shutil.disk_usage(services.data).free
+
+
 def _steps(services: Services) -> Samples:
     for job in _running(services):
         yield (job.id, job.kind, job.preset or ""), job.step
@@ -145,6 +153,12 @@ STATE_METRICS = (
         "Whether jobs cannot start or be written for now; /readyz contains the reason.",
         (),
         lambda services: [((), services.supervisor.waiting is not None)],
+    ),
+    StateMetric(
+        "tandem_data_free_bytes",
+        "Free space of the disk of the data folder.",
+        (),
+        _free_space,
     ),
     StateMetric(
         "tandem_damaged_checkpoints",
@@ -213,6 +227,12 @@ STATE_METRICS = (
     StateMetric("tandem_sockets_limit", "Largest number of open sockets.", ("kind",), _limits),
 )
 STORED_METRICS = (
+    StateMetric(
+        "tandem_database_size_bytes",
+        "Size of the database on its disk.",
+        (),
+        lambda services: [((), size_of(services.store))],
+    ),
     StateMetric(
         "tandem_jobs",
         "Jobs by state.",

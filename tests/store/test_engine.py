@@ -13,6 +13,7 @@ from app.storage_errors import StorageFull, StorageUnavailable
 from app.store import attempts, completion, jobs, metrics
 from app.store.database.migrate import migrate
 from app.store.database.reserve import fill_reserve
+from app.store.database.size import size_of
 from app.store.engine import Store
 from app.store.records import Claim, NewCheckpoint, NewJob, ResumeState
 from tests.support.databases import POSTGRESQL_ONLY, SQLITE_ONLY
@@ -35,6 +36,14 @@ def record_until_full(store: Store, claim: Claim) -> int:
             values = {f"x{i}": i / step for i in range(50)}
             attempts.record_progress(store, claim, step, values)
     return len(metrics.list_metrics(store, claim.job_id))
+
+
+def test_size_of_the_database_grows_with_its_content(store: Store, claim: Claim) -> None:
+    before = size_of(store)
+    tensors = os.urandom(3_000_000)
+    policy = NewCheckpoint(sha256="ab" * 32, manifest={}, tensors=tensors)
+    attempts.record_checkpoint(store, claim, 1, policy, None)
+    assert 0 < before <= size_of(store) - len(tensors)
 
 
 @SQLITE_ONLY

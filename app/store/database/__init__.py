@@ -7,5 +7,6 @@ lock     Lock for one server per data folder and SQLite file
 migrate  Creation and upgrade of the tables
 reserve  Space reserved in the database, for ends of jobs when it is full
 schema   Check of the database's schema, for workers, which never change it
+size     Size of the database on its disk
 tables   The tables
 """

@@ -1,4 +1,5 @@
 import re
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -8,6 +9,7 @@ from prometheus_client.parser import text_string_to_metric_families
 from starlette.websockets import WebSocketDisconnect
 
 from app.api.metrics import Metrics
+from tests.api.conftest import services_of
 
 SOCKET = "ws://127.0.0.1:8000/v1/motion/stream"
 PAGE = (Path(__file__).resolve().parents[3] / "docs" / "operations.md").read_text("utf-8")
@@ -137,6 +139,16 @@ def test_handshake_of_a_socket_has_the_request_id(client: TestClient) -> None:
     with client.websocket_connect(SOCKET, headers=headers) as socket:
         accepted = dict(socket.extra_headers or [])
         assert accepted[b"x-request-id"] == b"socket-1"
+
+
+def test_space_of_the_data_folder_and_size_of_the_database_are_stated(
+    client: TestClient,
+) -> None:
+    data = services_of(client).data
+    free = value(client, "tandem_data_free_bytes")
+    assert free == pytest.approx(shutil.disk_usage(data).free, rel=0.2)
+    size = (data / "tandem.db").stat().st_size
+    assert size <= value(client, "tandem_database_size_bytes") < 2 * size + 256 * 2**20
 
 
 def test_messages_on_a_socket_are_counted_with_their_wait(client: TestClient) -> None:
