@@ -264,6 +264,9 @@ def test_evaluation_is_started_with_choices_of_the_server(
         11,
     )
     expect(page.locator('.is-open [data-role="rows"]')).to_contain_text("success")
+    output = page.locator('.is-open [data-action="log"]')
+    expect(output).to_have_attribute("href", f"v1/jobs/{job_id}/log")
+    assert "evaluate starts" in patient_http.get(f"{server}/v1/jobs/{job_id}/log").text
     expect(page.locator(".is-open .job-sub")).to_contain_text("One random target per episode")
     assert len(page.problems) == 2  # type: ignore[attr-defined]  # two refusals
 
@@ -284,6 +287,19 @@ def test_choice_of_a_drawn_field_keeps_the_focus(open_page: Callable[..., Page])
         page.keyboard.press("ArrowDown")
         expect(row).not_to_have_attribute("data-path", before or "")
         expect(row.locator("select")).to_be_focused()
+
+
+def test_rates_of_a_sweep_are_those_of_its_preset(open_page: Callable[..., Page]) -> None:
+    page = open_page((1280, 900), scene=False)
+    open_form(page)
+    page.click('[data-kind="sweep"]')
+    rates = page.locator("#sweep-objective-quantity option")
+    for preset, stated in (
+        ("pick-td3", ["most success", "least collision", "least timeout"]),
+        ("sorting-e0-dqn", ["most success", "least timeout"]),
+    ):
+        page.select_option("#sweep-preset", preset)
+        expect(rates).to_have_text(stated)
 
 
 def test_sweep_shows_its_trials_and_marks_the_best(
