@@ -21,7 +21,7 @@ from app.policies.configs.reach import ReachExploration
 from app.policies.configs.td3 import NoiseExploration
 from app.sim.core.arrays import Vec
 from app.sim.pick.batch import PickBatch
-from app.sim.scenario.kernels.person_observation import BASE_GAIN
+from app.sim.pick.kernels.base_motion import base_motions
 from app.state_dict import State, Stateful
 
 HOLD, HOME, NEARBY, ELSEWHERE = range(4)
@@ -173,7 +173,6 @@ class OptionExploration(Stateful):
         return self._configurations[self._rng.integers(len(self._configurations)), :n]
 
     def _toward_goals(self) -> Vec:
-        away = self._goal - self._batch.state.q[:, : self._batch.n_act]
-        widest = np.maximum(np.abs(away).max(axis=1, keepdims=True), 1e-9)
-        speed = np.minimum(1.0, BASE_GAIN * widest / self._batch.arm.limits.qd_max[0])
-        return np.asarray(away / widest * speed)
+        motions = np.empty_like(self._goal)
+        base_motions(self._batch.arm, self._batch.state.q, self._goal, motions)
+        return motions

@@ -157,6 +157,24 @@ def test_options_take_over_in_every_second_noisy_row():
     assert changed.tolist() == [row >= explorer.n_greedy and row % 2 == 0 for row in range(16)]
 
 
+def test_options_move_joints_with_other_speed_limits_straight():
+    cell = load_cell("pick-and-place")
+    limits = np.array([0.5, 1.0, 0.25, 2.0, 3.2])
+    robot = cell.robot.model_copy(update={"qd_max": (*limits, 3.2)})
+    unequal = cell.model_copy(update={"robot": robot})
+    batch = PickBatch(unequal, 16, 1, PickSettings())
+    batch.reset()
+    rng, silent = np.random.default_rng(3), NoiseExploration(sigma_max=0.0)
+    noise = PerEnvAR1Noise((16, 5), batch.arm.dt, silent, rng)
+    explorer = OptionExploration(noise, batch, batch.world.station_q[:1], 1.0, rng)
+    acts = explorer.apply(np.zeros((16, 5), dtype=np.float32))
+    for act, goal, q in zip(acts, explorer._goal, batch.state.q[:, :5], strict=True):
+        if act.any():
+            motion = (goal - q) / limits
+            np.testing.assert_allclose(act / act[0], motion / motion[0], rtol=1e-5)
+    assert acts.any()
+
+
 def test_ornstein_uhlenbeck_noise_pulls_and_pushes_by_its_time_step():
     """theta 0.3, sigma 0.15, dt 0.01: a pull of 0.003 and a push of 0.015 per period."""
     started, config = np.ones(2, dtype=bool), ReachExploration()

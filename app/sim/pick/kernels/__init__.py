@@ -1,5 +1,6 @@
 """Compiled pick episodes.
 
+base_motion            Straight joint move to which the actor adds its residual
 candidates             Observation of several candidates in one call
 episode                Steps, ends and rewards of episodes
 grasp                  Phases of a pick

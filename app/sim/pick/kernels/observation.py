@@ -21,6 +21,7 @@ from app.sim.core.jit import FAR, kernel
 from app.sim.geometry.capsules import nearest_parts
 from app.sim.geometry.segments import segment_nearest
 from app.sim.human.kernels import kinematics as body
+from app.sim.pick.kernels.base_motion import base_motion
 from app.sim.pick.kernels.observation_layout import (
     ARMS,
     AT_GOAL_AHEAD,
@@ -83,7 +84,6 @@ from app.sim.robot.kernels.arm import (
     robot_tilt,
 )
 from app.sim.scenario.kernels.person_observation import (
-    BASE_GAIN,
     HORIZONS,
     TICK,
     Obs,
@@ -91,28 +91,6 @@ from app.sim.scenario.kernels.person_observation import (
     extrapolate_capsules,
     place_person,
 )
-
-
-@kernel(inline="always")
-def base_motion(arm: Arm, q: Vec, q_goal: Vec, out: Vec) -> float:
-    """Write the straight joint move toward a configuration as normalised speeds in [-1, 1].
-
-    All controlled joints arrive together; the speed falls with the remaining difference.
-
-    Returns:
-        The greatest joint difference [rad].
-    """
-    widest = 0.0
-    for j in range(CONTROLLED):
-        widest = max(widest, abs(q_goal[j] - q[j]))
-    if widest < 1e-9:
-        for j in range(CONTROLLED):
-            out[j] = 0.0
-        return widest
-    pace = min(1.0, BASE_GAIN * widest / arm.limits.qd_max[0]) / widest
-    for j in range(CONTROLLED):
-        out[j] = (q_goal[j] - q[j]) * pace
-    return widest
 
 
 @kernel(inline="always")

@@ -10,6 +10,7 @@ from app.sim.core.observation_layout import slices_of
 from app.sim.human import model as human
 from app.sim.pick.batch import PickBatch, PickSettings
 from app.sim.pick.candidate_observer import CandidateObserver
+from app.sim.pick.kernels.base_motion import base_motion
 from app.sim.pick.kernels.grasp import DESCEND, GraspRules
 from app.sim.pick.kernels.observation_layout import (
     DISTANCE_SCALE,
@@ -23,7 +24,8 @@ from app.sim.pick.task_policy import PickProgress
 from app.sim.prediction.kernels.worker import TIMES, predict_worker
 from app.sim.prediction.weights import new_worker_predictor
 from app.sim.robot.ur10 import Robot
-from app.sim.scenario.kernels.person_observation import HORIZONS
+from app.sim.scenario.kernels.person_observation import BASE_GAIN, HORIZONS
+from app.sim.scene.scene import arm_of
 
 
 @pytest.fixture(scope="module")
@@ -99,6 +101,21 @@ def test_base_motion_leads_to_the_posture_at_the_target(cell: Cell) -> None:
         np.testing.assert_allclose(
             base / np.abs(base).max(), offset / np.abs(offset).max(), atol=1e-5
         )
+
+
+def test_joints_with_other_speed_limits_arrive_together_by_base_motion(cell: Cell) -> None:
+    """And one joint is at its limit until the differences are small."""
+    limits = np.array([0.5, 1.0, 0.25, 2.0, 3.2, 3.2])
+    robot = cell.robot.model_copy(update={"qd_max": tuple(limits)})
+    arm = arm_of(cell.model_copy(update={"robot": robot}))
+    goal, q, out = np.array([1.0, -0.8, 0.6, 0.5, -0.4, 0.0]), np.zeros(6), np.zeros(5)
+    for _ in range(120):
+        base_motion(arm, q, goal, out)
+        left = np.abs(goal - q)[:5] / limits[:5]
+        assert np.abs(out).max() == pytest.approx(min(1.0, BASE_GAIN * left.max()))
+        q[:5] += out * limits[:5] * arm.dt
+        np.testing.assert_allclose(q[:5] / goal[:5], q[0] / goal[0], atol=1e-12)
+    np.testing.assert_allclose(q, goal, atol=1e-4)
 
 
 def test_person_far_away_is_seen_at_the_farthest_distance(cell: Cell) -> None:
