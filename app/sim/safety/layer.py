@@ -306,12 +306,11 @@ class SafetyLayer:
             people: People of that decision.
             age: Their age beyond the tracker's delay [s].
         """
-        gap = self._space.gap[separation_check.NOW]
-        if not gap.size:
+        if not self._space.gap.size:
             return None
         column = int(self._space.cause[separation_check.CAUSE_PART])
         time = self.arm.dt + self.settings.latency + age + decision.stop_time
-        reserve = gap - np.maximum(self._rule.speed, self._space.observed_speed) * time
+        reserve = self._reserves(people, time)
         if decision.person is None:
             column = int(np.argmin(reserve))
         elif column < self._shape[0]:
@@ -319,6 +318,17 @@ class SafetyLayer:
             column = first + int(np.argmin(reserve[first : first + body.N_CAPSULES]))
         terms = self._terms_of(column, qd, people, decision.stop_time, age)
         return self._person_of(column)[0], terms
+
+    def _reserves(self, people: Shapes, seconds: float) -> Vec:
+        """Return the distance of each part less what it may move in a time [m], (m + n,)."""
+        space = self._space
+        speed = np.maximum(self._rule.speed, space.observed_speed)
+        reserve: Vec = space.gap[separation_check.NOW] - speed * seconds
+        for column in range(self._shape[0], len(reserve)):  # perhaps of known velocity
+            separation, _ = self._nearest(column, people)
+            v_h = self._human_speed(column, people, separation, seconds)
+            reserve[column] = separation - v_h * seconds
+        return reserve
 
     def _person_of(self, column: int) -> tuple[int, int | None]:
         """Return the person of a column, workers first, and its part; None for a cylinder."""

@@ -167,3 +167,22 @@ def test_terms_are_those_of_the_fast_hand_and_not_of_the_nearer_body_at_rest():
         _, terms = layer.terms(decision, NONE, people)
         assert decision.override == override
         assert (terms.human_speed, terms.required > terms.separation) == (4.0, override == 0.0)
+
+
+@pytest.mark.parametrize(("toward", "person"), [(1.0, 1), (0.0, 0), (-1.0, 0)])
+def test_terms_are_those_of_the_person_with_the_least_reserve_at_known_velocities(
+    toward, person
+):
+    """A person at rest 2.0 m away, and one 2.05 m away that walks at a known velocity."""
+    resting, walking = walker(2.0), walker(2.05, toward=toward)
+    people = replace(
+        resting,
+        cylinders=np.concatenate([resting.cylinders, walking.cylinders]),
+        going=np.concatenate([resting.going, walking.going]),
+    )
+    layer = SafetyLayer(ARM, WALKS)
+    decision = layer.decide(REST, NONE, NONE, NONE, people)
+    assert decision.override == 1.0
+    found, terms = layer.terms(decision, NONE, people)
+    assert found == person
+    assert terms.separation == pytest.approx(apart(walking if person else resting), abs=1e-9)
