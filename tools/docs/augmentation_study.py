@@ -15,15 +15,12 @@ beside recorded people.
 
 import argparse
 import json
-import math
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import torch
-from scipy.stats import t as student
 
 from app.cli.recordings import clean_runs
 from app.errors import InvalidInput
@@ -31,6 +28,7 @@ from app.policies.checkpoints.checkpoint import Checkpoint, load
 from app.policies.checkpoints.trained_cell import cell_of
 from app.policies.evaluation.pick import selection_rules
 from app.policies.evaluation.pick.episodes import CANDIDATES, Evaluator, settings_for
+from app.policies.evaluation.statistics import clustered
 from app.policies.inference.task_selection import HYSTERESIS
 from app.policies.inference.value_networks import ValueNetworks, pick_preset_of
 from app.provenance import describe
@@ -106,19 +104,6 @@ def successes(checkpoint: Checkpoint, motions: Sequence[Motion], episodes: int) 
     return rates
 
 
-def over_seeds(values: Sequence[float], low: float = 0.0, high: float = 1.0) -> Json:
-    """Return the mean over seeds with its 95 % interval (Student's t).
-
-    Args:
-        values: One of each seed, two or more.
-        low: Least value that can be.
-        high: Greatest value that can be.
-    """
-    mean, n = float(np.mean(values)), len(values)
-    half = float(student.ppf(0.975, n - 1)) * float(np.std(values, ddof=1)) / math.sqrt(n)
-    return {"mean": mean, "low": max(low, mean - half), "high": min(high, mean + half)}
-
-
 def table_of(rates: dict[str, dict[int, Json]]) -> list[Json]:
     """Return the rows of the table: each kind, and the paired difference.
 
@@ -131,14 +116,14 @@ def table_of(rates: dict[str, dict[int, Json]]) -> list[Json]:
         line: Json = {"name": kind, "seeds": len(rates[kind])}
         for name in names:
             each = [one[name] for one in rates[kind].values()]
-            line |= {name: over_seeds(each), f"{name}_by_seed": each}
+            line |= {name: clustered(each), f"{name}_by_seed": each}
         rows.append(line)
     both = sorted(set(rates[KINDS[0]]) & set(rates[KINDS[1]]))
     if len(both) > 1:
         last: Json = {"name": "difference", "seeds": len(both)}
         for name in names:
             each = [rates[KINDS[0]][seed][name] - rates[KINDS[1]][seed][name] for seed in both]
-            last |= {name: over_seeds(each, -1.0), f"{name}_by_seed": each}
+            last |= {name: clustered(each, -1.0), f"{name}_by_seed": each}
         rows.append(last)
     return rows
 

@@ -122,6 +122,8 @@ def _monitored(rows: list[Json]) -> list[list[str]]:
 def _mean(value: Json | None) -> str:
     if value is None:
         return ""
+    if "low" not in value:  # a single episode
+        return f"{value['mean']:.2f}"
     return f"{value['mean']:.2f} ({value['low']:.2f}-{value['high']:.2f})"
 
 

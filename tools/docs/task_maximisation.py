@@ -26,6 +26,7 @@ from app.policies.checkpoints.model_state import tensors_under
 from app.policies.configs import presets
 from app.policies.configs.pick import PickPreset
 from app.policies.evaluation.pick.episodes import EVALUATION_LIBRARY
+from app.policies.evaluation.statistics import clustered
 from app.policies.inference.value_networks import pick_preset_of
 from app.policies.networks.pick import actor_of, critics_for
 from app.policies.training.curve import play
@@ -34,7 +35,6 @@ from app.provenance import describe
 from app.sim.cells.cell import load_cell
 from app.sim.pick.batch import OUTCOMES
 from app.sim.pick.valued_targets import ValuedTargetBatch
-from tools.docs.augmentation_study import over_seeds
 from tools.docs.learning_curves import policies
 from tools.docs.training_curves import record
 from tools.docs.world.plots import BLUE, GREY, ORANGE, panels, save
@@ -190,7 +190,7 @@ def _intervals(values: dict[str, list[float]], low: float) -> Json:
     line: Json = {}
     for name, each in values.items():
         ends = (-math.inf, math.inf) if name.startswith("error") else (low, 1.0)
-        line |= {name: over_seeds(each, *ends), f"{name}_by_seed": each}
+        line |= {name: clustered(each, *ends), f"{name}_by_seed": each}
     return line
 
 

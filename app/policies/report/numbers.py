@@ -23,6 +23,8 @@ def stored_value(found: Json, row: str, key: str, unit: str = "") -> str | None:
     listed = [*found.get("results", ()), *paired]
     rows = {one["name"]: one for one in reversed(listed)}
     value = rows.get(row, {}).get(key)
+    if isinstance(value, dict) and not {"low", "sd"} & value.keys():
+        value = value["mean"]  # of a single episode
     if isinstance(value, dict) and not unit:
         mean, low, high = (100.0 * value[key] for key in ("mean", "low", "high"))
         to = "-" if low >= 0.0 else " to "

@@ -1,8 +1,15 @@
-"""Last points of learning curves."""
+"""Numbers of results, and last points of learning curves."""
 
 from typing import Any
 
-from app.policies.report.numbers import curve_end
+from app.policies.report.numbers import curve_end, stored_value
+
+
+def test_the_mean_of_one_episode_has_no_interval() -> None:
+    several = {"mean": 4.0, "low": 3.0, "high": 5.0}
+    rows = [{"name": "a", "time_s": {"mean": 4.0}}, {"name": "b", "time_s": several}]
+    assert stored_value({"results": rows}, "a", "time_s", "s") == "4 s"
+    assert stored_value({"results": rows}, "b", "time_s", "s") == "4.00 (3.00 to 5.00) s"
 
 
 def curve(*points: tuple[int, float, float]) -> dict[str, Any]:

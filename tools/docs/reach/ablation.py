@@ -27,8 +27,8 @@ from app.errors import InvalidInput
 from app.policies.checkpoints.checkpoint import Checkpoint
 from app.policies.configs import presets
 from app.policies.evaluation.reach.bench import ReachBench
+from app.policies.evaluation.statistics import clustered
 from app.provenance import describe
-from tools.docs.augmentation_study import over_seeds
 from tools.docs.learning_curves import lines
 from tools.docs.reach.curves import ENDS
 from tools.docs.training_curves import read_if_there, record
@@ -105,7 +105,7 @@ def row_of(name: str, runs: Sequence[Json], base: Sequence[Json]) -> Json:
         "name": name,
         "seeds": len(runs),
         "n": sum(run["n"] for run in runs),
-        **{end: over_seeds(each) for end, each in means.items()},
+        **{end: clustered(each) for end, each in means.items()},
         "worst_seed": min(successes),
         "best_seed": max(successes),
         "against_base": None

@@ -145,6 +145,8 @@ def shown(row: Json, key: str) -> str:
         scale, unit, digits = (1.0, "", 4) if key in RATIOS else (100.0, " %", 2)
         if key in COUNTS:
             scale, unit, digits = 1.0, "", 2
+        if "low" not in value:  # a single episode
+            return f"{scale * value['mean']:.{digits}f}{unit}"
         mean, low, high = (
             f"{scale * value[one]:.{digits}f}" for one in ("mean", "low", "high")
         )

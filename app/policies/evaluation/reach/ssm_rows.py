@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from app.policies.evaluation.statistics import mean_of, wilson
+from app.policies.evaluation.statistics import mean_of, ratio_values, wilson
 from app.sim.scenario.monitoring import MonitoredEpisodes
 
 Json = dict[str, Any]
@@ -78,8 +78,8 @@ def against(one: MonitoredEpisodes, other: MonitoredEpisodes, time_limit_s: floa
     """Return the time saved by ``one`` against ``other``, paired by crossing.
 
     ``all`` covers all runs, with the time limit for runs that do not arrive; ``untouched`` the
-    runs in which both arrive and neither is touched. ``share`` is relative to the other's mean
-    time.
+    runs in which both arrive and neither is touched. ``share`` is the ratio of the time saved
+    to the other's time, over all of them.
 
     Args:
         one: Runs of all crossings.
@@ -92,10 +92,9 @@ def against(one: MonitoredEpisodes, other: MonitoredEpisodes, time_limit_s: floa
     def saving(which: NDArray[np.bool_]) -> Json | None:
         if not which.any():
             return None
-        less = mean_of(times[1][which] - times[0][which])
-        scale = float(times[1][which].mean())
-        share = {key: value / scale for key, value in (less or {}).items()}
-        return {"n": int(which.sum()), "saved_s": less, "share": share}
+        saved, usual = (times[1] - times[0])[which], times[1][which]
+        share = mean_of(ratio_values(saved, usual))
+        return {"n": int(which.sum()), "saved_s": mean_of(saved), "share": share}
 
     every = np.ones(len(untouched), dtype=np.bool_)
     return {"all": saving(every), "untouched": saving(untouched)}

@@ -24,8 +24,8 @@ from app.policies.evaluation.sorting.episodes import (
     greedy,
     run_with_fallback,
 )
-from app.policies.evaluation.sorting.grid import settings_of, share
-from app.policies.evaluation.statistics import mean_of, wilson
+from app.policies.evaluation.sorting.grid import settings_of
+from app.policies.evaluation.statistics import mean_of, share_of, wilson
 from app.sim.core.arrays import Vec
 from app.sim.sorting.batch import SortingBatch, SortingSettings
 from app.sim.sorting.benchmark_tasks import TESTS, SortingTest
@@ -97,7 +97,6 @@ def run_test(
 def row_of(name: str, episodes: SortingEpisodes) -> dict[str, Any]:
     """Return a row of the result."""
     n, good = len(episodes.success), episodes.part(episodes.success)
-    choices, riskier = int(episodes.choices.sum()), int(episodes.riskier.sum())
     return {
         "name": name,
         "n": n,
@@ -105,9 +104,9 @@ def row_of(name: str, episodes: SortingEpisodes) -> dict[str, Any]:
         "timeout": wilson(n - len(good.success), n),
         "fewest": wilson(int((good.moves == good.fewest).sum()), n),
         "moves_over_minimum": mean_of(good.moves / good.fewest),
-        "riskier_pick": share(episodes.riskier, episodes.picks),
-        "safest_identical": wilson(choices - riskier, choices) if choices else None,
-        "failed_pick": share(episodes.failed, episodes.picks),
+        "riskier_pick": share_of(episodes.riskier, episodes.picks),
+        "safest_identical": share_of(episodes.choices - episodes.riskier, episodes.choices),
+        "failed_pick": share_of(episodes.failed, episodes.picks),
         "planner_fallback": wilson(int(episodes.planner_fallback.sum()), n),
         "repeated": wilson(int(episodes.repeated.sum()), n),
     }

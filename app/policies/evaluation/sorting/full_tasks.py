@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from app.policies.evaluation.statistics import mean_of, wilson
+from app.policies.evaluation.statistics import count_of, mean_of, ratio_values, wilson
 from app.sim.core.arrays import Vec
 
 Index = NDArray[np.int64]
@@ -45,10 +45,10 @@ class FullTasks:
             "n": n,
             "finished": wilson(int(self.finished.sum()), n),
             "without_moving_contact": wilson(free, n),
-            "moving_contacts": mean_of(self.moving),
-            "contacts_at_rest": mean_of(self.resting),
+            "moving_contacts": count_of(self.moving),
+            "contacts_at_rest": count_of(self.resting),
             "stopped": mean_of(self.stopped),
-            "late_motions": mean_of(self.late),
+            "late_motions": count_of(self.late),
             "grasps": mean_of(self.attempts),
             "options_per_grasp": float(self.options.sum() / max(1, self.attempts.sum())),
             "cycle_time_s": mean_of(self.cycle_s[self.finished]),
@@ -58,11 +58,6 @@ class FullTasks:
         """Return values per task whose mean is the number of parts per hour, shape (n,).
 
         The estimate is the ratio of all parts to the whole time, tasks that were not finished
-        included. The deviation of each value from the mean is the contribution of its task to
-        the first order (delta method), so that the interval of the mean is that of the ratio,
-        and differences between conditions on the same tasks are paired.
+        included; see :func:`ratio_values`.
         """
-        hours = self.cycle_s / 3600.0
-        rate = self.parts.sum() / hours.sum()
-        values: Vec = rate + (self.parts - rate * hours) / hours.mean()
-        return values
+        return ratio_values(self.parts, self.cycle_s / 3600.0)

@@ -37,7 +37,7 @@ from app.policies.evaluation.sorting.episodes import (
 )
 from app.policies.evaluation.sorting.optimal_baseline import choose_by_planner
 from app.policies.evaluation.sorting.pairs import SMALL, grid_batches, pairs_of
-from app.policies.evaluation.statistics import mean_of, wilson
+from app.policies.evaluation.statistics import mean_of, share_of, wilson
 from app.sim.core.arrays import Vec
 from app.sim.sorting.batch import SortingBatch, SortingSettings
 from app.sim.sorting.state import SortingShape
@@ -102,8 +102,8 @@ def row_of(name: str, episodes: SortingEpisodes, pairs: Index, least: float) -> 
         "moves_over_minimum": mean_of(good.moves / good.fewest),
         "exactly_minimal": wilson(int((good.moves == good.fewest).sum()), n),
         "attempts_over_expected": mean_of(good.attempts / good.expected),
-        "riskier_pick": share(episodes.riskier, episodes.picks),
-        "failed_pick": share(episodes.failed, episodes.picks),
+        "riskier_pick": share_of(episodes.riskier, episodes.picks),
+        "failed_pick": share_of(episodes.failed, episodes.picks),
         "planner_fallback": wilson(int(episodes.planner_fallback.sum()), n),
         "repeated": wilson(int(episodes.repeated.sum()), n),
         "mean_return": float(episodes.rewards.mean()),
@@ -126,12 +126,6 @@ def pair_of(
         "return": float(episodes.rewards.mean()),
         "below": success["high"] < least,
     }
-
-
-def share(hits: Index, of: Index) -> dict[str, float] | None:
-    """Return a rate over all episodes; None if ``of`` is zero."""
-    total = int(of.sum())
-    return wilson(int(hits.sum()), total) if total else None
 
 
 def grid(values: Values, shape: SortingShape, fail: Vec, request: EvaluationRequest) -> Json:

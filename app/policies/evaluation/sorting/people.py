@@ -38,7 +38,7 @@ from app.policies.evaluation.sorting.order_rules import (
     critic,
 )
 from app.policies.evaluation.sorting.task_states import NOTHING, TaskStates
-from app.policies.evaluation.statistics import mean_of
+from app.policies.evaluation.statistics import count_difference, mean_of
 from app.policies.inference.task_selection import HYSTERESIS
 from app.policies.inference.value_networks import ValueNetworks, pick_preset_of
 from app.sim.cells.cell import Cell, load_cell
@@ -365,5 +365,5 @@ def _paired(first: FullTasks, other: FullTasks, name: str) -> dict[str, Any]:
         "name": f"critic - {name}",
         "n": int(both.sum()),
         "cycle_time_s": mean_of((first.cycle_s - other.cycle_s)[both]),
-        "moving_contacts": mean_of((first.moving - other.moving)[both]),
+        "moving_contacts": count_difference(first.moving[both], other.moving[both]),
     }

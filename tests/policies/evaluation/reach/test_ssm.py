@@ -84,6 +84,11 @@ def test_a_saving_is_paired_and_counts_runs_that_do_not_arrive(straight):
     assert same["all"]["n"] == 6
     half = selected(straight.episodes, np.arange(3))
     assert against(half, half, LIMIT_S)["all"]["n"] == 3
+    every = np.ones(6, dtype=bool)
+    fast = replace(straight.episodes, arrived=every, seconds=np.arange(1.0, 7.0))
+    slow = replace(fast, seconds=4.0 * fast.seconds)
+    share = against(fast, slow, LIMIT_S)["all"]["share"]
+    assert share == pytest.approx({"mean": 0.75, "low": 0.75, "high": 0.75})
 
 
 def test_the_protocol_runs_policy_planners_recordings_and_random_episodes(monkeypatch):

@@ -9,8 +9,7 @@ from scipy import stats
 from app.errors import InvalidInput
 from app.policies.configs import presets
 from app.policies.configs.fields import entries
-from app.policies.evaluation.statistics import wilson
-from tools.docs.augmentation_study import over_seeds
+from app.policies.evaluation.statistics import clustered, wilson
 from tools.docs.reach.ablation import BASE, CHANGES, SHORT, folder_of, measured, row_of, welch
 
 
@@ -40,7 +39,7 @@ def test_intervals_count_seeds() -> None:
     worse = [run(0.90, cpu_min=5.0), run(0.92, cpu_min=7.0)]
     row = row_of("worse", worse, base)
     assert row["n"] == 2000
-    assert row["success"] == over_seeds([0.90, 0.92])
+    assert row["success"] == clustered([0.90, 0.92])
     assert row["against_base"] == welch([0.90, 0.92], [0.95, 0.96, 0.94])
     assert (row["worst_seed"], row["best_seed"]) == (0.90, 0.92)
     assert row["cpu_min"] == pytest.approx(6.0)

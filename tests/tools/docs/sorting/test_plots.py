@@ -85,6 +85,7 @@ def test_the_table_of_full_tasks_has_a_column_per_rule_and_per_difference() -> N
     cycle = {"mean": 101.4, "low": 99.9, "high": 102.9}
     less = {"mean": -3.5, "low": -5.6, "high": -1.4}
     row = {"name": "critic", "n": 300, "finished": rate(1.0), "cycle_time_s": cycle}
+    row["parts_per_hour"] = {"mean": 219.6}
     pair = {"name": "critic - planner", "n": 300, "cycle_time_s": less}
     settings = {"cell": "sorting-e0"}
     shown = table(
@@ -92,6 +93,7 @@ def test_the_table_of_full_tasks_has_a_column_per_rule_and_per_difference() -> N
     ).splitlines()
     assert shown[0] == "|  | `critic` | `critic - planner` |"
     assert shown[3] == "| finished | 100.00 % (99.90-100.00) |  |"
+    assert "| parts per hour | 219.60 |  |" in shown
     assert "| cycle time [s] | 101.40 (99.90-102.90) | -3.50 (-5.60 to -1.40) |" in shown
 
 
