@@ -70,8 +70,11 @@ def collect(
 ) -> OutcomeData:
     """Return labelled observations of episodes under a greedy policy.
 
+    Every episode that begins within the steps is simulated to its end: without those that are
+    still running, long episodes would be missing more often than short ones.
+
     Args:
-        n_steps: Steps of all environments.
+        n_steps: Steps of all environments in which episodes begin.
         seed: Seed of the steps that are kept.
         should_stop: Called before every step.
 
@@ -83,7 +86,8 @@ def collect(
     kept: list[list[tuple[NDArray[np.float32], float, float]]] = [[] for _ in range(n)]
     rows: list[tuple[NDArray[np.float32], float, int, float, int]] = []
     episode, dt = np.arange(n), batch.arm.dt
-    for _ in range(n_steps):
+    steps, collected = 0, np.full(n, n_steps > 0)  # whether the episode began in time
+    while collected.any():
         _continue_unless(should_stop)
         first = batch.state.elapsed < 0.5 * dt
         shortened = np.flatnonzero(first & (rng.random(n) < SHORTENED))
@@ -92,15 +96,17 @@ def collect(
             obs = torch.as_tensor(batch.obs)
             act = actor(obs)
             value = critic.least(obs, act).numpy()
-        for e in np.flatnonzero(first | (rng.random(n) < KEEP)).tolist():
+        for e in np.flatnonzero(collected & (first | (rng.random(n) < KEEP))).tolist():
             sample = batch.obs[e].copy(), float(value[e]), float(batch.state.elapsed[e])
             kept[e].append(sample)
         elapsed = batch.state.elapsed + dt
         ended = batch.step(act.numpy()).ended
-        for e in np.flatnonzero(ended).tolist():
+        for e in np.flatnonzero(collected & (ended > 0)).tolist():
             label = LABELS[int(ended[e])]
             rows += [(o, v, label, elapsed[e] - t, int(episode[e])) for o, v, t in kept[e]]
             kept[e], episode[e] = [], episode[e] + n
+        steps += 1
+        collected &= (ended == 0) | (steps < n_steps)
     if not rows:
         none = np.zeros(0, dtype=np.float32)
         return OutcomeData(batch.obs[:0], none, none.astype(int), none, none.astype(int))

@@ -64,6 +64,17 @@ def test_outcomes_are_learned_from_episodes_of_any_length():
     assert data.time_s[first][timeout] == pytest.approx(left[timeout], abs=1e-3)
 
 
+def test_every_episode_that_begins_within_the_steps_is_learned_to_its_end():
+    preset = PickPreset()
+    batch = batch_of(preset, CELL, 24, 3)
+    networks = [make(preset, batch.obs_size) for make in (actor_of, critics_for)]
+    data = collect(batch, *networks, n_steps=1, seed=3, should_stop=lambda: False)
+    assert np.unique(data.episode).tolist() == list(range(24))
+    assert data.time_s.min() > 0.0 and data.time_s.max() > 1.0
+    none = collect(batch, *networks, n_steps=0, seed=3, should_stop=lambda: False)
+    assert len(none.obs) == 0
+
+
 def test_monitored_preset_steps_under_the_layer_with_the_settings_of_the_cell():
     preset = MONITORED
     batch = batch_of(preset, CELL, 16, 3)
