@@ -31,6 +31,9 @@ EPOCHS, BATCH, RATE, DECAY = 12, 1024, 1e-3, 0.1
 """Passes over the data, size of a minibatch, learning rate and weight decay."""
 LEAST_BATCHES = 16
 """Fewest minibatches of a pass; they are smaller where there is little data."""
+LEAST_SPREAD = 1e-3
+"""Spread that errors are compared with where the members agree more closely: one factor widens
+all intervals, so that small errors of nearly certain outcomes would make the others useless."""
 TIME_WEIGHT = 0.05
 """Weight of the error of the time, relative to the cross-entropy."""
 
@@ -124,7 +127,8 @@ def fit(data: OutcomeData, seed: int, should_stop: Callable[[], bool]) -> Outcom
     """Return the ensemble fitted to labelled observations.
 
     A tenth of the episodes is kept apart: on them the spread is widened until the rate of
-    success lies inside the interval in nine of ten bins.
+    success lies inside the interval in nine of ten bins (in bins of nearly certain outcomes,
+    inside LEAST_SPREAD times the same factor).
 
     Args:
         data: Labelled observations.
@@ -197,7 +201,8 @@ def _widen(head: OutcomeHead, data: OutcomeData, apart: NDArray[np.bool_]) -> No
     won = data.label[apart] == 0
     order = np.argsort(probability)
     ratios = [
-        abs(won[part].mean() - probability[part].mean()) / max(spread[part].mean(), 1e-3)
+        abs(won[part].mean() - probability[part].mean())
+        / max(spread[part].mean(), LEAST_SPREAD)
         for part in np.array_split(order, 10)
         if len(part)
     ]

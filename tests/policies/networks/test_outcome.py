@@ -6,7 +6,7 @@ import torch
 
 from app.policies.networks.actor_critic import ResidualActor, ResidualFading
 from app.policies.networks.outcome import OutcomeHead
-from app.policies.training.outcome import EPOCHS, FitStopped, OutcomeData, fit
+from app.policies.training.outcome import EPOCHS, FitStopped, OutcomeData, _widen, fit
 
 
 def test_probabilities_sum_to_one_and_times_are_not_negative() -> None:
@@ -33,6 +33,18 @@ def test_a_fit_recovers_a_rate_that_depends_on_one_input(n: int, error: float) -
     np.testing.assert_allclose(found.probability[:, 0], expected, atol=error)
     assert found.probability[:, 2].max() < error
     np.testing.assert_allclose(found.time_s, 3.0, atol=0.3)
+
+
+def test_small_errors_of_certain_outcomes_widen_no_interval() -> None:
+    """Three equal members predict 99.93 %, and all succeed: the spread is 0, the error not."""
+    head, n = OutcomeHead(1), 1000
+    for member in head.members:
+        torch.nn.init.zeros_(member[-1].weight)
+        member[-1].bias.data = torch.tensor([8.0, 0.0, 0.0, 3.0])
+    zero = np.zeros(n, dtype=np.float32)
+    data = OutcomeData(zero[:, None], zero, np.zeros(n, dtype=np.int64), zero, np.arange(n))
+    _widen(head, data, np.ones(n, dtype=bool))
+    assert float(head.widen) == 1.0
 
 
 def test_a_fit_stops_between_two_passes_over_the_data() -> None:
