@@ -81,11 +81,6 @@ class CaseGeometry:
         """Return the length of the tool's path to a goal in straight joint motion [m]."""
         return self.stations.tool_path_m[self.start, goal]
 
-    def joint_distance_rad(self, goal: str) -> float:
-        """Return the largest joint difference between the start and a goal [rad]."""
-        over = self.stations.over
-        return float(np.abs(over[goal] - over[self.start]).max())
-
     def blocked_s(self, goal: str) -> tuple[float, float] | None:
         """Return the first and the last time at which a goal is blocked [s]; None for never."""
         when = self.person.times[self.person.goal_m[goal] < BLOCKED_BELOW]

@@ -186,7 +186,6 @@ def agrees(case: str, shown: CaseGeometry) -> bool:
     return (
         shown.person.palm_error_m <= PALM_ERROR
         and between >= NEARER_BY
-        and shown.joint_distance_rad(shown.nearer) < shown.joint_distance_rad(shown.farther)
         and bool(start[FIRST] >= FREE_FROM and start.min() >= MARGIN)
         and DESCRIPTIONS[case].holds(shown)
     )

