@@ -3,7 +3,7 @@
 The fraction of the straight joint path from the target (0) to the sampled start (1) has a
 triangular distribution with the upper limit 1; a training moves its mode and its lower limit.
 A fraction at which the robot would be nearer to a person than at other starts, or in contact,
-is drawn again; after ``FRACTION_TRIES`` the robot is at the sampled start.
+is drawn again; the last of ``FRACTION_TRIES`` tries is the sampled start itself.
 
 Source: thesis section 5.3.4.
 """
@@ -18,7 +18,7 @@ from app.sim.robot.kernels.arm import CONTROLLED
 from app.sim.scenario.kernels.episode import Indices
 
 FRACTION_TRIES = 20
-"""Draws of a fraction of the path."""
+"""Tries of a fraction of the path; the last is 1."""
 
 
 class StartRange(NamedTuple):
