@@ -25,7 +25,13 @@ from numpy.typing import NDArray
 from app.sim.core.arrays import Vec
 from app.sim.core.jit import kernel
 from app.sim.core.kernels.rng import State, below, normal, uniform
-from app.sim.primitives.kernels.script import MAX_MOVES, Moves, draw_pause, draw_posture
+from app.sim.primitives.kernels.script import (
+    MAX_MOVES,
+    Moves,
+    draw_pause,
+    draw_posture,
+    minimum_jerk,
+)
 
 Index = NDArray[np.int64]
 
@@ -206,10 +212,7 @@ def phase_profile(
         if t >= duration * stop_at:
             t = max(0.0, t - duration * stop_at - stop_s)
             begin, span = stop_at, 1.0 - stop_at
-    seconds = duration * span
-    x = min(1.0, max(0.0, t / seconds))
-    phase = x * x * x * (10.0 + x * (6.0 * x - 15.0))
-    rate = 30.0 * (x * (1.0 - x)) ** 2 / seconds
+    phase, rate = minimum_jerk(t, duration * span)
     return begin + span * phase, span * rate
 
 

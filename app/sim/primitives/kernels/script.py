@@ -62,6 +62,19 @@ def script_at(
     move_at(t, start[move], duration[move], postures[move], postures[move + 1], 1.0, q, qd)
 
 
+@kernel(error_model="numpy", inline="always")
+def minimum_jerk(t: float, duration: float) -> tuple[float, float]:
+    """Return the minimum-jerk phase in [0, 1] and its rate [1/s], at rest at both ends.
+
+    Args:
+        t: Time since the start [s]; clipped to the motion.
+        duration: Duration of the motion [s].
+    """
+    x = min(1.0, max(0.0, t / duration))
+    phase = x * x * x * (10.0 + x * (6.0 * x - 15.0))
+    return phase, 30.0 * (x * (1.0 - x)) ** 2 / duration
+
+
 @kernel(error_model="numpy")
 def move_at(
     t: float,
@@ -85,12 +98,10 @@ def move_at(
         q: Filled with joint positions [m, rad], shape (18,).
         qd: Filled with joint speeds [m/s, rad/s], shape (18,).
     """
-    phase = min(1.0, max(0.0, (t - start) / duration))
-    blend = phase * phase * phase * (10.0 + phase * (6.0 * phase - 15.0))
-    rate = 30.0 * (phase * (1.0 - phase)) ** 2 / duration
+    phase, rate = minimum_jerk(t - start, duration)
     for j in range(18):
         span = after[j] - before[j]
-        q[j] = before[j] + blend * span
+        q[j] = before[j] + phase * span
         qd[j] = rate * span * pace
 
 
