@@ -36,6 +36,15 @@ def motions(cell: Cell, library: MotionLibrary) -> list[SegmentMotion]:
     return random_segments(cell, library, N, 1)
 
 
+@pytest.mark.parametrize(("floor", "largest"), [(0.01, 4.02), (0.05, 1.24), (0.06, 1.19)])
+def test_a_floor_keeps_the_gains_small(cell: Cell, floor: float, largest: float) -> None:
+    known = [primitive_for(cell, segment).weights for segment in segments_of(cell)]
+    both = [one for some in known for one in (some, some[..., ::-1])]
+    gains = [np.abs(promp.gain_of_ends(one, floor)).max() for one in both]
+    assert max(gains) == pytest.approx(largest, abs=0.005)
+    assert {len(some) for some in known} == {60}
+
+
 def moved(cell: Cell, offset: tuple[float, float], jitter: float, seed: int = 0) -> Cell:
     """Return a cell of which everything is moved, and the stations some more."""
     rng = np.random.default_rng(seed)
