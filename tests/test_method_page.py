@@ -11,7 +11,7 @@ ROOT = Path(__file__).resolve().parent.parent
 DOCS = ROOT / "docs"
 TEXT = (DOCS / "method.md").read_text("utf-8")
 SUFFIXES = {".py", ".md", ".js", ".html", ".css", ".json", ".pddl", ".toml", ".yaml"}
-CITING = ("app", "jobs", "web", "docs", "tests")
+CITING = ("app", "jobs", "web", "docs", "tests", "tools")
 NUMBER = r"\d+(?:\.\d+)*"
 BETWEEN = r"(?:\s*,\s*(?:and\s+)?|\s+and\s+|\s+to\s+|\s*-\s*)"
 CITATION = r"\b(?:METHOD|docs/method\.md`{0,2})[\s#*/]+"
@@ -98,6 +98,13 @@ def test_every_cited_section_exists() -> None:
     }
     assert len(cited) > 100
     assert {(path, number) for path, number in cited if number not in known} == set()
+
+
+def test_modules_that_decide_by_default_are_listed() -> None:
+    listed = TEXT.partition("## 7. ")[2].partition("## 8. ")[0]
+    for module in ("inference/rollout", "inference/controllers", "kernels/improvement"):
+        assert f"{module}.py" in listed
+    assert "**Rollout**" in TEXT
 
 
 def test_headings_are_numbered_without_gaps() -> None:

@@ -6,7 +6,7 @@ offered while another is free, and a motion planner (``planning/replanning.py``)
 around the people through the phases of the pick. It brakes where a person enters its path. As
 soon as a person moves, the policy acts again.
 
-Source: ours; replanning after docs/method.md 2.6.
+Source: ours; docs/method.md 3.1.
 """
 
 from dataclasses import dataclass, field

@@ -5,7 +5,7 @@ the joint motion of a period that would bring a part of the robot in contact clo
 obstacle is not executed: the joints keep their positions, at rest. Motion away from the
 obstacle is. A person who walks into the robot passes through it.
 
-Source: docs/method.md 2.3; the reward (4.25)-(4.28), with the norm of the action as its cost.
+Source: docs/method.md 2.5; the reward (4.25)-(4.28), with the norm of the action as its cost.
 """
 
 import numpy as np

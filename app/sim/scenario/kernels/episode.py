@@ -41,7 +41,7 @@ SUCCESS_DISTANCE = 0.1
 START_TRIES = 200
 """Draws of a start, of which the last is used with any clearance."""
 MAX_CANDIDATES = 6
-"""Most targets that an episode of the pick scenario offers (docs/method.md 3.6)."""
+"""Most targets that an episode of the pick scenario offers."""
 NO_TARGET = -1
 """Number of a goal that is not one of the targets."""
 
