@@ -28,7 +28,7 @@ from app.sim.scene.scene import people_geometry_of
 
 def scenes_of(
     arm: Arm, shared: People, q: Vec, people: tuple[Person, ...], moved: MovedPerson
-) -> tuple[tuple[Vec, Vec, Vec], Vec | None]:
+) -> tuple[tuple[Vec, Vec, Vec], Vec]:
     """Return the observed people beside each posture, the nearest to the robot first.
 
     Args:
@@ -40,8 +40,7 @@ def scenes_of(
     Returns:
         Joint positions [m, rad] and speeds [m/s, rad/s], shape (m, P, 18) each, and body
         dimensions [m], shape (m, P, N_SIZE); then the distance of the robot to the nearest
-        person [m], shape (m,), None where observations contain it: cylinders are observed as
-        people who stand in them.
+        person [m], shape (m,).
 
     Raises:
         InvalidInput: There is no such person, or a posture is no person's.
@@ -55,16 +54,15 @@ def scenes_of(
         raise InvalidInput("moved.q", postures.shape, "must be finite, of shape (m, 18)")
     present = [i for i in range(n) if i == who or not is_far(people[i])]
     others, m = [i for i in present if i != who], len(postures)
-    order, clearance = np.tile([who, *others], (m, 1)), None
-    if others or people[who].cylinder is not None:
-        clearance = own = _clearances(arm, shared, q, people[who], postures)
-        if others:
-            place = nearest_index(arm, shared, q, [people[i] for i in others])
-            first = others[place or 0]
-            near = people[first]
-            gap = _clearances(arm, shared, q, near, as_kernel_array(near.q)[None])
-            order[own > gap] = [first, *(i for i in present if i != first)]
-            clearance = np.minimum(own, gap)
+    order = np.tile([who, *others], (m, 1))
+    clearance = _clearances(arm, shared, q, people[who], postures)
+    if others:
+        place = nearest_index(arm, shared, q, [people[i] for i in others])
+        first = others[place or 0]
+        near = people[first]
+        gap = _clearances(arm, shared, q, near, as_kernel_array(near.q)[None])
+        order[clearance > gap] = [first, *(i for i in present if i != first)]
+        clearance = np.minimum(clearance, gap)
     known = [as_known(person) for person in people]
     sizes = np.stack([shared.bodies[0] if p.size is None else p.size for p in known])
     joints = np.tile(np.stack([person.q for person in known]), (m, 1, 1))

@@ -25,7 +25,6 @@ from app.policies.inference.pick_training_range import PickTrainingRange
 from app.policies.inference.trained_policy import TrainedPolicy
 from app.policies.inference.value_networks import ValueNetworks, pick_preset_of
 from app.policies.networks.outcome import OutcomePrediction, estimates_of
-from app.policies.networks.pick import CLEARANCE
 from app.sim.cells.cell import Cell, require_cell
 from app.sim.core.arrays import Vec
 from app.sim.core.kernels.bounds import are_inside
@@ -43,7 +42,7 @@ from app.sim.perception.observed_people import (
 from app.sim.pick.batch import step_robot
 from app.sim.pick.candidate_observer import CandidateObserver
 from app.sim.pick.kernels.grasp import LIFT, GraspRules
-from app.sim.pick.kernels.observation_layout import DISTANCE_SCALE, FARTHEST, PRESENT_WITHIN
+from app.sim.pick.kernels.observation_layout import FARTHEST, PRESENT_WITHIN
 from app.sim.pick.task_policy import (
     FRESH,
     NOT_BEGUN,
@@ -108,8 +107,6 @@ class _SelectionQuery(NamedTuple):
 class _Evaluation(NamedTuple):
     """Evaluation of n candidates beside m sets of people."""
 
-    obs: NDArray[np.float32]
-    """Observations, shape (m n, n_obs)."""
     reachable: NDArray[np.bool_]
     """Shape (n,)."""
     act: NDArray[np.float32]
@@ -213,8 +210,6 @@ class TaskChooser(TrainedPolicy):
         m, k = found.values.shape
         rows = np.arange(m) * k + found.chosen
         risk = None if found.outcomes is None else found.outcomes.probability[rows]
-        if clearance is None:
-            clearance = DISTANCE_SCALE * found.obs[::k, CLEARANCE].astype(np.float64)
         return RiskMap(
             chosen=found.chosen,
             value=found.values.ravel()[rows].astype(np.float64),
@@ -263,7 +258,7 @@ class TaskChooser(TrainedPolicy):
             scores = success if terms.objective == "success" else -per_success
             by_score = np.where(offered, scores.reshape(by_set.shape), -np.inf)
             chosen = by_score.argmax(axis=1)
-        return _Evaluation(obs, reachable, act, by_set, outcomes, chosen)
+        return _Evaluation(reachable, act, by_set, outcomes, chosen)
 
     def _speeds(self, q: Vec, qd: Vec, act: NDArray[np.float32]) -> Vec:
         """Return the joint speeds of actions, shape (n, 5) [rad/s], shape (n, 6)."""

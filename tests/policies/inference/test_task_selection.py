@@ -10,12 +10,14 @@ from app.policies.checkpoints import pretrained
 from app.policies.checkpoints.checkpoint import Checkpoint
 from app.policies.inference.task_selection import TaskChooser, select
 from app.sim.cells.cell import load_cell
+from app.sim.collision.contact import worker_distances
 from app.sim.human import model as human
 from app.sim.human.anthropometry import percentile_body
 from app.sim.human.person import Person
 from app.sim.pick.kernels.grasp import LIFT
-from app.sim.pick.task_policy import Candidate, PickProgress
+from app.sim.pick.task_policy import Candidate, MovedPerson, PickProgress
 from app.sim.robot.ur10 import Robot
+from app.sim.scene.scene import arm_of, people_of
 
 CELL = load_cell("pick-and-place")
 HOME = np.array(CELL.robot.home_q)
@@ -89,6 +91,23 @@ def test_a_hand_on_one_of_two_equally_near_cubes_turns_the_choice(
     assert posture.reached
     assert beside.chosen == free
     assert beside.values[0] < alone.values[0] - 0.25
+
+
+def test_map_has_the_distances_of_the_contact_test_with_one_worker_and_with_two(chooser):
+    grid = [(x, y) for x in np.linspace(-0.8, 0.8, 9) for y in np.linspace(-0.4, 1.4, 10)]
+    moved = MovedPerson(
+        index=0, q=np.array([human.rest_posture(x, y, -np.pi / 2) for x, y in grid])
+    )
+    of_robot, shared = arm_of(CELL), people_of(CELL)
+    exact = [
+        worker_distances(of_robot, shared, HOME, posture[None], CELL.body[None])[0]
+        for posture in moved.q
+    ]
+    far = person(-3.0, 2.5)
+    for people in ([person()], [person(), far]):
+        found = chooser.risk_map(HOME, np.zeros(6), people, cubes("cube1", "cube4"), moved)
+        np.testing.assert_allclose(found.clearance_m, np.minimum(exact, 1.5), atol=1e-9)
+    assert min(exact) <= 0.0 < max(exact)
 
 
 def test_hysteresis_keeps_the_previous_choice_until_another_is_clearly_better():
