@@ -273,7 +273,8 @@ def observation_workspace_of(cell: Cell) -> PickObservationWorkspace:
     """Return work space for observations in a cell, one at a time."""
     far = human.rest_posture(*FAR_AWAY)
     size, predictor = as_kernel_array(cell.body), new_worker_predictor()
-    return new_pick_observation_workspace(cell.floor_z, far, size, predictor)
+    tool = cell.robot.tool_length, cell.robot.tool_radius
+    return new_pick_observation_workspace(cell.floor_z, far, size, predictor, tool)
 
 
 def target_configurations(arm: Arm, grasp: GraspRules, goals: Vec) -> tuple[Vec, Vec, Flags]:

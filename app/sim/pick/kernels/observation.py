@@ -60,7 +60,6 @@ from app.sim.pick.kernels.observation_workspace import (
     COARSE_FIRST,
     COARSE_LINK,
     COARSE_P0,
-    COARSE_SPAN,
     FIRST_PART,
     GOAL_LANES,
     LAST_PART,
@@ -97,7 +96,7 @@ from app.sim.scenario.kernels.person_observation import (
 def _place_lanes(arm: Arm, q: Vec, first: int, work: PickObservationWorkspace) -> None:
     """Place the robot's coarse capsules at ``q`` [rad], shape (6,), from lane ``first`` on."""
     kinematics.link_poses(arm.lengths, q, work.rot, work.pos)
-    place_capsules(work.rot, work.pos, COARSE_LINK, COARSE_P0, COARSE_SPAN, first, work.lanes)
+    place_capsules(work.rot, work.pos, COARSE_LINK, COARSE_P0, work.span, first, work.lanes)
 
 
 @kernel(inline="always")
@@ -300,7 +299,7 @@ def observe_target(
         _write_human_arms(person, robot, out)
         out[SCALARS + 3] = time_left / TIME_SCALE
         rot, pos = robot.rot, robot.pos
-        place_capsules(rot, pos, COARSE_LINK, COARSE_P0, COARSE_SPAN, STILL, work.lanes)
+        place_capsules(rot, pos, COARSE_LINK, COARSE_P0, work.span, STILL, work.lanes)
     _write_target(goal, person, tcp, out)
     base_motion(arm, q, q_goal, base)
     for j in range(CONTROLLED):

@@ -18,6 +18,8 @@ from app.sim.scenario.kernels.person_observation import (
     place_predicted,
 )
 
+STANDARD_TOOL = (0.12, 0.04)
+"""Length from flange to tcp and radius of the tool of the last coarse capsule below [m]."""
 COARSE_LINK = np.array([2, 3, 4, 5, 6], dtype=np.int64)
 """Link of each coarse capsule: the robot from the upper arm to the tool, simplified for
 features. Contacts use the capsules of ``robot/data/ur10_capsules.json``."""
@@ -34,9 +36,9 @@ COARSE_SPAN = np.array(
         [0.0, 0.17, 0.0],
     ]
 )
-"""Second end minus first end in that frame [m]."""
+"""Second end minus first end in that frame [m], for the standard tool."""
 COARSE_RADIUS = np.array([0.09, 0.075, 0.066, 0.066, 0.045])
-"""Radius of each [m]."""
+"""Radius of each [m], for the standard tool."""
 COARSE_FIRST = (0, 1, 2, 4, 5)
 """First coarse capsule of each of the four groups of links; last, the number of capsules."""
 N_COARSE = 5
@@ -101,6 +103,9 @@ class PickObservationWorkspace(NamedTuple):
     """The second person, likewise."""
     far: PersonWorkspace
     """The person far away who is observed where there is no second one."""
+    span: Vec
+    """Second end minus first end of each coarse capsule in the link's frame [m], shape
+    (N_COARSE, 3)."""
     lanes: Vec
     """Coarse capsules of the robot in three configurations, shape (9, N_LANES)."""
     gap: Vec
@@ -135,8 +140,29 @@ class PickObservationWorkspace(NamedTuple):
     """Joints, joint speeds and body dimensions to which ``ahead`` belongs, (2, 36 + N_SIZE)."""
 
 
+def coarse_capsules(tool_length: float, tool_radius: float) -> tuple[Vec, Vec]:
+    """Return spans [m], shape (N_COARSE, 3), and radii [m], shape (N_COARSE,), with a tool.
+
+    The last capsule ends as far beyond the tool's segment as for the standard tool, and is as
+    much wider than the tool.
+
+    Args:
+        tool_length: Distance from flange to tcp [m].
+        tool_radius: Radius of the tool [m].
+    """
+    length, radius = STANDARD_TOOL
+    span, radii = COARSE_SPAN.copy(), COARSE_RADIUS.copy()
+    span[-1, 1] += max(tool_length - tool_radius, 0.0) - (length - radius)
+    radii[-1] += tool_radius - radius
+    return span, radii
+
+
 def new_pick_observation_workspace(
-    floor_z: float, far_q: Vec, far_size: Vec, predictor: WorkerPredictor
+    floor_z: float,
+    far_q: Vec,
+    far_size: Vec,
+    predictor: WorkerPredictor,
+    tool: tuple[float, float],
 ) -> PickObservationWorkspace:
     """Return work space for one observation at a time.
 
@@ -145,16 +171,17 @@ def new_pick_observation_workspace(
         far_q: Joint positions of the person far away [m, rad], shape (18,).
         far_size: Body dimensions of that person [m], shape (body.N_SIZE,).
         predictor: Motion predictor; its work space becomes part of this one.
+        tool: Length from flange to tcp and radius of the tool [m].
     """
+    span, radius = coarse_capsules(*tool)
     far = new_person_workspace()
     place_person(floor_z, far_q, np.zeros(18), far_size, far)
     return PickObservationWorkspace(
         person=new_person_workspace(),
         second=new_person_workspace(),
         far=far,
-        lanes=new_columns(
-            N_LANES, np.tile(COARSE_RADIUS, 3), np.tile((COARSE_SPAN**2).sum(axis=1), 3)
-        ),
+        span=span,
+        lanes=new_columns(N_LANES, np.tile(radius, 3), np.tile((span**2).sum(axis=1), 3)),
         gap=np.zeros(N_LANES),
         part=np.zeros(N_LANES),
         rot=np.zeros((7, 3, 3)),

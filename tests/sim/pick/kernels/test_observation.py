@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from app.sim.cells.cell import Cell, load_cell
+from app.sim.collision.contact import clearance
 from app.sim.core.observation_layout import slices_of
 from app.sim.human import model as human
 from app.sim.pick.batch import PickBatch, PickSettings
@@ -25,7 +26,7 @@ from app.sim.prediction.kernels.worker import TIMES, predict_worker
 from app.sim.prediction.weights import new_worker_predictor
 from app.sim.robot.ur10 import Robot
 from app.sim.scenario.kernels.person_observation import BASE_GAIN, HORIZONS
-from app.sim.scene.scene import arm_of
+from app.sim.scene.scene import NO_CYLINDERS, arm_of, people_of
 
 
 @pytest.fixture(scope="module")
@@ -140,6 +141,22 @@ def test_seen_values_stay_within_a_few_units(cell: Cell) -> None:
         obs = batch.step(np.ones((200, 5), dtype=np.float32)).obs
         assert np.isfinite(obs).all()
         assert np.abs(obs).max() < 15.0
+
+
+@pytest.mark.parametrize(("length", "radius"), [(0.12, 0.04), (0.3, 0.04), (0.4, 0.12)])
+def test_clearance_of_a_longer_or_wider_tool_is_not_above_that_of_its_capsule(
+    cell: Cell, length: float, radius: float
+) -> None:
+    tool = {"tool_length": length, "tool_radius": radius}
+    robot = cell.robot.model_copy(update=tool)
+    other, at = cell.model_copy(update={"robot": robot}), state(cell)
+    tcp = Robot(length).tcp_pose(at["q"])[:3, 3]
+    person = human.rest_posture(tcp[0], tcp[1] + 0.45, -np.pi / 2)
+    row = seen(other, human_q=person)[0]
+    shown = DISTANCE_SCALE * row[LAYOUT["distance_tilt_clearance_time"]][2]
+    exact = clearance(arm_of(other), people_of(other), at["q"], person[None], NO_CYLINDERS)
+    assert 0.0 < exact.people_m < 0.5
+    assert -0.05 < shown - exact.people_m < 0.01
 
 
 PICK = slices_of(PICK_SIZES)
