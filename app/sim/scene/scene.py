@@ -187,7 +187,11 @@ def people_of(cell: Cell, work: HumanMotionConfig | None = None) -> People:
         absent_share=0.0,
         rest_share=0.0,
         primitive_library=empty_primitive_library(),
+
+    Raises:
+        InvalidInput: The cell has more people than the kernels hold.
         tracks=NO_TRACKS,
+    check_people(kinds_of(cell))
         limits=np.stack([human.Q_MIN, human.Q_MAX]),
         yielding=0.0,
         pace=1.0,

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from app.errors import InvalidInput
+from app.sim.cells.cell import load_cell
 from app.sim.envs.pick import PickEnv, PickVectorEnv
 from app.sim.envs.reach import ReachEnv, ReachVectorEnv
 from app.sim.envs.sorting import SortingEnv, SortingVectorEnv
@@ -40,6 +41,17 @@ def test_arguments_of_another_type_are_refused(
 def test_people_are_a_list_of_kinds(make: Any, people: Any) -> None:
     with pytest.raises(InvalidInput, match="people = .* must be a list of kinds of people; ch"):
         make(people=people)
+
+
+@pytest.mark.parametrize(
+    ("make", "name"), [(ReachEnv, "shared-workspace"), (PickEnv, "pick-and-place")]
+)
+def test_cell_with_more_people_than_kernels_hold_is_refused(make: Any, name: str) -> None:
+    cell = load_cell(name)
+    crowded = cell.model_copy(update={"people": cell.people * 5})
+    with pytest.raises(InvalidInput, match="people = .* must be at most 4"):
+        make(cell=crowded)
+    assert make(cell=cell.model_copy(update={"people": cell.people * 4})).reset(seed=1)
 
 
 @pytest.mark.parametrize("make", VECTOR)
