@@ -57,14 +57,18 @@ def halton_targets(region: GoalRegion, n: int = N_HALTON) -> Vec:
         n: Number of targets, including the 8 corners.
 
     Raises:
-        InvalidInput: ``n`` is out of range, or the box has no volume.
+        InvalidInput: ``n`` is out of range, or a side of the box is shorter than the spacing of
+            its grid.
     """
     if not N_CORNERS <= n <= MOST_HALTON:
         rule = f"must lie in [{N_CORNERS}, {MOST_HALTON}]: the corners are among them"
         raise InvalidInput("n_halton", n, rule)
     size = np.array(region.size)
-    if (size <= 0.0).any():
-        rule = "needs a box with a volume for goals of a Halton set"
+    if min(region.counts()) < 2:  # nearly all points would be moved to a corner
+        rule = (
+            "needs a box with a volume for goals of a Halton set: every side at least spacing "
+            f"= {region.spacing:g} m"
+        )
         raise InvalidInput("goal_region.size", list(region.size), rule)
     low, high = region.box()
     corners = np.array([[i, j, k] for i in (0, 1) for j in (0, 1) for k in (0, 1)])

@@ -67,9 +67,10 @@ def test_too_few_or_too_many_halton_targets_are_refused(n: int) -> None:
         )
 
 
-def test_a_flat_box_has_no_halton_targets() -> None:
-    flat = GoalRegion(center=(0.0, 0.8, 0.3), size=(1.0, 0.4, 0.0), spacing=0.2)
-    with pytest.raises(InvalidInput, match="volume"):
+@pytest.mark.parametrize("size", [(1.0, 0.4, 0.0), (1e-7, 1e-7, 1e-7), (1e-12, 0.4, 0.4)])
+def test_a_flat_box_has_no_halton_targets(size: tuple[float, float, float]) -> None:
+    flat = GoalRegion(center=(0.0, 0.8, 0.3), size=size, spacing=0.2)
+    with pytest.raises(InvalidInput, match="volume .* every side at least spacing = 0.2 m"):
         halton_targets(flat)
 
 
