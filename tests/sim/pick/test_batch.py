@@ -65,6 +65,20 @@ def test_robot_starts_from_home_cubes_and_docks_in_equal_shares(cell: Cell) -> N
 
 def test_targets_are_drawn_uniformly(cell: Cell) -> None:
     batch = PickBatch(cell, 4000, 9, PickSettings(start_clearance_m=-10.0))
+def test_other_starts_keep_the_limits_of_the_joints(cell: Cell) -> None:
+    narrow = {
+        "q_min": (*cell.robot.q_min[:4], -1.7, cell.robot.q_min[5]),
+        "q_max": (*cell.robot.q_max[:4], -1.5, cell.robot.q_max[5]),
+    }
+    robot = cell.robot.model_copy(update=narrow)
+    settings = PickSettings(people=(), anywhere_share=1.0)
+    batch = PickBatch(cell.model_copy(update={"robot": robot}), 64, 5, settings)
+    batch.reset()
+    limits = batch.arm.limits
+    assert (batch.state.q >= limits.q_min).all() and (batch.state.q <= limits.q_max).all()
+    assert len(np.unique(batch.state.q[:, 4])) > 10
+
+
     batch.reset()
     counts = np.bincount(batch.state.candidates[:, 0], minlength=len(cell.stations))
     np.testing.assert_allclose(counts / 4000, 1 / len(cell.stations), atol=0.03)

@@ -164,7 +164,7 @@ def _draw_point(rules: PickRules, rng: random.State, point: Vec) -> None:
 def _draw_configuration(
     world: PickCell, rules: PickRules, point: Vec, q: Vec, rng: random.State
 ) -> None:
-    """Draw a configuration with the tool over a point of the box, tilted a little.
+    """Draw a configuration with the tool over a point of the box, tilted within joint limits.
 
     Args:
         rules: Starts of episodes.
@@ -173,9 +173,11 @@ def _draw_configuration(
     """
     _draw_point(rules, rng, point)
     point[2] += HIGHER * random.uniform(rng)
-    kinematics.ik_vertical(world.arm.lengths, world.arm.limits, point, q)
+    limits = world.arm.limits
+    kinematics.ik_vertical(world.arm.lengths, limits, point, q)
     for j in range(3, CONTROLLED):
-        q[j] += WRIST_SPREAD * (2.0 * random.uniform(rng) - 1.0)
+        turned = q[j] + WRIST_SPREAD * (2.0 * random.uniform(rng) - 1.0)
+        q[j] = min(limits.q_max[j], max(limits.q_min[j], turned))
 
 
 @kernel()
