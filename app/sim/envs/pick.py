@@ -65,7 +65,7 @@ class PickEnv(SingleEnv):
     | hand_velocities | 6 | [m/s] |
     | goal_posture_minus_q, base | 2 x 5 | offset of the target's q [rad]; base motion |
     | distance_tilt_clearance_time | 4 | twice the distance of tcp and target [m], tilt [rad], |
-    | | | clearance to the person [0.5 m], time left [10 s] |
+    | | | clearance to the person [0.5 m], time left [10 s], at most 100 |
     | nearest_by_group | 4 x 4 | distance [0.5 m] and direction of the person, by links |
     | look_ahead_still, look_ahead_base | 2 x 3 | clearance in 0.25, 0.5, 1 s [0.5 m]: robot |
     | | | at rest, along the base motion |

@@ -9,7 +9,8 @@ from app.sim.envs.arguments import cell_of, env_number, settings_with
 from app.sim.envs.single_env import SingleEnv
 from app.sim.envs.tasks import RobotTask
 from app.sim.envs.vector_env import BatchVectorEnv
-from app.sim.reach.batch import ReachBatch, ReachSettings
+from app.sim.reach.batch import ReachSettings
+from app.sim.reach.blocked_batch import new_reach_batch
 from app.sim.scene.scene import HumanKind
 
 
@@ -64,7 +65,7 @@ class ReachEnv(SingleEnv):
     | clearance | 1 | distance of robot and people [0.5 m], at most 3 |
     | look_ahead | 3 | the same in 0.25, 0.5, 1 s: robot at rest, people at constant velocity |
     | distance | 1 | twice the distance of tcp and goal [m] |
-    | time_left | 1 | [2.5 s] |
+    | time_left | 1 | [2.5 s], at most 100 |
     | base | 6 | action of the base controller |
     | look_ahead_base | 3 | clearance in 0.25, 0.5, 1 s along the base motion [0.5 m] |
     | human_growth | 1 | twice the growth of the radius [m/s] |
@@ -79,7 +80,7 @@ class ReachEnv(SingleEnv):
 
     | group | size | content |
     |-------|------|---------|
-    | arrival | 1 | time to the goal of the base motion [s] |
+    | arrival | 1 | time to the goal of the base motion [s], at most 100 |
     | base_clearance | 9 | clearance along it in 0.04 to 1.28 s, the least [0.2 m], -1 to 2 |
     | aside_clearance | 4 x 9 | the same at rest, toward home, and to either side of home |
     | goal_gap_ahead | 8 | distance of person and goal at these times [0.5 m] |
@@ -117,8 +118,9 @@ class ReachEnv(SingleEnv):
     ## End
     Success and collision *terminate*; so does a timeout (5 s) if the time left is observed;
     otherwise (``observation="state"``) it *truncates*. With ``collision_ends=False`` an episode
-    continues after a collision and counts as a collision at its end. ``info["outcome"]`` names
-    the outcome; one-step bounds add *unfeasible*.
+    continues after a collision and counts as a collision at its end; with ``blocked=`` rules a
+    contact also blocks the arm (``app.sim.reach.blocked_batch``, with its reward).
+    ``info["outcome"]`` names the outcome; one-step bounds add *unfeasible*.
 
     ## Randomness
     Goal, start and the people's motion. Episode ``k`` after ``reset(seed=s)`` depends only on
@@ -146,7 +148,7 @@ class ReachEnv(SingleEnv):
     ) -> None:
         chosen = settings_with(settings, ReachSettings(), people)
         first = env_number("first_env", first_env)
-        self.batch = ReachBatch(cell_of(cell), 1, 0, chosen, first)
+        self.batch = new_reach_batch(cell_of(cell), 1, 0, chosen, first)
         super().__init__(RobotTask(self.batch), render_mode)
 
 
@@ -170,6 +172,6 @@ class ReachVectorEnv(BatchVectorEnv):
     ) -> None:
         chosen = settings_with(settings, ReachSettings(), people)
         first, n = env_number("first_env", first_env), env_number("num_envs", num_envs, 1)
-        self.batch = ReachBatch(cell_of(cell), n, 0, chosen, first)
+        self.batch = new_reach_batch(cell_of(cell), n, 0, chosen, first)
         task = RobotTask(self.batch)
         super().__init__(task, render_mode, autoreset_mode, max_episode_steps)

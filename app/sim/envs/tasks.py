@@ -7,6 +7,7 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from app.errors import InvalidInput
+from app.sim.core.observation_layout import OBS_BOUND
 from app.sim.envs.arguments import action_array
 from app.sim.envs.raycast import Image
 from app.sim.envs.rendering import people_solids, picture, target_solids
@@ -21,8 +22,6 @@ Infos = dict[str, NDArray[Any]]
 
 MAX_SEED, MAX_EPISODE = 2**63 - 1, 2**62 - 1
 """Greatest seed; greatest number of a stated episode, to which later ones are added."""
-OBS_BOUND = 100.0
-"""Bound of the observation spaces; nothing observed comes near it."""
 NAMES = np.array(OUTCOMES, dtype=object)
 TIMEOUT = OUTCOMES.index("timeout")
 

@@ -85,7 +85,9 @@ class BlockedReachBatch(ReachBatch):
         return np.where(reached, weights.c_s - rest, -cost)
 
 
-def new_reach_batch(cell: Cell, n_envs: int, seed: int, settings: ReachSettings) -> ReachBatch:
+def new_reach_batch(
+    cell: Cell, n_envs: int, seed: int, settings: ReachSettings, first_env: int = 0
+) -> ReachBatch:
     """Return reach environments; contacts block the arm where the settings say so."""
     kind = ReachBatch if settings.blocked is None else BlockedReachBatch
-    return kind(cell, n_envs, seed, settings)
+    return kind(cell, n_envs, seed, settings, first_env)

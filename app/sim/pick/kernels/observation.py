@@ -18,6 +18,7 @@ import math
 
 from app.sim.core.arrays import Vec
 from app.sim.core.jit import FAR, kernel
+from app.sim.core.observation_layout import OBS_BOUND
 from app.sim.geometry.capsules import nearest_parts
 from app.sim.geometry.segments import segment_nearest
 from app.sim.human.kernels import kinematics as body
@@ -297,7 +298,7 @@ def observe_target(
         _write_joints(arm, state, out)
         _write_tool(state.qd, robot, out)
         _write_human_arms(person, robot, out)
-        out[SCALARS + 3] = time_left / TIME_SCALE
+        out[SCALARS + 3] = min(OBS_BOUND, time_left / TIME_SCALE)
         rot, pos = robot.rot, robot.pos
         place_capsules(rot, pos, COARSE_LINK, COARSE_P0, work.span, STILL, work.lanes)
     _write_target(goal, person, tcp, out)

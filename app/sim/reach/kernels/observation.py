@@ -19,7 +19,7 @@ import math
 from app.sim.core.arrays import Vec
 from app.sim.core.jit import FAR, kernel
 from app.sim.core.kernels.trig import sincos
-from app.sim.core.observation_layout import slices_of
+from app.sim.core.observation_layout import OBS_BOUND, slices_of
 from app.sim.geometry.capsules import RADIUS, UX, UY, X, Y, capsule_clearances, least
 from app.sim.geometry.cylinder import cylinder_clearance
 from app.sim.human.kernels import kinematics as body
@@ -235,6 +235,6 @@ def write_features(
         out: Filled, shape (>= N_FEATURES,).
     """
     _write_state_features(arm, query, clearance, work, out)
-    out[52] = time_left / TIME_SCALE
+    out[52] = min(OBS_BOUND, time_left / TIME_SCALE)
     start = N_FEATURES - base_controller.N_APPROACH
     write_approach_features(arm, top_z, query, work, start, out)

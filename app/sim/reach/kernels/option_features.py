@@ -13,7 +13,7 @@ import math
 
 from app.sim.core.arrays import Vec
 from app.sim.core.jit import FAR, kernel
-from app.sim.core.observation_layout import slices_of
+from app.sim.core.observation_layout import OBS_BOUND, slices_of
 from app.sim.geometry.capsules import copy_values
 from app.sim.people.kernels.pedestrian import AGE, N_PAST, PAST_RADIUS, PAST_SPEED
 from app.sim.people.kernels.people import PeopleState
@@ -200,7 +200,7 @@ def write_option_features(
     q, qd, goal = query.q, query.qd, query.goal
     rate = base_motion(arm, work.robot, goal, work)
     arrival, least, p = 1.0 / rate, FAR, work.n[1]
-    out[k] = arrival
+    out[k] = min(OBS_BOUND, arrival)
     for i in range(N_LOOKS):
         t = STEP_S * LOOKS[i]
         share = min(1.0, rate * max(0.0, t - LAG_S))
