@@ -12,6 +12,8 @@ cases         The four case studies of task selection (docs/method.md 3.6, thesi
 curriculum_batch
               Pick environments whose robots start part of the path to the target
               (docs/method.md 3.5)
+hand_speeds   Statistics of the speed of the workers' hands, reported with the results of
+              evaluations
 monitored_batch
               The pick scenario under speed and separation monitoring
 person_grid   Postures of a person at the positions of a grid, for maps of choice and risk

@@ -15,11 +15,8 @@ from app.errors import InvalidInput
 from app.sim.cells.cell import Cell, lacks_stations
 from app.sim.core.arrays import Vec, as_kernel_array
 from app.sim.core.jit import FAR
-from app.sim.core.kernels.rng import start_stream
 from app.sim.human import model as human
 from app.sim.people.human_motion_config import USUAL, HumanMotionConfig
-from app.sim.people.kernels.motion import record_palms
-from app.sim.people.kernels.people import new_people_geometry
 from app.sim.pick.kernels import episode, starts
 from app.sim.pick.kernels.grasp import DESCEND, REACH_ONLY, GraspRules
 from app.sim.pick.kernels.observation_layout import (
@@ -361,29 +358,3 @@ def tool_state(arm: Arm, q: Vec, qd: Vec, goal: Vec) -> tuple[float, float, floa
     distance, tilt = distance_to(as_kernel_array(goal), pose), arm_kernel.robot_tilt(pose)
     speed = arm_kernel.tcp_speed(pose, as_kernel_array(qd))
     return distance, tilt, speed, bool(episode.succeeded(distance, tilt, speed))
-
-
-def hand_speeds(batch: PickBatch, n_scripts: int = 200) -> dict[str, float]:
-    """Return statistics of the speed of the workers' hands while above 0.05 m/s [m/s].
-
-    They are those of ``n_scripts`` scripts, 10 s of each.
-    """
-    people, tick = batch.world.people._replace(yielding=0.0), 0.01
-    state = new_people_state(batch.cell, people, 1)
-    n_workers = state.q.shape[1]
-    geometry = new_people_geometry(people, n_workers, state.cylinders.shape[1])
-    palms, rng = np.zeros((int(10.0 / tick), n_workers, 2, 3)), np.zeros(1, dtype=np.uint64)
-    rates = []
-    for number in range(n_scripts):
-        start_stream(batch.seed, 1 << 20, number, rng)
-        record_palms(people, state, rng, batch.arm.columns, tick, geometry, palms)
-        rates.append(np.linalg.norm(np.diff(palms, axis=0), axis=-1).ravel() / tick)
-    speeds = np.concatenate(rates)
-    moving = speeds[speeds > 0.05]
-    if not moving.size:  # no worker, or none moves
-        return {}
-    return {
-        "hand_speed_median_m_s": float(np.median(moving)),
-        "hand_speed_p99_m_s": float(np.percentile(moving, 99)),
-        "hand_moving_share": len(moving) / len(speeds),
-    }

@@ -14,6 +14,7 @@ from app.sim.human import model as human
 from app.sim.pick import batch as pick
 from app.sim.pick.batch import OUTCOMES, PickBatch, PickSettings
 from app.sim.pick.candidate_observer import CandidateObserver
+from app.sim.pick.hand_speeds import hand_speeds
 from app.sim.pick.kernels.candidates import observe_candidates
 from app.sim.pick.kernels.observation_layout import LAYOUT
 from app.sim.robot.kernels import actions
@@ -218,7 +219,7 @@ def test_cell_whose_station_is_out_of_reach_is_refused_by_name(cell: Cell) -> No
 
 
 def test_hands_are_fast_enough_to_be_a_problem(cell: Cell) -> None:
-    speeds = pick.hand_speeds(PickBatch(cell, 1, 11, TEN_SECONDS), n_scripts=60)
+    speeds = hand_speeds(PickBatch(cell, 1, 11, TEN_SECONDS), n_scripts=60)
     assert speeds["hand_speed_median_m_s"] >= 0.4
     assert speeds["hand_speed_p99_m_s"] >= 1.5
 

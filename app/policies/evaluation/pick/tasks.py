@@ -28,7 +28,8 @@ from app.policies.evaluation.statistics import mcnemar
 from app.policies.inference.task_selection import HYSTERESIS
 from app.policies.inference.value_networks import ValueNetworks, pick_preset_of
 from app.sim.collision.fcl_recheck import Trajectory
-from app.sim.pick.batch import OUTCOMES, hand_speeds
+from app.sim.pick.batch import OUTCOMES
+from app.sim.pick.hand_speeds import hand_speeds
 from app.sim.scenario.kernels import episode as kernel
 from app.sim.scene.scene import HumanKind, kinds_of
 

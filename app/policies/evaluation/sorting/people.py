@@ -49,11 +49,11 @@ from app.sim.people.kernels.people import SCRIPTED
 from app.sim.pick.batch import (
     PickBatch,
     PickSettings,
-    hand_speeds,
     observation_workspace_of,
     queries,
     target_configurations,
 )
+from app.sim.pick.hand_speeds import hand_speeds
 from app.sim.pick.kernels.grasp import APPROACH, LIFT
 from app.sim.pick.kernels.observation import observe_batch
 from app.sim.pick.kernels.observation_layout import LAYOUT
