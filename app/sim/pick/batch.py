@@ -53,6 +53,7 @@ from app.sim.scene.scene import (
     new_people_state,
     people_of,
     require_finite,
+    require_shape,
     with_people,
 )
 
@@ -243,10 +244,15 @@ class PickBatch(EnvBatch):
         self._task = self._task._replace(weights=self._task.weights._replace(c_c=cost))
 
     def set_goals(self, envs: Indices, goals: Vec) -> None:
-        """Set new targets [m], shape (len(envs), 3), in some environments."""
-        shared = self.world, self.settings.grasp, self.state
-        for e, goal in zip(envs, goals, strict=True):
-            starts.set_goal(*shared, int(e), as_kernel_array(goal), self._work.robot)
+        """Set new targets [m], shape (len(envs), 3), in some environments.
+
+        Raises:
+            InvalidInput: An environment does not exist, or the targets have another shape.
+            SimulationError: A number is NaN or infinite.
+        """
+        shared, checked = (self.world, self.settings.grasp, self.state), self._checked(envs)
+        for e, goal in zip(checked, self._checked_goals(checked, goals), strict=True):
+            starts.set_goal(*shared, int(e), goal, self._work.robot)
 
     def shorten(self, envs: Indices, shares: Vec) -> None:
         """Leave a share of the time left, in whole control periods; observe again.
@@ -255,9 +261,9 @@ class PickBatch(EnvBatch):
             envs: Environments.
             shares: Shares in [0, 1], shape (len(envs),); rounded up to a control period.
         """
-        left, dt = self.state.time_left, self.arm.dt
-        left[envs] = np.ceil(shares * left[envs] / dt) * dt
-        self._look(envs)
+        left, dt, checked = self.state.time_left, self.arm.dt, self._checked(envs)
+        left[checked] = np.ceil(shares * left[checked] / dt) * dt
+        self._look(checked)
 
     def set_starts(self, q: Vec) -> None:
         """Put the robots at rest at other starts [rad], shape (n_envs, 6)."""
@@ -270,6 +276,8 @@ def observation_workspace_of(cell: Cell) -> PickObservationWorkspace:
     """Return work space for observations in a cell, one at a time."""
     far = human.rest_posture(*FAR_AWAY)
     size, predictor = as_kernel_array(cell.body), new_worker_predictor()
+        require_shape("q", q, self.state.q.shape)
+        require_finite("q", q)
     tool = cell.robot.tool_length, cell.robot.tool_radius
     return new_pick_observation_workspace(cell.floor_z, far, size, predictor, tool)
 

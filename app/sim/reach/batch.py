@@ -15,7 +15,7 @@ from app.errors import InvalidInput
 from app.sim.cells.cell import Cell
 from app.sim.cells.parts import GoalRegion, Station
 from app.sim.cells.people import Worker
-from app.sim.core.arrays import Vec, as_kernel_array, as_kernel_index
+from app.sim.core.arrays import Vec, as_kernel_array
 from app.sim.core.jit import FAR
 from app.sim.people.human_motion_config import REACHING, HumanMotionConfig
 from app.sim.people.kernels.people import People
@@ -39,7 +39,6 @@ from app.sim.scene.scene import (
     new_people_state,
     pedestrian_settings,
     people_of,
-    require_finite,
     require_shape,
     with_people,
 )
@@ -308,13 +307,9 @@ class ReachBatch(EnvBatch):
             InvalidInput: An environment does not exist, or the goals have another shape.
             SimulationError: A number is NaN or infinite.
         """
-        require_shape("goals", np.asarray(goals), (len(envs), 3))
-        require_finite("goals", np.asarray(goals, dtype=np.float64))
         checked = self._checked(envs)
-        for e, goal in zip(checked, goals, strict=True):
-            episode.set_goal(
-                self.world, self.state, int(e), as_kernel_array(goal), self._work.robot
-            )
+        for e, goal in zip(checked, self._checked_goals(checked, goals), strict=True):
+            episode.set_goal(self.world, self.state, int(e), goal, self._work.robot)
         return self._look(checked)
 
     def observe_goals(
@@ -373,14 +368,6 @@ class ReachBatch(EnvBatch):
     def n_people(self) -> int:
         """Number of people in each environment; workers come first."""
         return len(self.cell.people)
-
-    def _checked(self, envs: Indices) -> Indices:
-        numbers = as_kernel_index(np.asarray(envs, dtype=np.int64))
-        wrong = numbers[(numbers < 0) | (numbers >= self.n_envs)]
-        if wrong.size:
-            rule = f"must be one of {self.n_envs} environments"
-            raise InvalidInput("envs", int(wrong[0]), rule)
-        return numbers
 
     def observe(self) -> NDArray[np.float32]:
         """Update all clearances and observations after the state was changed from outside."""

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.sim.cells.cell import Cell
+from app.sim.core.arrays import Vec, as_kernel_array
 from app.sim.core.jit import direct
 from app.sim.people.kernels.people import PeopleState
 from app.sim.robot.kernels.arm import Arm
@@ -25,7 +26,7 @@ from app.sim.scenario.kernels.episode import (
     new_step_workspace,
 )
 from app.sim.scenario.step_result import StepResult
-from app.sim.scene.scene import require_finite, require_shape
+from app.sim.scene.scene import env_numbers, require_finite, require_shape
 from app.state_dict import Stateful
 
 
@@ -123,9 +124,13 @@ class EnvBatch(Stateful, ABC):
 
         Returns:
             Observations of all environments, (n_envs, obs_size).
+
+        Raises:
+            InvalidInput: An environment does not exist.
         """
-        self._start(envs)
-        return self._look(envs)
+        checked = self._checked(envs)
+        self._start(checked)
+        return self._look(checked)
 
     def step(
         self, act: NDArray[np.float32], *, auto_reset: bool = True, features: bool = True
@@ -156,6 +161,17 @@ class EnvBatch(Stateful, ABC):
                 self._look(done)
         return StepResult(obs=self._obs, last_obs=self._last, rew=self._rew, ended=self._ended)
 
+    def _checked(self, envs: Indices) -> Indices:
+        """Return the numbers of environments that exist, for kernels."""
+        return env_numbers(envs, self.n_envs)
+
+    def _checked_goals(self, envs: Indices, goals: Vec) -> Vec:
+        """Return a finite goal for each environment [m], shape (len(envs), 3)."""
+        points = np.asarray(goals)
+        require_shape("goals", points, (len(envs), 3))
+        require_finite("goals", points)
+        return as_kernel_array(points)
+
     def _start(self, envs: Indices) -> None:
         """Start episodes in some environments."""
         first = self.seed, self._first
@@ -169,7 +185,7 @@ class EnvBatch(Stateful, ABC):
 
     def _look(self, envs: Indices) -> NDArray[np.float32]:
         """Write the observations of some environments; return all, (n_envs, obs_size)."""
-        if len(envs) == self.n_envs:
+        if np.array_equal(envs, self._all):
             self._observe(envs, self._obs)
         elif len(envs):
             out = np.empty((len(envs), self.obs_size), dtype=np.float32)

@@ -57,6 +57,22 @@ def require_shape(name: str, values: NDArray[Any], shape: tuple[int, ...]) -> No
         raise InvalidInput(name, values.shape, f"must have the shape {shape}")
 
 
+def env_numbers(envs: NDArray[Any], n_envs: int) -> NDArray[np.int64]:
+    """Return the numbers of environments as kernels take them, shape (k,).
+
+    Raises:
+        InvalidInput: They are no numbers, as a mask is none, or an environment does not exist.
+    """
+    given = np.asarray(envs)
+    if given.ndim != 1 or (given.size and given.dtype.kind not in "iu"):
+        found = f"{given.dtype} of shape {given.shape}"
+        raise InvalidInput("envs", found, "must be numbers of environments, shape (k,)")
+    wrong = given[(given < 0) | (given >= n_envs)]
+    if wrong.size:
+        raise InvalidInput("envs", int(wrong[0]), f"must be one of {n_envs} environments")
+    return as_kernel_index(given.astype(np.int64))
+
+
 def check_people(kinds: Sequence[str]) -> None:
     """Check a list of people.
 
@@ -171,7 +187,11 @@ def people_of(cell: Cell, work: HumanMotionConfig | None = None) -> People:
     Args:
         cell: Work cell with 0 to 4 people.
         work: Motion of the workers; None: they stand where they are placed.
+
+    Raises:
+        InvalidInput: The cell has more people than the kernels hold.
     """
+    check_people(kinds_of(cell))
     workers = len(cell.workers)
     shared = People(
         bodies=as_kernel_array(cell.body[None]),
@@ -187,11 +207,7 @@ def people_of(cell: Cell, work: HumanMotionConfig | None = None) -> People:
         absent_share=0.0,
         rest_share=0.0,
         primitive_library=empty_primitive_library(),
-
-    Raises:
-        InvalidInput: The cell has more people than the kernels hold.
         tracks=NO_TRACKS,
-    check_people(kinds_of(cell))
         limits=np.stack([human.Q_MIN, human.Q_MAX]),
         yielding=0.0,
         pace=1.0,

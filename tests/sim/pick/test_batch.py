@@ -137,6 +137,53 @@ def test_meshes_find_no_contact_that_the_kernels_missed(cell: Cell) -> None:
     obs, state = batch.reset(), batch.state
     paths: list[list[tuple[np.ndarray, ...]]] = [[] for _ in range(24)]
     for _ in range(200):
+@pytest.mark.parametrize(
+    "envs", [[3], [-1], [2**32], np.array([True, False, True]), [0.0], [[0]]]
+)
+def test_only_numbers_of_environments_are_started_and_get_targets(
+    cell: Cell, envs: Any
+) -> None:
+    batch = PickBatch(cell, 3, 5, TEN_SECONDS)
+    batch.reset()
+    before = batch.state_dict()
+    shares = np.full(len(envs), 0.5)
+    for call in (
+        lambda: batch.start(np.array(envs)),
+        lambda: batch.set_goals(np.array(envs), np.zeros((len(envs), 3))),
+        lambda: batch.shorten(np.array(envs), shares),
+    ):
+        with pytest.raises(InvalidInput, match="^envs = .* must be"):
+            call()
+    np.testing.assert_equal(batch.state_dict(), before)
+
+
+def test_environments_start_in_any_order_and_as_any_integers(cell: Cell) -> None:
+    strided = np.array([2, 9, 0, 9, 1, 9])[::2]
+    expected = PickBatch(cell, 3, 5, TEN_SECONDS).reset()
+    for envs in (strided, strided.astype(np.int32), strided.astype(np.uint8)):
+        batch = PickBatch(cell, 3, 5, TEN_SECONDS)
+        np.testing.assert_array_equal(batch.start(envs), expected)
+
+
+def test_targets_and_starts_that_are_not_finite_or_of_another_shape_are_refused(
+    cell: Cell,
+) -> None:
+    batch, rows = PickBatch(cell, 3, 5, TEN_SECONDS), np.arange(2)
+    batch.reset()
+    goal = batch.state.goal.copy()
+    for wrong in (np.full((2, 3), np.nan), np.full((2, 3), -np.inf)):
+        with pytest.raises(SimulationError, match="goals .* finite"):
+            batch.set_goals(rows, wrong)
+    for shape in ((3, 3), (2, 2), (3,)):
+        with pytest.raises(InvalidInput, match="goals .* shape"):
+            batch.set_goals(rows, np.zeros(shape))
+    with pytest.raises(SimulationError, match="q = .* finite"):
+        batch.set_starts(np.full((3, 6), np.nan))
+    with pytest.raises(InvalidInput, match="q = .* shape"):
+        batch.set_starts(np.zeros(6))
+    np.testing.assert_array_equal(batch.state.goal, goal)
+
+
         before = state.q.copy(), state.qd.copy(), state.people.q[:, 0].copy()
         running = np.flatnonzero(state.outcome == 0)
         obs = batch.step(obs[:, LAYOUT["base"]].copy(), auto_reset=False).obs
