@@ -8,6 +8,7 @@ from app.sim.cell_validation.units import shown
 from app.sim.cells.cell import Cell
 from app.sim.cells.parts import Obstacle, Station
 from app.sim.cells.people import Worker
+from app.sim.cells.support import is_over, is_over_table, top_of
 
 HIGHEST_PART = 0.4
 """Largest height of a station above the table or obstacle that supports it [m]."""
@@ -36,19 +37,11 @@ class FaultlessParts:
         self.goal_region = cell.goal_region if is_faultless("goal_region") else None
 
 
-def _over(box: Obstacle, point: Sequence[float]) -> bool:
-    """Return whether a point lies over or in the footprint of an obstacle."""
-    c, s = math.cos(box.yaw), math.sin(box.yaw)
-    x, y = point[0] - box.center[0], point[1] - box.center[1]
-    along, across = abs(c * x + s * y), abs(c * y - s * x)
-    return along <= box.half_size[0] and across <= box.half_size[1]
-
-
 def places(parts: FaultlessParts) -> Iterator[Fault]:
     """Check that stations are supported and free, and people clear of table and obstacles."""
     for station in parts.stations:
         place, value = f"stations.{station.id}.position", shown(station.position)
-        under = [box for box in parts.obstacles if _over(box, station.position)]
+        under = [box for box in parts.obstacles if is_over(box, station.position)]
         inside = [
             box
             for box in under
@@ -61,7 +54,9 @@ def places(parts: FaultlessParts) -> Iterator[Fault]:
             yield Fault(
                 place=place, value=value, rule="must not lie below the table top, z = 0"
             )
-        elif parts.table and not under and not _on_table(parts.cell, station.position):
+        elif (
+            parts.table and not under and not is_over_table(parts.cell.table, station.position)
+        ):
             yield Fault(
                 place=place,
                 value=value,
@@ -83,8 +78,8 @@ def places(parts: FaultlessParts) -> Iterator[Fault]:
 def _hangs(cell: Cell, station: Station, under: Sequence[Obstacle]) -> str:
     """Return the gap below a station as text; empty if it is supported."""
     z = station.position[2]
-    tops = [(box.center[2] + box.half_size[2], box.id) for box in under]
-    tops += [(0.0, "the table")] if _on_table(cell, station.position) else []
+    tops = [(top_of(box), box.id) for box in under]
+    tops += [(0.0, "the table")] if is_over_table(cell.table, station.position) else []
     carrying = [one for one in tops if one[0] <= z]
     if not carrying:
         return f"{tops[0][1]} lies above it"
@@ -95,11 +90,6 @@ def _hangs(cell: Cell, station: Station, under: Sequence[Obstacle]) -> str:
 def _in_height(box: Obstacle, z: float) -> bool:
     """Return whether a height lies between bottom and top of an obstacle."""
     return abs(z - box.center[2]) < box.half_size[2]
-
-
-def _on_table(cell: Cell, position: tuple[float, float, float]) -> bool:
-    table, (x, y, _) = cell.table, position
-    return table.x_min <= x <= table.x_max and table.y_min <= y <= table.y_max
 
 
 def _table_text(cell: Cell) -> str:
@@ -141,7 +131,7 @@ def _standing(parts: FaultlessParts) -> Iterator[Fault]:
             on_floor = (
                 box.center[2] - box.half_size[2] < person.pelvis_height + parts.cell.floor_z
             )
-            if on_floor and _over(box, person.home):
+            if on_floor and is_over(box, person.home):
                 rule = f"must not lie inside the obstacle {box.id}"
                 yield Fault(place=f"{place}.home", value=shown(person.home), rule=rule)
 

@@ -6,7 +6,8 @@ from functools import lru_cache
 import numpy as np
 
 from app.sim.cells.cell import Cell
-from app.sim.cells.parts import TableGeometry
+from app.sim.cells.parts import Station, TableGeometry
+from app.sim.cells.support import support_height
 from app.sim.core.arrays import Vec, as_kernel_array
 from app.sim.envs.raycast import Camera, Image, Raycaster
 from app.sim.envs.solids import Box, Capsule, Cylinder, Rgb, Solid
@@ -20,6 +21,8 @@ from app.sim.scenario.kernels.episode import SUCCESS_DISTANCE
 from app.sim.scene.scene import arm_of, people_geometry_of, people_of
 from app.sim.sorting.layout import block_height, half_size, is_sorting
 from app.sim.sorting.state import NULL, SortingShape, SortingState
+
+Point = tuple[float, float, float]
 
 WIDTH, HEIGHT = 480, 360
 """Size of the images [px]."""
@@ -102,7 +105,8 @@ def _static_solids(cell: Cell) -> tuple[Solid, ...]:
         solids.append(Box(center=box.center, half_size=half, yaw=box.yaw, colour=OBSTACLE))
     for kind, side, height in (("cube", 0.035, 0.07), ("dock", 0.075, 0.012)):
         for station in cell.stations_of(kind):
-            middle = (*station.position[:2], 0.5 * height)
+            x, y, base = _foot(cell, station)
+            middle = (x, y, base + 0.5 * height)
             half = (side, side, 0.5 * height)
             solids.append(Box(center=middle, half_size=half, colour=STATION))
     return tuple(solids)
@@ -203,29 +207,29 @@ def block_solids(cell: Cell, shape: SortingShape, state: SortingState) -> list[S
     named = [one.colour for one in cell.stations_of("cluster")]
     colours = [BLOCKS.get(one or "", UNNAMED[k]) for k, one in enumerate(named)]
 
-    def block(code: int, x: float, y: float, stands: int, opacity: float = 1.0) -> Solid:
+    def block(code: int, foot: Point, stands: int, opacity: float = 1.0) -> Solid:
         colour, size = divmod(int(code) - 1, shape.n_sizes)
         half = half_size(cell, size, shape.n_sizes)
         half[2] = 0.5 * level - 5e-4  # a line between two blocks of one colour
         half[:2] += 0.002 * (opacity < 1.0)
-        at = (x, y, _FLAT + (stands + 0.5) * level)
+        at = (*foot[:2], foot[2] + _FLAT + (stands + 0.5) * level)
         return Box(center=at, half_size=half, colour=colours[colour], opacity=opacity)
 
     solids: list[Solid] = []
     for k, station in enumerate(cell.stations_of("clutter")):
-        x, y, _ = station.position
+        foot = _foot(cell, station)
         share = min(float(state.fail[k]) / MOST_FAILURE, 1.0)
-        solids.append(_tile(x, y, _between(*FAILURES, share)))
+        solids.append(_tile(foot, _between(*FAILURES, share)))
         if state.clutter[k] != NULL:
-            solids.append(block(state.clutter[k], x, y, 0))
+            solids.append(block(state.clutter[k], foot, 0))
     for c, station in enumerate(cell.stations_of("cluster")):
-        x, y, _ = station.position
-        solids.append(_tile(x, y, _between(TRAY, colours[c], 0.35)))
+        foot = _foot(cell, station)
+        solids.append(_tile(foot, _between(TRAY, colours[c], 0.35)))
         for k, (code, wanted) in enumerate(zip(state.towers[c], state.goal[c], strict=True)):
             if code != NULL:
-                solids.append(block(code, x, y, k))
+                solids.append(block(code, foot, k))
             if wanted not in (NULL, code):
-                solids.append(block(wanted, x, y, k, opacity=0.4))
+                solids.append(block(wanted, foot, k, opacity=0.4))
     return solids
 
 
@@ -233,8 +237,15 @@ _FLAT = 0.004
 """Height of the tiles on which blocks stand [m]."""
 
 
-def _tile(x: float, y: float, colour: Rgb) -> Solid:
-    return Box(center=(x, y, 0.5 * _FLAT), half_size=(0.08, 0.08, 0.5 * _FLAT), colour=colour)
+def _tile(foot: Point, colour: Rgb) -> Solid:
+    middle = (*foot[:2], foot[2] + 0.5 * _FLAT)
+    return Box(center=middle, half_size=(0.08, 0.08, 0.5 * _FLAT), colour=colour)
+
+
+def _foot(cell: Cell, station: Station) -> Point:
+    """Return the point of table or obstacle below a station [m]."""
+    x, y, _ = station.position
+    return x, y, support_height(cell, station.position)
 
 
 def _between(low: Rgb, high: Rgb, share: float) -> Rgb:

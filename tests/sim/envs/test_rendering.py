@@ -11,8 +11,23 @@ from gymnasium.wrappers import AddRenderObservation
 from numpy.typing import NDArray
 
 from app.errors import InvalidInput
+from app.sim.cells.cell import Cell, load_cell
+from app.sim.cells.parts import Obstacle
 from app.sim.envs import IDS
-from app.sim.envs.rendering import CYLINDERS, GLOVE, HEIGHT, TOOL, TOP, WIDTH
+from app.sim.envs.rendering import (
+    CYLINDERS,
+    GLOVE,
+    HEIGHT,
+    STATION,
+    TOOL,
+    TOP,
+    WIDTH,
+    _static_solids,
+    block_solids,
+)
+from app.sim.envs.solids import Box
+from app.sim.sorting.batch import batch_in
+from app.sim.sorting.state import NULL
 
 SHAPE = (HEIGHT, WIDTH, 3)
 Image = NDArray[np.uint8]
@@ -101,6 +116,40 @@ def test_blocks_are_seen_where_they_lie() -> None:
     assert (before != empty).any(axis=2).mean() > 1e-3
     red = (205, 58, 62)
     assert share_of(before, red) > share_of(empty, red)
+
+
+def on_shelf(cell: Cell, number: int, height: float) -> Cell:
+    """A cell with one station over a shelf of a height [m]."""
+    x, y, z = cell.stations[number].position
+    raised = cell.stations[number].model_copy(update={"position": (x, y, z + height)})
+    size = (0.1, 0.1, 0.5 * height)
+    shelf = Obstacle(id="shelf", label="Shelf", center=(x, y, size[2]), half_size=size)
+    stations = (*cell.stations[:number], raised, *cell.stations[number + 1 :])
+    return cell.model_copy(update={"obstacles": (shelf,), "stations": stations})
+
+
+def test_objects_stand_on_what_is_below_their_station() -> None:
+    cell = on_shelf(load_cell("pick-and-place"), 0, 0.2)
+    boxes = [one for one in _static_solids(cell) if isinstance(one, Box)]
+    x, y, _ = cell.stations[0].position
+    (cube,) = (one for one in boxes if one.colour == STATION and one.center[:2] == (x, y))
+    assert cube.center[2] - cube.half_size[2] == pytest.approx(0.2)
+
+
+def test_blocks_stand_on_what_is_below_their_slot() -> None:
+    plain = load_cell("sorting-e0")
+    task = batch_in(plain, 1, 4)
+    task.reset()
+    state = task.state_of(0)
+    before, after = (
+        block_solids(cell, task.shape, state) for cell in (plain, on_shelf(plain, 0, 0.1))
+    )
+    moved = [
+        b.center[2] - a.center[2]
+        for a, b in zip(before, after, strict=True)
+        if isinstance(a, Box) and isinstance(b, Box) and a.center != b.center
+    ]
+    assert moved == pytest.approx([0.1] * (1 + (state.clutter[0] != NULL)))
 
 
 @pytest.mark.parametrize("env_id", ["tandem/Pick-v0", "tandem/Reach-v0", "tandem/SortingE0-v0"])

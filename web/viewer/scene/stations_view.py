@@ -16,6 +16,7 @@ from app.live.snapshot import CandidateSnapshot, WorldSnapshot
 from app.live.status_messages import value_text
 from app.sim.cells.cell import Cell
 from app.sim.cells.parts import Station
+from app.sim.cells.support import support_height
 from web.viewer.people.mannequin import Rgb
 from web.viewer.scene.solid_meshes import block, disc, slab, torus
 
@@ -70,7 +71,7 @@ class StationsView:
             color=IDLE,
             flat_shading=True,
             cast_shadow=station.kind == "cube",
-            position=(x, y, 0.0),
+            position=(x, y, support_height(self._cell, station.position)),
         )
         name = station.id
 
@@ -82,7 +83,8 @@ class StationsView:
 
     def _add_label(self, station: Station) -> viser.LabelHandle:
         x, y, _ = station.position
-        height = CUBE_SIDE + 0.035 if station.kind == "cube" else 0.05
+        height = support_height(self._cell, station.position)
+        height += CUBE_SIDE + 0.035 if station.kind == "cube" else 0.05
         return self._scene.add_label(
             f"/labels/{station.id}",
             station.label,
@@ -130,8 +132,8 @@ class StationsView:
     def _mark(self, chosen: str | None) -> None:
         self._marker.visible = chosen is not None
         if chosen is not None:
-            x, y, _ = self._cell.station(chosen).position
-            self._marker.position = (x, y, 0.0)
+            x, y, z = self._cell.station(chosen).position
+            self._marker.position = (x, y, support_height(self._cell, (x, y, z)))
 
 
 def _text(station: Station, candidate: CandidateSnapshot | None, values: list[float]) -> str:

@@ -8,6 +8,7 @@ from app.live import commands
 from app.live.pick.world import LivePickWorld
 from app.live.snapshot import ContactSnapshot
 from app.sim.cells.cell import Cell, load_cell
+from app.sim.cells.parts import Obstacle
 from app.sim.human import model as human
 from app.sim.robot.ur10 import LINK_NAMES, Robot
 from tests.support.straight_policy import StraightPolicy
@@ -15,7 +16,7 @@ from tests.web.conftest import node
 from web.viewer.capsules_view import HIT
 from web.viewer.scene.arc import dashes
 from web.viewer.scene.cell_scene import PATH_LIFT, CellScene
-from web.viewer.scene.stations_view import GOALS, IDLE
+from web.viewer.scene.stations_view import GOALS, IDLE, StationsView
 
 
 @pytest.fixture(scope="module")
@@ -161,3 +162,15 @@ def test_mannequin_and_capsules_grow_with_the_person(
     forearm = np.ptp(node(server, "/shapes/people/0/forearm_r").vertices[:, 2])
     girth = human.capsule_radii(person.size)[human.CAPSULE_NAMES.index("forearm_r")]
     assert forearm == pytest.approx(person.size[6] + 2.0 * girth, abs=2e-3)
+
+
+def test_objects_stand_on_the_obstacle_below_their_station(
+    server: viser.ViserServer, cell: Cell
+) -> None:
+    x, y, z = cell.stations[0].position
+    shelf = Obstacle(id="shelf", label="Shelf", center=(x, y, 0.1), half_size=(0.1, 0.1, 0.1))
+    high = cell.stations[0].model_copy(update={"id": "high", "position": (x, y, z + 0.2)})
+    with_shelf = cell.model_copy(update={"obstacles": (shelf,), "stations": (high,)})
+    StationsView(server, with_shelf, lambda command: None)
+    assert tuple(node(server, "/stations/high").position) == pytest.approx((x, y, 0.2))
+    assert node(server, "/labels/high").position[2] > 0.2
