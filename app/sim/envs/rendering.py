@@ -66,7 +66,6 @@ _PARTS = {
 """Colours of a worker's capsules besides arms and trunk."""
 
 
-@lru_cache(maxsize=64)
 def raycaster_of(cell: Cell) -> Raycaster:
     """Return the raycaster of a cell, which does not depend on its people."""
     return _raycaster(cell.model_copy(update={"people": ()}))
