@@ -22,6 +22,7 @@ from app.sim.mocap.importer import Motion, placed
 from app.sim.people.kernels import people
 from app.sim.people.kernels.people import People, Tracks
 from app.sim.people.off_task_motion import off_task_motions
+from app.sim.people.reach_script import VARIANTS as REACH_VARIANTS
 from app.sim.people.reach_script import build_reach_library
 from app.sim.primitives.kernels.primitives import PrimitiveLibrary
 from app.sim.primitives.primitive_library import VARIANTS, motion_library
@@ -68,8 +69,9 @@ class HumanMotionConfig:
     augmentation: bool = True
     """Whether primitives are sampled and varied (docs/method.md 3.4); otherwise demonstrations
     are replayed."""
-    variants: int = VARIANTS
-    """Keyframes per body, place and hand."""
+    variants: int | None = None
+    """Keyframes of ``library``, or postures of ``reaches``, per body, place and hand; None: as
+    many as the source has, ``primitive_library.VARIANTS`` or ``reach_script.VARIANTS``."""
     recorded: tuple[Motion, ...] = ()
     """Runs placed in the cell, for ``recorded``; one that is given twice is drawn twice as
     often."""
@@ -89,6 +91,11 @@ class HumanMotionConfig:
             raise InvalidInput(
                 "pace_max", self.pace_max, f"must be at least pace = {self.pace}"
             )
+        if self.variants is not None:
+            whole = isinstance(self.variants, int) and not isinstance(self.variants, bool)
+            if not whole or self.variants < 1:
+                rule = "must be a whole number of at least 1, or None"
+                raise InvalidInput("variants", self.variants, rule)
         if self.bodies is not None and not self.bodies:
             raise InvalidInput("bodies", 0, "must hold at least one size, or be None")
         if self.motion == "recorded" and not self.recorded:
@@ -130,7 +137,8 @@ def with_human_motion(shared: People, cell: Cell, settings: HumanMotionConfig) -
     if settings.motion == "library":
         return _with_library(shared, cell, settings)
     sizes = settings.bodies or (cell.human.size,)
-    library = build_reach_library(cell, settings.seed, sizes)
+    variants = REACH_VARIANTS if settings.variants is None else settings.variants
+    library = build_reach_library(cell, settings.seed, sizes, variants)
     return shared._replace(
         source=people.REACHES,
         bodies=np.stack([size.vector(cell.floor_z) for size in sizes]),
@@ -147,7 +155,7 @@ def _with_library(shared: People, cell: Cell, settings: HumanMotionConfig) -> Pe
         settings.seed,
         settings.bodies,
         augmentation=settings.augmentation,
-        variants=settings.variants,
+        variants=VARIANTS if settings.variants is None else settings.variants,
     )
     # Copies, because kernels are compiled separately for read-only arrays. Samples are large,
     # and read-only everywhere.

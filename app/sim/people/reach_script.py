@@ -28,6 +28,8 @@ REACH_PACE = 0.5
 """Mean palm speed of a single reach [m/s]."""
 SHORTEST_REACH_S = 0.8
 """Shortest duration of a single reach [s]."""
+VARIANTS = 24
+"""Postures per body, place and hand."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -46,7 +48,7 @@ class ReachLibrary:
 
 @lru_cache(maxsize=8)
 def build_reach_library(
-    cell: Cell, seed: int, bodies: tuple[BodySize, ...] | None = None, variants: int = 24
+    cell: Cell, seed: int, bodies: tuple[BodySize, ...] | None = None, variants: int = VARIANTS
 ) -> ReachLibrary:
     """Draw ``variants`` postures for each body, place and hand of a cell.
 

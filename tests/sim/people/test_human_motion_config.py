@@ -13,6 +13,7 @@ from app.sim.human.kernels.kinematics import PELVIS_Z
 from app.sim.people.human_motion_config import (
     TRACK_DT,
     HumanMotionConfig,
+    MotionSource,
     at_the_table,
     back_and_forth,
     tracks_of,
@@ -332,6 +333,23 @@ def test_speeds_of_people_are_drawn_between_the_two_paces() -> None:
     assert np.median(pace) == pytest.approx(0.6 + 1.4 / 4, abs=0.06)
     with pytest.raises(InvalidInput, match="pace_max"):
         HumanMotionConfig(pace=1.0, pace_max=0.5)
+
+
+@pytest.mark.parametrize("motion", ["library", "reaches"])
+def test_as_many_postures_are_drawn_as_stated(cell: Cell, motion: MotionSource) -> None:
+    usual, few = (
+        people_of(cell, HumanMotionConfig(motion=motion, variants=variants))
+        for variants in (None, 2)
+    )
+    assert (few.of_station[..., 1] == 2).all()
+    stated = HumanMotionConfig(motion=motion, variants=int(usual.of_station[0, 0, 0, 1]))
+    np.testing.assert_array_equal(people_of(cell, stated).postures, usual.postures)
+
+
+@pytest.mark.parametrize("variants", [0, -1, 2.5, True, float("nan")])
+def test_no_other_numbers_of_postures_are_taken(variants: int) -> None:
+    with pytest.raises(InvalidInput, match="variants = .* at least 1"):
+        HumanMotionConfig(variants=variants)
 
 
 def test_a_short_run_is_played_forward_and_backward() -> None:
