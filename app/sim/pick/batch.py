@@ -137,10 +137,19 @@ class PickSettings:
         if not 0.0 <= self.target_jitter_m < math.inf:
             rule = "must be finite and not negative"
             raise InvalidInput("target_jitter_m", self.target_jitter_m, rule)
+        _check_grasp(self.grasp)
         fewest, most = self.n_candidates
         if not 1 <= fewest <= most <= MAX_CANDIDATES:
             rule = f"must be a least and a greatest number in [1, {MAX_CANDIDATES}]"
             raise InvalidInput("n_candidates", list(self.n_candidates), rule)
+
+
+def _check_grasp(grasp: GraspRules) -> None:
+    """Raise InvalidInput unless the descent has a length and closing takes time."""
+    if not 0.0 <= grasp.depth < math.inf:
+        raise InvalidInput("grasp.depth", grasp.depth, "must be finite and not negative")
+    if not 0.0 < grasp.close_s < math.inf:
+        raise InvalidInput("grasp.close_s", grasp.close_s, "must be positive and finite")
 
 
 WHOLE_PICK = PickSettings(time_limit_s=12.0, grasp=GraspRules(), observation="two-people")

@@ -16,6 +16,7 @@ from app.sim.pick.batch import OUTCOMES, PickBatch, PickSettings
 from app.sim.pick.candidate_observer import CandidateObserver
 from app.sim.pick.hand_speeds import hand_speeds
 from app.sim.pick.kernels.candidates import observe_candidates
+from app.sim.pick.kernels.grasp import GraspRules
 from app.sim.pick.kernels.observation_layout import LAYOUT
 from app.sim.robot.kernels import actions
 from app.sim.robot.kernels.joints import JointPath
@@ -125,10 +126,14 @@ def test_more_candidates_than_stations_are_refused(cell: Cell) -> None:
         ("target_jitter_m", -0.1, "negative"),
         ("start", "nope", "choices: clearance, uniform"),
         ("observation", "nope", "choices: state, features"),
+        ("grasp", GraspRules(depth=-0.1), "negative"),
+        ("grasp", GraspRules(depth=float("nan")), "finite"),
+        ("grasp", GraspRules(close_s=0.0), "positive"),
+        ("grasp", GraspRules(depth=0.0, close_s=float("nan")), "positive"),
     ],
 )
 def test_settings_out_of_range_are_refused(field: str, value: Any, rule: str) -> None:
-    with pytest.raises(InvalidInput, match=f"^{field} = .*{rule}"):
+    with pytest.raises(InvalidInput, match=rf"^{field}[.\w]* = .*{rule}"):
         PickSettings(**{field: value})
 
 

@@ -94,7 +94,8 @@ def conclude(
     grasp, goal, d_old, tilt_old = task.grasp, state.goal[e], state.distance[e], state.tilt[e]
     d, tilt = distance_to(goal, robot), robot_tilt(robot)
     near = max(SUCCESS_DISTANCE, weights.d_v)
-    speed = tcp_speed(robot, state.qd[e]) if d <= near else 0.0
+    slow = d <= near or grasp.depth > 0.0  # the object may be farther away than this
+    speed = tcp_speed(robot, state.qd[e]) if slow else 0.0
     if grasp.depth > 0.0:
         tool = ToolState(robot.tcp, tilt, speed, state.clear[e, 0])
         phase, closing, lifted = next_phase(

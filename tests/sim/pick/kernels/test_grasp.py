@@ -90,6 +90,20 @@ def test_base_motion_picks_every_object_in_an_empty_cell() -> None:
     assert 1.8 < grasping.min() < grasping.max() < 2.4
 
 
+def test_gripper_closes_only_at_a_slow_tool_however_deep_the_object_is() -> None:
+    settings = PickSettings(people=(), grasp=RULES._replace(depth=0.2), observation="phase")
+    batch = PickBatch(load_cell(), 2, 5, settings)
+    batch.reset()
+    batch.set_goals(np.arange(2), batch.world.stations[:2] + [0.0, 0.0, 0.25])
+    batch.set_starts(batch.state.q_grasp)
+    batch.state.phase[:] = DESCEND
+    batch.state.qd[0, 1] = 0.25
+    act = (batch.state.qd[:, :5] / batch.arm.limits.qd_max[:5]).astype(np.float32)
+    batch.step(act, auto_reset=False)
+    assert batch.state.phase.tolist() == [DESCEND, DESCEND]
+    assert batch.state.closing.tolist() == [0.0, DT]
+
+
 def test_the_same_target_continues_a_pick_and_another_one_restarts_it() -> None:
     settings = PickSettings(people=(), grasp=RULES, observation="phase")
     batch = PickBatch(load_cell(), 2, 5, settings)
