@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from app.sim.envs.arguments import check_render_mode, options_of
 from app.sim.envs.raycast import Image
-from app.sim.envs.tasks import BatchTask, next_episode
+from app.sim.envs.tasks import BatchTask, episodes_of, next_episode, seed_of
 
 ROW = np.zeros(1, dtype=np.int64)
 
@@ -46,14 +46,15 @@ class SingleEnv(gymnasium.Env[NDArray[Any], Any]):
 
         Raises:
             InvalidInput: The seed or the number of the episode is out of range, or there is no
-                such option.
+                such option; nothing is changed.
         """
         stated = options_of(options, ("episode",))
+        seed, episodes = seed_of(seed), episodes_of(stated.get("episode"), len(ROW))
         super().reset(seed=seed)
         if seed is None and not self._seeded:
             seed = int(self.np_random.integers(2**31))
         batch = self._task.batch
-        next_episode(batch, ROW, seed, stated.get("episode"))
+        next_episode(batch, ROW, seed, episodes)
         self._seeded = self._running = True
         return batch.obs[0].copy(), self._info()
 

@@ -164,31 +164,47 @@ def _box(bound: float, n: int) -> spaces.Space[Any]:
     return cast("spaces.Space[Any]", spaces.Box(-bound, bound, (n,), np.float32))
 
 
-def next_episode(batch: Batch, rows: Rows, seed: int | None, episode: object = None) -> None:
+def next_episode(
+    batch: Batch, rows: Rows, seed: int | None, episodes: Rows | None = None
+) -> None:
     """Number and start the next episodes of some rows.
 
     Args:
         batch: Batch of the rows.
         rows: Numbers of the rows.
         seed: Seed of episode 0; None for the next episode of the present seed.
-        episode: Number of the episode instead of these, or one for each row.
-
-    Raises:
-        InvalidInput: The seed or a number of an episode is out of range; nothing is changed.
+        episodes: Numbers of the episodes instead of these, from :func:`episodes_of`.
     """
-    if seed is not None and not 0 <= seed <= MAX_SEED:
-        raise InvalidInput("seed", seed, "must lie in [0, 2^63)")
-    if episode is None:
-        after = batch.episode[rows] + 1 if seed is None else np.zeros_like(rows)
-    else:
-        after = _episodes(episode, len(rows))
+    if episodes is None:
+        episodes = batch.episode[rows] + 1 if seed is None else np.zeros_like(rows)
     batch.seed = batch.seed if seed is None else seed
-    batch.episode[rows] = after
+    batch.episode[rows] = episodes
     batch.start(rows)
 
 
-def _episodes(given: object, n_rows: int) -> Rows:
-    """Return stated numbers of episodes, shape (n_rows,)."""
+def seed_of(given: object) -> int | None:
+    """Return the seed of a reset; None if it is None.
+
+    Raises:
+        InvalidInput: It is not a whole number in [0, 2^63).
+    """
+    if given is None:
+        return None
+    if isinstance(given, int | np.integer) and not isinstance(given, bool):
+        seed = int(given)
+        if 0 <= seed <= MAX_SEED:
+            return seed
+    raise InvalidInput("seed", given, "must be a whole number in [0, 2^63), or None")
+
+
+def episodes_of(given: object, n_rows: int) -> Rows | None:
+    """Return stated numbers of episodes, shape (n_rows,); None if None are stated.
+
+    Raises:
+        InvalidInput: One is not a whole number in [0, 2^62), or there are not ``n_rows``.
+    """
+    if given is None:
+        return None
     found = np.asarray(given)
     is_whole = found.dtype.kind in "iu" and found.shape in ((), (n_rows,))
     if not is_whole or not ((found >= 0) & (found <= MAX_EPISODE)).all():

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from app.errors import InvalidInput
 from app.sim.envs.arguments import action_array, check_render_mode, options_of
 from app.sim.envs.raycast import Image
-from app.sim.envs.tasks import BatchTask, Mask, next_episode
+from app.sim.envs.tasks import BatchTask, Mask, Rows, episodes_of, next_episode, seed_of
 
 MODES = tuple(mode.value for mode in AutoresetMode)
 Steps = tuple[NDArray[Any], NDArray[np.float64], Mask, Mask, dict[str, Any]]
@@ -86,15 +86,16 @@ class BatchVectorEnv(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
         Raises:
             InvalidInput: The mask has another shape or type, is false everywhere, or is
                 combined with a seed although it is not true everywhere; the seed or the number
-                of an episode is out of range; there is no such option.
+                of an episode is out of range; there is no such option. Nothing is changed.
             ResetNeeded: The first reset is partial.
         """
         stated = options_of(options, ("episode", "reset_mask"))
-        chosen = self._chosen(stated.get("reset_mask"), seed)
+        seed, chosen = seed_of(seed), self._chosen(stated.get("reset_mask"), seed)
+        episodes = episodes_of(stated.get("episode"), int(chosen.sum()))
         super().reset(seed=seed)
         if seed is None and not self._seeded:
             seed = int(self.np_random.integers(2**31))
-        self._begin(chosen, seed, stated.get("episode"))
+        self._begin(chosen, seed, episodes)
         self._seeded = True
         return self._task.batch.obs.copy(), _marked(self._task.infos(), chosen)
 
@@ -117,9 +118,11 @@ class BatchVectorEnv(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
                 raise ResetNeeded("call reset() without reset_mask first")
         return found.copy()
 
-    def _begin(self, chosen: Mask, seed: int | None = None, episode: object = None) -> None:
+    def _begin(
+        self, chosen: Mask, seed: int | None = None, episodes: Rows | None = None
+    ) -> None:
         """Start episodes in the marked environments."""
-        next_episode(self._task.batch, np.flatnonzero(chosen), seed, episode)
+        next_episode(self._task.batch, np.flatnonzero(chosen), seed, episodes)
         self._steps[chosen], self._over[chosen] = 0, False
 
     def step(self, actions: NDArray[Any]) -> Steps:

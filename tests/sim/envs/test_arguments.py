@@ -74,6 +74,34 @@ def test_unknown_options_are_refused_with_the_choices(make: Any, options: Any) -
         make().reset(seed=1, options=options)
 
 
+@pytest.mark.parametrize("make", [*SINGLE, *VECTOR])
+@pytest.mark.parametrize(
+    ("seed", "options"),
+    [
+        (-1, {}),
+        (1.5, {}),
+        (True, {}),
+        (2**63, {}),
+        ([1, 2], {}),
+        (7, {"episode": -1}),
+        (7, {"episode": 1.5}),
+    ],
+)
+def test_refused_reset_changes_nothing(make: Any, seed: Any, options: dict[str, Any]) -> None:
+    env, same = make(), make()
+    env.reset(seed=3), same.reset(seed=3)
+    with pytest.raises(InvalidInput, match=r"(seed|options\.episode) = .* must be a whole"):
+        env.reset(seed=seed, options=options)
+    np.testing.assert_array_equal(env.reset()[0], same.reset()[0])
+    assert env.np_random.integers(2**31) == same.np_random.integers(2**31)
+
+
+@pytest.mark.parametrize("make", [*SINGLE, *VECTOR])
+@pytest.mark.parametrize("seed", [np.int64(3), np.uint8(3)])
+def test_seeds_of_numpy_are_seeds(make: Any, seed: Any) -> None:
+    np.testing.assert_array_equal(make().reset(seed=seed)[0], make().reset(seed=3)[0])
+
+
 @pytest.mark.parametrize("make", [ReachEnv, ReachVectorEnv])
 @pytest.mark.parametrize(
     "given", ["a", ["0"] * 6, 6 * [1j], 6 * [None], [[0.0] * 6, [0.0] * 5]]
