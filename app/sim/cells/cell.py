@@ -153,10 +153,17 @@ def require_cell(cell: Cell, name: str, sha256: str) -> None:
 
 
 def lacks_stations(cell: Cell) -> str | None:
-    """Return the missing parts for the pick scenario; None if complete."""
+    """Return the missing stations for picks and for the work of people; None if complete."""
     if not cell.stations_of("cube") or not cell.stations_of("dock"):
         return "needs at least one station of kind cube and one of kind dock"
     return None
+
+
+def lacks_for_pick_episodes(cell: Cell) -> str | None:
+    """Return the missing parts for episodes of the pick scenario; None if complete."""
+    if cell.robot.home_q[5] != 0.0:
+        return "needs home_q[5] = 0 rad: picks hold the sixth joint there"
+    return lacks_stations(cell)
 
 
 def lacks_for_pick(cell: Cell) -> str | None:
@@ -166,8 +173,8 @@ def lacks_for_pick(cell: Cell) -> str | None:
     of people, 0 to 4. Fixed obstacles are not observed: a policy learns their positions.
     """
     if len(cell.people) != 1 or not cell.workers:
-        return lacks_stations(cell) or "needs exactly one person, of kind worker"
-    return lacks_stations(cell)
+        return lacks_for_pick_episodes(cell) or "needs exactly one person, of kind worker"
+    return lacks_for_pick_episodes(cell)
 
 
 def lacks_for_reach(cell: Cell) -> str | None:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.errors import InvalidInput
-from app.sim.cells.cell import Cell, lacks_stations
+from app.sim.cells.cell import Cell, lacks_for_pick_episodes
 from app.sim.core.arrays import Vec, as_kernel_array
 from app.sim.core.jit import FAR
 from app.sim.human import model as human
@@ -157,7 +157,7 @@ WHOLE_PICK = PickSettings(time_limit_s=12.0, grasp=GraspRules(), observation="tw
 
 
 def _world_of(cell: Cell, settings: PickSettings) -> starts.PickCell:
-    if (lack := lacks_stations(cell)) is not None:
+    if (lack := lacks_for_pick_episodes(cell)) is not None:
         raise InvalidInput("cell", cell.name, f"cannot be used for picking: it {lack}")
     arm, stations = arm_of(cell), cell.pick_stations
     positions = np.array([station.position for station in stations]).reshape(-1, 3)
@@ -276,6 +276,8 @@ class PickBatch(EnvBatch):
 
     def set_starts(self, q: Vec) -> None:
         """Put the robots at rest at other starts [rad], shape (n_envs, 6)."""
+        require_shape("q", q, self.state.q.shape)
+        require_finite("q", q)
         shared = self.world, self.settings.grasp, self.state
         self.state.q[:], self.state.qd[:], self.state.qdd[:] = q, 0.0, 0.0
         starts.measure_starts(*shared, self._work)
@@ -285,8 +287,6 @@ def observation_workspace_of(cell: Cell) -> PickObservationWorkspace:
     """Return work space for observations in a cell, one at a time."""
     far = human.rest_posture(*FAR_AWAY)
     size, predictor = as_kernel_array(cell.body), new_worker_predictor()
-        require_shape("q", q, self.state.q.shape)
-        require_finite("q", q)
     tool = cell.robot.tool_length, cell.robot.tool_radius
     return new_pick_observation_workspace(cell.floor_z, far, size, predictor, tool)
 

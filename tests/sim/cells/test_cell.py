@@ -6,7 +6,14 @@ import pytest
 from app.errors import NotFound
 from app.sim.cell_validation.checks import check_cell
 from app.sim.cell_validation.reachability import Reach
-from app.sim.cells.cell import Cell, cell_names, lacks_for_pick, load_cell, parse_definition
+from app.sim.cells.cell import (
+    Cell,
+    cell_names,
+    lacks_for_pick,
+    lacks_for_pick_episodes,
+    load_cell,
+    parse_definition,
+)
 from app.sim.cells.parts import Each, Obstacle, Within
 from app.sim.collision.fcl_reference import CollisionReference
 from app.sim.human.kernels.kinematics import PELVIS_Z
@@ -146,6 +153,11 @@ def test_only_a_cell_with_cubes_docks_and_a_worker_is_one_to_pick_in() -> None:
     assert "kind cube" in (lacks_for_pick(load_cell("sorting-e0")) or "")
     no_people = load_cell().model_copy(update={"people": ()})
     assert "kind worker" in (lacks_for_pick(no_people) or "")
+    turned = (*load_cell().robot.home_q[:5], 1.0)
+    robot = load_cell().robot.model_copy(update={"home_q": turned})
+    other = load_cell().model_copy(update={"robot": robot})
+    assert "home_q[5] = 0" in (lacks_for_pick(other) or "")
+    assert lacks_for_pick_episodes(other.model_copy(update={"people": ()})) is not None
 
 
 def test_unknown_cell_is_named_with_the_known_ones() -> None:

@@ -65,8 +65,6 @@ def test_robot_starts_from_home_cubes_and_docks_in_equal_shares(cell: Cell) -> N
     assert at_dock.mean() == pytest.approx(1 / 3, abs=0.05)
 
 
-def test_targets_are_drawn_uniformly(cell: Cell) -> None:
-    batch = PickBatch(cell, 4000, 9, PickSettings(start_clearance_m=-10.0))
 def test_other_starts_keep_the_limits_of_the_joints(cell: Cell) -> None:
     narrow = {
         "q_min": (*cell.robot.q_min[:4], -1.7, cell.robot.q_min[5]),
@@ -81,6 +79,8 @@ def test_other_starts_keep_the_limits_of_the_joints(cell: Cell) -> None:
     assert len(np.unique(batch.state.q[:, 4])) > 10
 
 
+def test_targets_are_drawn_uniformly(cell: Cell) -> None:
+    batch = PickBatch(cell, 4000, 9, PickSettings(start_clearance_m=-10.0))
     batch.reset()
     counts = np.bincount(batch.state.candidates[:, 0], minlength=len(cell.stations))
     np.testing.assert_allclose(counts / 4000, 1 / len(cell.stations), atol=0.03)
@@ -137,11 +137,6 @@ def test_settings_out_of_range_are_refused(field: str, value: Any, rule: str) ->
         PickSettings(**{field: value})
 
 
-def test_meshes_find_no_contact_that_the_kernels_missed(cell: Cell) -> None:
-    batch = PickBatch(cell, 24, 12, TEN_SECONDS)
-    obs, state = batch.reset(), batch.state
-    paths: list[list[tuple[np.ndarray, ...]]] = [[] for _ in range(24)]
-    for _ in range(200):
 @pytest.mark.parametrize(
     "envs", [[3], [-1], [2**32], np.array([True, False, True]), [0.0], [[0]]]
 )
@@ -189,6 +184,11 @@ def test_targets_and_starts_that_are_not_finite_or_of_another_shape_are_refused(
     np.testing.assert_array_equal(batch.state.goal, goal)
 
 
+def test_meshes_find_no_contact_that_the_kernels_missed(cell: Cell) -> None:
+    batch = PickBatch(cell, 24, 12, TEN_SECONDS)
+    obs, state = batch.reset(), batch.state
+    paths: list[list[tuple[np.ndarray, ...]]] = [[] for _ in range(24)]
+    for _ in range(200):
         before = state.q.copy(), state.qd.copy(), state.people.q[:, 0].copy()
         running = np.flatnonzero(state.outcome == 0)
         obs = batch.step(obs[:, LAYOUT["base"]].copy(), auto_reset=False).obs
@@ -268,6 +268,13 @@ def test_cell_whose_station_is_out_of_reach_is_refused_by_name(cell: Cell) -> No
     broken = cell.model_copy(update={"stations": (far, *cell.stations[1:])})
     with pytest.raises(InvalidInput, match="stations.cube0.position"):
         PickBatch(broken, 1, 0, TEN_SECONDS)
+
+
+def test_cell_whose_home_turns_the_sixth_joint_is_refused(cell: Cell) -> None:
+    robot = cell.robot.model_copy(update={"home_q": (*cell.robot.home_q[:5], 1.0)})
+    turned = cell.model_copy(update={"robot": robot})
+    with pytest.raises(InvalidInput, match=r"cannot be used for picking: it needs home_q\[5\]"):
+        PickBatch(turned, 1, 0, TEN_SECONDS)
 
 
 def test_hands_are_fast_enough_to_be_a_problem(cell: Cell) -> None:
