@@ -19,7 +19,7 @@ from app.sim.cells.parts import MAX_FAILURE
 from app.sim.core.arrays import Vec
 from app.sim.core.jit import direct
 from app.sim.scenario.step_result import StepResult
-from app.sim.scene.scene import require_shape
+from app.sim.scene.scene import env_numbers, require_shape
 from app.sim.sorting.kernels import episode as sorting_episode
 from app.sim.sorting.kernels import task as kernel
 from app.sim.sorting.kernels.reward import SortingWeights
@@ -185,10 +185,6 @@ class SortingBatch(Stateful):
         self.rows = new_rows(shape, n_envs, fail)
         """Rows of all tasks."""
         self.settings = settings or SortingSettings()
-        _check_sizes(self.settings, shape)
-        """Starts, disturbances, rewards and ends; may be replaced between two steps."""
-        self.rows.fixed_objects[:] = self.settings.n_objects
-        self.rows.fixed_goal[:] = self.settings.n_goal
         self._obs = np.zeros((n_envs, shape.obs_size), dtype=np.uint8)
         self._last = np.zeros_like(self._obs)
         self._masks = np.zeros((n_envs, shape.n_actions), dtype=np.bool_)
@@ -199,6 +195,18 @@ class SortingBatch(Stateful):
     def __getstate__(self) -> dict[str, Any]:
         """Return the state to pickle, without the compiled kernel."""
         return {**self.__dict__, "_step": None}
+
+    @property
+    def settings(self) -> SortingSettings:
+        """Starts, disturbances, rewards and ends; may be replaced between two steps."""
+        return self._settings
+
+    @settings.setter
+    def settings(self, settings: SortingSettings) -> None:
+        _check_sizes(settings, self.shape)
+        self._settings = settings
+        self.rows.fixed_objects[:] = settings.n_objects
+        self.rows.fixed_goal[:] = settings.n_goal
 
     @property
     def obs(self) -> Obs:
@@ -249,10 +257,14 @@ class SortingBatch(Stateful):
 
         Returns:
             Observations of all rows, (n_envs, obs_size).
+
+        Raises:
+            InvalidInput: A row does not exist.
         """
-        if len(rows) == self.n_envs:
+        checked = env_numbers(rows, self.n_envs)
+        if np.array_equal(checked, np.arange(self.n_envs)):
             return self.restart()
-        for e in rows.tolist():
+        for e in checked.tolist():
             one = kernel.SortingRows._make(column[e : e + 1] for column in self.rows)
             first, obs = self._first + e, self._obs[e : e + 1]
             sorting_episode.start_rows(one, self._rules(), self.seed, first, obs)

@@ -106,6 +106,23 @@ def test_one_state_and_the_rows_agree_on_masks_observations_and_moves() -> None:
         batch.rows.outcome[:] = OUTCOMES.index("running")
 
 
+def test_sizes_of_other_settings_count_from_the_next_start_on() -> None:
+    batch = batch_of(16)
+    batch.settings = SortingSettings(n_objects=3, n_goal=2)
+    batch.restart()
+    assert (counts(batch).sum(axis=1) == 3).all()
+    assert (batch.rows.goal_heights.sum(axis=1) == 2).all()
+    with pytest.raises(InvalidInput, match="n_objects = 7 must lie in"):
+        batch.settings = SortingSettings(n_objects=7)
+    assert batch.settings.n_objects == 3 and (batch.rows.fixed_objects == 3).all()
+
+
+@pytest.mark.parametrize("rows", [[16], [-1], [True] * 16, [0.0]])
+def test_only_rows_that_exist_are_started(rows: list[int]) -> None:
+    with pytest.raises(InvalidInput, match="^envs = .* must be"):
+        batch_of(16).start(np.array(rows))
+
+
 def test_picks_fail_as_often_as_their_cells_say() -> None:
     n = 4000
     batch = batch_of(n, SortingSettings(n_objects=6), RISKY)
