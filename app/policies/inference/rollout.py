@@ -123,13 +123,13 @@ class RolloutImprovement:
 
     def __init__(self, actor: ReachActor) -> None:
         network = _network_of(actor)
-        if network is None:
+        if network is None or not isinstance(actor, ReachPolicy):
             rule = (
                 "must be a residual actor of two layers with option features, in a cell whose "
                 f"control period dt divides {STEP_S} s, for rollouts"
             )
             raise InvalidInput("checkpoint", actor.checkpoint, rule)
-        self._network, self._rule = network, actor.action.rule()
+        self._network, self._rule, self._dt = network, actor.action.rule(), actor.dt
         self.constraint = NO_CONSTRAINT
         """Constraint of the safety layer."""
         self._envs: ReachEnvs | None = None
@@ -151,9 +151,15 @@ class RolloutImprovement:
 
         Returns:
             Index of the selected candidate in ``CANDIDATES``, or POLICY, shape (n_envs,).
+
+        Raises:
+            InvalidInput: The environments have another control period than the policy.
         """
         world, state, chosen = envs.world, envs.state, np.empty(len(act), dtype=np.int64)
         if self._work is None or self._envs is not envs:
+            if world.arm.dt != self._dt:
+                rule = f"must be {self._dt:g} s, the policy's control period, for rollouts"
+                raise InvalidInput("robot.dt", world.arm.dt, rule)
             workspace = new_observation_workspace(
                 world.arm, world.people, state.people, new_motion_predictor()
             )

@@ -311,6 +311,15 @@ def test_rollouts_need_a_control_period_that_divides_their_step(
             MotionDecider(actor, cell).decide(query)
 
 
+def test_rollouts_need_environments_with_the_policys_control_period() -> None:
+    robot = CELL.robot.model_copy(update={"dt": 0.01})
+    other = CELL.model_copy(update={"robot": robot})
+    batch = ReachBatch(other, 2, 3, ReachSettings(observation="forecast"))
+    batch.reset()
+    with pytest.raises(InvalidInput, match=r"robot\.dt = 0\.01 must be 0\.02 s"):
+        RolloutImprovement(ACTOR).improve(batch, np.zeros((2, 6), dtype=np.float32))
+
+
 def test_other_policies_cannot_be_simulated() -> None:
     actor = RandomActor()
     assert can_roll_out(ACTOR) and not can_roll_out(actor)
