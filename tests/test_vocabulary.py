@@ -42,3 +42,16 @@ def test_names_strings_and_comments_of_python_are_searched() -> None:
         (1, "ways (n_ways)"),
         (2, "twins"),
     ]
+
+
+@pytest.mark.parametrize(
+    ("source", "found"),
+    [
+        ('"""Why it was held against it."""\n', "held against"),
+        ("# for want of space\n", "for want of"),
+        ('label = "the source\'s"\n', "the source's"),
+        ('label = """Who walks away"""\n', "Who"),
+    ],
+)
+def test_phrases_of_python_are_found(source: str, found: str) -> None:
+    assert [word for _, word in in_python(source)] == [found]
