@@ -15,6 +15,7 @@ from app.store.database.schema import REVISION, check_schema
 from app.store.database.tables import metadata
 from app.store.engine import Store
 from app.store.records import NewJob
+from tests.support.postgresql_server import PostgresqlServer
 
 
 def test_migrations_build_exactly_the_tables(store: Store) -> None:
@@ -82,3 +83,19 @@ def test_file_that_is_no_database_is_named(tmp_path: Path) -> None:
     ):
         migrate(store)
     store.close()
+
+
+@pytest.mark.postgres
+def test_each_test_has_an_empty_database(postgresql: PostgresqlServer) -> None:
+    """It has nothing of the test before, and has its indices no longer."""
+    for _ in range(2):
+        store = Store(postgresql.emptied_database())
+        assert jobs.create_job(store, NewJob(kind="count", spec={})).number == 1
+        with store.writing() as connection:
+            assert compare_metadata(MigrationContext.configure(connection), metadata) == []
+        store.close()
+    store = Store(postgresql.emptied_database())
+    with store.writing() as connection:
+        connection.execute(sa.text("CREATE INDEX more ON jobs (kind)"))
+    store.close()
+    assert store.url != postgresql.emptied_database()

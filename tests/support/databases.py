@@ -42,8 +42,7 @@ def database_url(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[str
         yield f"sqlite:///{shutil.copy(request.getfixturevalue('migrated'), tmp_path)}"
         return
     server: PostgresqlServer = request.getfixturevalue("postgresql")
-    with server.database() as url:
-        yield url
+    yield server.emptied_database()
 
 
 @pytest.fixture
