@@ -1,5 +1,7 @@
 """A tiny training run, shared by the tests of this folder."""
 
+from collections.abc import Callable
+
 import pytest
 
 from app.policies.configs import presets
@@ -33,12 +35,17 @@ def preset_of(name: str, *fields: dict[str, object]) -> Preset:
 
 
 class Recorder:
-    """Keeps what a training reports; stops it at a step if asked to."""
+    """Keeps what a training reports; stops it at a step or a point if asked to."""
 
-    def __init__(self, stop_at: int | None = None, memory: MemoryFiles | None = None) -> None:
+    def __init__(
+        self,
+        stop_at: int | None = None,
+        memory: MemoryFiles | None = None,
+        stops: Callable[[Progress], bool] = lambda _: False,
+    ) -> None:
         self.progress: list[Progress] = []
         self.checkpoints = []
-        self._stop_at, self._memory = stop_at, memory
+        self._stop_at, self._memory, self._stops = stop_at, memory, stops
 
     def run(self, preset: Preset, resume=None, seed: int = 3, cell: Cell | None = None):
         return train(
@@ -51,12 +58,11 @@ class Recorder:
             on_checkpoint=lambda step, policy, state: self.checkpoints.append(
                 (step, policy, state)
             ),
-            should_stop=lambda: (
-                self._stop_at is not None
-                and bool(self.progress)
-                and self.progress[-1].step >= self._stop_at
-            ),
+            should_stop=lambda: bool(self.progress) and self._is_last(self.progress[-1]),
         )
+
+    def _is_last(self, point: Progress) -> bool:
+        return self._stops(point) or (self._stop_at is not None and point.step >= self._stop_at)
 
 
 @pytest.fixture(scope="session")
