@@ -20,8 +20,8 @@ from app.sim.scenario.kernels.episode import COLLISION
 from tests.policies.untrained import shipped_as, untrained_reach
 
 N = 12
-EPISODES = {"reach-targets": 2, "reach-people": 24, "reach-tracker": 24}
-"""Episodes per target, and those whose rates or errors are compared; of other protocols N."""
+EPISODES = {"reach-targets": 2, "reach-people": 24}
+"""Episodes per target, and those whose rates are compared; of other protocols N."""
 MEASURED = sorted(
     f"reach-{name}"
     for name in "targets random constant speeds smoothness people tracker".split()
