@@ -1,17 +1,16 @@
 """One running service for the tests of this folder: real store, supervisor, policy and cell."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
-from fastapi import FastAPI
 from fastapi.testclient import TestClient
 
 from app.api.services import Services
 from app.main import create_app
 from app.settings import Settings
-from tests.api.described import Answered, undescribed
+from tests.api.described import Answered, api_document, undescribed
 from tests.api.live_server import WARM_UP_S, served
 from tests.support.databases import database_url, migrated, postgresql, store
 from tests.support.waiting import wait_until
@@ -31,7 +30,7 @@ def client(tmp_path_factory: pytest.TempPathFactory) -> Iterator[TestClient]:
     app = create_app(Settings(data=tmp_path_factory.mktemp("data")))
     with TestClient(app, base_url=ADDRESS) as one:
         wait_until_ready(one)
-        one.event_hooks = {"response": [require_description(app)]}
+        one.event_hooks = {"response": [require_description]}
         yield one
 
 
@@ -40,15 +39,10 @@ def services_of(client: TestClient) -> Services:
     return client.app.state.services  # type: ignore[attr-defined, no-any-return]
 
 
-def require_description(app: FastAPI) -> Callable[[Answered], None]:
-    """Return a check of every answer of a test: the OpenAPI document describes it."""
-    document = app.openapi()
-
-    def check(answer: Answered) -> None:
-        fault = undescribed(document, answer)
-        assert fault is None, fault
-
-    return check
+def require_description(answer: Answered) -> None:
+    """Check an answer of a test: the OpenAPI document describes it."""
+    fault = undescribed(api_document(), answer)
+    assert fault is None, fault
 
 
 @pytest.fixture(scope="module")

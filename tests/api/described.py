@@ -2,7 +2,11 @@
 
 import re
 from functools import cache
+from pathlib import Path
 from typing import Any, Protocol
+
+from app.main import create_app
+from app.settings import Settings
 
 
 class Answered(Protocol):
@@ -14,6 +18,12 @@ class Answered(Protocol):
     def headers(self) -> Any: ...
     @property
     def request(self) -> Any: ...
+
+
+@cache
+def api_document() -> dict[str, Any]:
+    """Return the document, which is the same for every service; making it takes long."""
+    return create_app(Settings(data=Path("nowhere"))).openapi()
 
 
 def operation_of(document: dict[str, Any], method: str, path: str) -> dict[str, Any] | None:

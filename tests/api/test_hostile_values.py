@@ -3,7 +3,6 @@
 import copy
 import json
 from collections.abc import Iterable, Iterator
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -13,9 +12,9 @@ from httpx2 import ASGITransport, AsyncClient, Response
 from app.main import create_app
 from app.settings import Settings
 from tests.api.conftest import ADDRESS, wait_until_ready
-from tests.api.described import undescribed
+from tests.api.described import api_document, undescribed
 
-API: dict[str, Any] = create_app(Settings(data=Path("nowhere"))).openapi()
+API = api_document()
 ROUTES = [
     (method, path)
     for path, operations in API["paths"].items()

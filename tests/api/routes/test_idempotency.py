@@ -20,7 +20,7 @@ def idle(store: Store, tmp_path: Path) -> Iterator[TestClient]:
     """A client of the routes; no job runs."""
     app = app_of(idle_service(store, tmp_path))
     with TestClient(app, base_url=ADDRESS) as client:
-        client.event_hooks = {"response": [require_description(app)]}
+        client.event_hooks = {"response": [require_description]}
         yield client
 
 
