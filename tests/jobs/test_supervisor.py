@@ -45,6 +45,7 @@ def test_job_runs_to_its_end(store: Store, supervisor: Supervisor) -> None:
 
 
 @pytest.mark.usefixtures("supervisor")
+@SQLITE_ONLY
 def test_no_more_jobs_run_at_once_than_allowed(store: Store) -> None:
     first = queue(store, steps=100, hold_at=[22])
     second = queue(store, steps=20)
@@ -90,6 +91,7 @@ def test_job_that_always_crashes_fails_with_its_last_words(store: Store) -> None
 
 
 @pytest.mark.usefixtures("supervisor")
+@SQLITE_ONLY
 def test_bad_input_found_by_the_worker_fails_at_once(store: Store) -> None:
     job = wait_until_final(store, queue(store, steps=40, refuse_at=7))
     assert (job.state, job.attempt) == ("failed", 1)
@@ -97,6 +99,7 @@ def test_bad_input_found_by_the_worker_fails_at_once(store: Store) -> None:
 
 
 @pytest.mark.usefixtures("supervisor")
+@SQLITE_ONLY
 def test_unknown_kind_fails_and_names_the_known(store: Store) -> None:
     job = wait_until_final(store, queue(store, kind="dream"))
     assert job.state == "failed"
@@ -132,6 +135,7 @@ def test_job_cancelled_while_its_worker_starts_has_not_crashed(store: Store) -> 
 
 
 @pytest.mark.usefixtures("supervisor")
+@SQLITE_ONLY
 def test_deaf_worker_is_killed_after_the_grace_time(store: Store) -> None:
     job_id = queue(store, steps=100, hold_at=[7], deaf=True)
     wait_for(store, job_id, lambda job: job.step >= 5)
@@ -328,6 +332,7 @@ def test_row_left_running_without_a_worker_is_started_again(store: Store) -> Non
     assert wait_until_final(store, job_id).state == "succeeded"
 
 
+@SQLITE_ONLY
 def test_worker_that_cannot_be_started_fails_the_job(
     store: Store, tmp_path: Path, executor: LocalProcess
 ) -> None:
@@ -338,6 +343,7 @@ def test_worker_that_cannot_be_started_fails_the_job(
 
 
 @pytest.mark.usefixtures("supervisor")
+@SQLITE_ONLY
 def test_log_of_a_job_carries_its_id_in_each_line(store: Store, tmp_path: Path) -> None:
     job_id = queue(store, steps=20)
     wait_until_final(store, job_id)
