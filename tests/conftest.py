@@ -47,6 +47,8 @@ FIRST = (
         "policies/evaluation/test_registry.py",
         "sim/safety/test_adversarial_trials.py",
     ),
+    # These share a training.
+    ("jobs/test_run.py", "jobs/remote/test_run.py"),
     # These are long. At most two processes draw the scene; others have time to wait.
     ("browser/test_job_forms.py",),
     ("browser/scenes/test_windows.py", "browser/scenes/test_view.py"),

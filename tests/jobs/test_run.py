@@ -1,4 +1,4 @@
-"""The entry point with the real runners, in real processes."""
+"""The real runners: trainings and an evaluation in real processes, others in this one."""
 
 import os
 import signal
@@ -31,7 +31,7 @@ from tests.policies.evaluation.sorting_players import untrained
 from tests.sim.recorded_person import csv_text, working
 from tests.support import workshop
 from tests.support.databases import SQLITE_ONLY
-from tests.support.trainings import Made, killed_midway, made_by, train
+from tests.support.trainings import Made, killed_midway, made_by, run_here, train
 
 
 @pytest.fixture
@@ -56,7 +56,7 @@ def test_worker_finds_a_database_whose_path_is_relative_to_the_server(
 
 
 @pytest.mark.usefixtures("supervisor")
-def test_training_stores_its_curve_and_policies(store: Store) -> None:
+def test_training_stores_its_curve_and_policies(store: Store, undisturbed: Made) -> None:
     job_id = train(store)
     job = wait_until_final(store, job_id)
     assert (job.state, job.error, job.attempt) == ("succeeded", None, 1)
@@ -64,6 +64,7 @@ def test_training_stores_its_curve_and_policies(store: Store) -> None:
     made = checkpoints.list_checkpoints(store, job_id=job_id).items
     assert [c.step for c in made] == [2048, 1536, 1024, 512]
     assert job.result == {"checkpoint": made[0].sha256, "step": 2048}
+    assert made_by(store, job_id) == undisturbed
     assert attempts.load_resume(store, job_id) is None
 
 
@@ -97,7 +98,7 @@ def test_training_that_a_budget_ended_goes_on_to_the_same_bits(
 def test_training_with_damaged_files_goes_on_from_an_earlier_state(
     store: Store, tmp_path: Path
 ) -> None:
-    job_id = train(store, **{"learning.total_steps": 4096})
+    job_id = train(store, **{"learning.total_steps": 3072})
     wait_for(store, job_id, lambda job: job.step >= 1152)
     (pid,) = worker_pids(os.getpid())
     os.kill(pid, signal.SIGSTOP)
@@ -108,31 +109,31 @@ def test_training_with_damaged_files_goes_on_from_an_earlier_state(
     os.kill(pid, signal.SIGKILL)
     job = wait_until_final(store, job_id)
     assert (job.state, job.error) == ("succeeded", None)
-    assert [m.step for m in metrics.list_metrics(store, job_id)] == list(range(128, 4097, 128))
+    assert [m.step for m in metrics.list_metrics(store, job_id)] == list(range(128, 3073, 128))
     resumed = [e.data.get("resumed_from_step") for e in events.list_events(store, job_id)]
     assert newest.step - 512 in resumed
     assert [step for step, _ in made_by(store, job_id).checkpoints] == list(
-        range(4096, 0, -512)
+        range(3072, 0, -512)
     )
 
 
-@pytest.mark.usefixtures("supervisor")
 @SQLITE_ONLY
-def test_training_in_a_cell_of_one_s_own_gives_a_policy_of_that_cell(store: Store) -> None:
+def test_training_in_a_cell_of_one_s_own_gives_a_policy_of_that_cell(
+    store: Store, tmp_path: Path
+) -> None:
     CellCatalog(store).add(workshop.cell())
-    job = wait_until_final(
-        store, train(store, cell="workshop", **{"learning.total_steps": 1024})
-    )
+    train(store, cell="workshop", **{"learning.total_steps": 1024})
+    job = run_here(store, tmp_path)
     assert (job.state, job.error) == ("succeeded", None)
     assert job.result is not None
     record = checkpoints.get_checkpoint(store, job.result["checkpoint"])
     assert is_for(record.manifest, workshop.cell())
 
 
-@pytest.mark.usefixtures("supervisor")
 @SQLITE_ONLY
-def test_training_in_a_cell_that_is_gone_fails_by_name(store: Store) -> None:
-    job = wait_until_final(store, train(store, cell="kitchen"))
+def test_training_in_a_cell_that_is_gone_fails_by_name(store: Store, tmp_path: Path) -> None:
+    train(store, cell="kitchen")
+    job = run_here(store, tmp_path)
     assert job.state == "failed"
     assert "overrides.cell = 'kitchen' is no known work cell" in (job.error or "")
 
@@ -161,25 +162,27 @@ def test_killed_training_goes_on_and_its_policy_can_be_evaluated(store: Store) -
     )
 
 
-@pytest.mark.usefixtures("supervisor")
 @SQLITE_ONLY
 @pytest.mark.parametrize("named", [None, "pick"])  # evaluations of former versions named one
 def test_protocol_without_policy_is_run_without_checkpoint(
-    store: Store, named: str | None
+    store: Store, tmp_path: Path, named: str | None
 ) -> None:
     body = {"kind": "evaluate", "protocol": "safety-ssm", "episodes": 2}
     new = parse_spec(body).new_job()
     new = replace(new, spec={**new.spec, "checkpoint": named})
-    job = wait_until_final(store, jobs.create_job(store, new).id)
+    jobs.create_job(store, new)
+    job = run_here(store, tmp_path)
     assert (job.state, job.error) == ("succeeded", None)
     assert job.result is not None and "checkpoint" not in job.result
 
 
-@pytest.mark.usefixtures("supervisor")
 @SQLITE_ONLY
-def test_evaluation_of_an_unknown_checkpoint_fails_by_name(store: Store) -> None:
+def test_evaluation_of_an_unknown_checkpoint_fails_by_name(
+    store: Store, tmp_path: Path
+) -> None:
     body = {"kind": "evaluate", "protocol": "pick-single", "checkpoint": "nobody"}
-    job = wait_until_final(store, jobs.create_job(store, parse_spec(body).new_job()).id)
+    jobs.create_job(store, parse_spec(body).new_job())
+    job = run_here(store, tmp_path)
     assert (job.state, job.error) == ("failed", "no checkpoint 'nobody'")
 
 
@@ -191,10 +194,9 @@ def test_evaluation_is_of_the_checkpoint_that_its_alias_named_when_it_was_posted
         checkpoints.put_checkpoint(store, shipped(name))
     checkpoints.set_alias(store, "line-2", pretrained.SHA256["reach"])
     body = {"kind": "evaluate", "protocol": "pick-single", "checkpoint": "line-2"}
-    job = jobs.create_job(store, parse_spec({**body, "episodes": 1}).new_job())
+    jobs.create_job(store, parse_spec({**body, "episodes": 1}).new_job())
     checkpoints.set_alias(store, "line-2", pretrained.SHA256["pick"])
-    with supervised(store, tmp_path):
-        ended = wait_until_final(store, job.id)
+    ended = run_here(store, tmp_path)
     assert "must be a policy that picks" in (ended.error or "")
 
 
@@ -220,14 +222,16 @@ def test_evaluation_beside_stored_recordings_tells_row_by_row(store: Store) -> N
         assert point.values["success"] == row["success"]["mean"]
 
 
-@pytest.mark.usefixtures("supervisor")
 @SQLITE_ONLY
-def test_evaluation_of_the_case_studies_tells_the_rates_of_each_case(store: Store) -> None:
+def test_evaluation_of_the_case_studies_tells_the_rates_of_each_case(
+    store: Store, tmp_path: Path
+) -> None:
     policy = pretrained.load("pick")
     checkpoints.put_checkpoint(store, to_store(policy))
     body = {"kind": "evaluate", "protocol": "pick-cases", "checkpoint": policy.sha256}
     spec = parse_spec({**body, "episodes": 2}).new_job()
-    job = wait_until_final(store, jobs.create_job(store, spec).id)
+    jobs.create_job(store, spec)
+    job = run_here(store, tmp_path)
     assert (job.state, job.error, job.step) == ("succeeded", None, 4)
     assert job.result is not None
     points = metrics.list_metrics(store, job.id)
@@ -237,30 +241,32 @@ def test_evaluation_of_the_case_studies_tells_the_rates_of_each_case(store: Stor
         assert "expected" not in point.values
 
 
-@pytest.mark.usefixtures("supervisor")
 @SQLITE_ONLY
-def test_evaluation_beside_a_recording_that_is_gone_fails_by_name(store: Store) -> None:
+def test_evaluation_beside_a_recording_that_is_gone_fails_by_name(
+    store: Store, tmp_path: Path
+) -> None:
     policy = pretrained.load("pick")
     checkpoints.put_checkpoint(store, to_store(policy))
     body = {"kind": "evaluate", "protocol": "pick-mocap", "recordings": ["waves"]}
     spec = parse_spec({**body, "checkpoint": policy.sha256, "episodes": 4}).new_job()
-    job = wait_until_final(store, jobs.create_job(store, spec).id)
+    jobs.create_job(store, spec)
+    job = run_here(store, tmp_path)
     assert job.state == "failed"
     assert "recordings[0] = 'waves' is no stored recording" in (job.error or "")
 
 
-@pytest.mark.usefixtures("supervisor")
 @SQLITE_ONLY
 def test_evaluation_of_sorting_tells_row_by_row_and_refuses_a_policy_that_picks(
-    store: Store,
+    store: Store, tmp_path: Path
 ) -> None:
-    ids = []
+    ended = []
     for policy in (untrained(), pretrained.load("pick")):
         checkpoints.put_checkpoint(store, to_store(policy))
         body = {"kind": "evaluate", "protocol": "sorting-tests", "episodes": 2}
         spec = parse_spec({**body, "checkpoint": policy.sha256}).new_job()
-        ids.append(jobs.create_job(store, spec).id)
-    sorts, picks = (wait_until_final(store, one) for one in ids)
+        jobs.create_job(store, spec)
+        ended.append(run_here(store, tmp_path))
+    sorts, picks = ended
     assert (sorts.state, sorts.error, sorts.step) == ("succeeded", None, 12)
     assert sorts.result is not None
     assert len(metrics.list_metrics(store, sorts.id)) == len(sorts.result["results"]) == 12

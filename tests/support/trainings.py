@@ -10,8 +10,13 @@ from app.policies.configs.presets import nested
 from app.store import checkpoints, jobs
 from app.store.engine import Store
 from app.store.records import JobRecord
+from jobs.access import StoreAccess
+from jobs.inputs import StoreInputs
+from jobs.run import runners
 from jobs.spec import parse_spec
-from tests.jobs.machinery import supervised, wait_for, wait_until_final, worker_pids
+from jobs.worker import JobWorker
+from tests.jobs.machinery import wait_for, wait_until_final, worker_pids
+from tests.support.databases import claimed
 
 TINY = {
     "learning.total_steps": 2048,
@@ -43,6 +48,14 @@ def train(store: Store, step_budget: int | None = None, **overrides: float | str
     return jobs.create_job(store, parse_spec(body).new_job()).id
 
 
+def run_here(store: Store, folder: Path) -> JobRecord:
+    """Run the next job in this process, as ``jobs.run`` does in one of its own."""
+    claim, job = claimed(store)
+    run = runners(StoreInputs(store, folder, job.id))[job.kind]
+    assert JobWorker(StoreAccess(store, folder, claim)).execute(run) == 0
+    return jobs.get_job(store, job.id)
+
+
 def killed_midway(store: Store, folder: Path) -> JobRecord:
     """Post a training, kill its process when it has states; return the job at its end."""
     job_id = train(store)
@@ -60,9 +73,9 @@ def made_by(store: Store, job_id: str) -> Made:
 
 
 def made_undisturbed(store: Store, folder: Path) -> Made:
-    """Run the training in a process of this machine to its end."""
-    with supervised(store, folder):
-        job = wait_until_final(store, train(store))
+    """Run the training in this process to its end."""
+    train(store)
+    job = run_here(store, folder)
     made = made_by(store, job.id)
     assert job.state == "succeeded" and len(made.checkpoints) == 4
     return made

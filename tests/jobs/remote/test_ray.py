@@ -22,7 +22,7 @@ from jobs.supervisor import Supervisor
 from tests.jobs.machinery import PATIENCE, supervised, wait_for, wait_until, wait_until_final
 from tests.jobs.remote.serving import TOKEN
 from tests.support.databases import SQLITE_ONLY
-from tests.support.trainings import made_by, train
+from tests.support.trainings import made_by, run_here, train
 
 pytestmark = [pytest.mark.ray, SQLITE_ONLY]
 FIELDS: dict[str, float | str] = {
@@ -123,8 +123,8 @@ def test_job_whose_cluster_does_not_answer_waits_and_counts_no_crash(
 def test_training_whose_worker_and_node_fail_ends_with_the_checkpoints_of_a_local_one(
     store: Store, tmp_path: Path, address: str, cluster: RayCluster
 ) -> None:
-    with supervised(store, tmp_path):
-        local = wait_until_final(store, train(store, **FIELDS))
+    train(store, **FIELDS)
+    local = run_here(store, tmp_path)
     with running_on(cluster.address, store, tmp_path, address):
         job_id = train(store, **FIELDS)
         wait_for(store, job_id, lambda job: job.step >= 384)

@@ -1,21 +1,22 @@
-"""A worker that has neither the database nor the data folder, in a real process."""
+"""A worker that has neither the database nor the data folder."""
 
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 
 from app.store import attempts, jobs, metrics
 from app.store.engine import Store
 from jobs.executor import LocalProcess
+from jobs.remote.access import ServiceAccess
+from jobs.remote.connection import ServiceConnection
+from jobs.remote.inputs import ServiceInputs
+from jobs.run import runners
 from jobs.spec import parse_spec
 from jobs.supervisor import Supervisor
-from tests.jobs.machinery import (
-    PATIENCE,
-    supervised,
-    wait_for,
-    wait_until_final,
-)
+from jobs.worker import JobWorker
+from tests.jobs.machinery import PATIENCE, supervised, wait_for
 from tests.jobs.remote.serving import TOKEN, serving
-from tests.support.databases import SQLITE_ONLY
+from tests.support.databases import SQLITE_ONLY, claimed
 from tests.support.trainings import Made, killed_midway, made_by, train
 
 pytestmark = SQLITE_ONLY
@@ -53,10 +54,13 @@ def test_stopping_server_takes_the_last_state_over_http(store: Store, tmp_path: 
 
 
 def test_evaluation_of_an_unknown_checkpoint_fails_over_http_as_locally(
-    store: Store, tmp_path: Path, address: str
+    store: Store, address: str
 ) -> None:
     body = {"kind": "evaluate", "protocol": "pick-single", "checkpoint": "nobody"}
-    job_id = jobs.create_job(store, parse_spec(body).new_job()).id
-    with supervised(store, tmp_path, executor=elsewhere(tmp_path, address)):
-        job = wait_until_final(store, job_id)
+    jobs.create_job(store, parse_spec(body).new_job())
+    claim, _ = claimed(store)
+    with closing(ServiceConnection(address, TOKEN, claim)) as service:
+        run = runners(ServiceInputs(service))["evaluate"]
+        assert JobWorker(ServiceAccess(service)).execute(run) == 0
+    job = jobs.get_job(store, claim.job_id)
     assert (job.state, job.error) == ("failed", "no checkpoint 'nobody'")
