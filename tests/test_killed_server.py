@@ -24,7 +24,7 @@ TRAINING = {
     "seed": 5,
     "overrides": {
         "learning": {
-            "total_steps": 6144,
+            "total_steps": 4096,
             "n_envs": 16,
             "buffer_size": 2000,
             "batch_size": 64,
@@ -86,8 +86,8 @@ def test_training_finishes_without_gap_after_the_server_was_killed(tmp_path: Pat
         assert (job["state"], job["attempt"]) == ("succeeded", 2), job
         curve = patient_http.get(f"{address}{path}/metrics", params={"limit": 1000}).json()
         steps = [point["step"] for point in curve["items"]]
-        assert steps == list(range(256, 6144 + 1, 256))
+        assert steps == list(range(256, 4096 + 1, 256))
         kept = patient_http.get(f"{address}/v1/checkpoints", params={"limit": 100})
         stored = kept.json()["items"]
         mine = [row["step"] for row in stored if row.get("job_id") == job["id"]]
-        assert sorted(mine) == list(range(512, 6144 + 1, 512))
+        assert sorted(mine) == list(range(512, 4096 + 1, 512))

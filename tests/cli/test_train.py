@@ -15,7 +15,7 @@ from app.cli.train import INTERRUPTED, cut_curve, in_use
 from tests.cli.test_commands import ROOT, environment
 
 FIELDS = {
-    "learning.total_steps": 4096,
+    "learning.total_steps": 2048,
     "learning.n_envs": 8,
     "learning.buffer_size": 2000,
     "learning.batch_size": 16,
@@ -24,7 +24,7 @@ FIELDS = {
     "learning.checkpoint_steps": 512,
     "networks.width": 16,
 }
-STEPS = list(range(64, 4097, 64))
+STEPS = list(range(64, 2049, 64))
 
 
 def call(output: Path, *more: str) -> list[str]:
@@ -42,7 +42,7 @@ def interrupted(output: Path, data: Path, step: int) -> tuple[int, str]:
         assert process.stderr is not None
         for line in process.stderr:
             lines.append(line)
-            if f"{step} of 4096 steps" in line:
+            if f"{step} of 2048 steps" in line:
                 process.send_signal(signal.SIGINT)
     return process.returncode, "".join(lines)
 
