@@ -60,6 +60,7 @@ class PostgresqlServer:
         self._folder, self._disk_bytes = folder, disk_bytes
         self._number = 0
         self._spare: str | None = None
+        self._session: sa.Connection | None = None
         self._template: tuple[str, int] | None = None
         _run(
             "initdb",
@@ -111,6 +112,7 @@ class PostgresqlServer:
         Args:
             how: SIGINT for a fast shutdown, SIGQUIT for a crash with recovery at the start.
         """
+        self._close_session()
         self._process.send_signal(how)
         self._process.wait(WAIT_S)
 
@@ -151,6 +153,7 @@ class PostgresqlServer:
         size or open sessions differ from those of a copy. A copy takes ten times as long.
         """
         if self._spare is None or not self._empty(self._spare):
+            self._close_session()
             if self._spare is not None:
                 self.execute(f"DROP DATABASE {self._spare} WITH (FORCE)")
             self._number += 1
@@ -165,17 +168,25 @@ class PostgresqlServer:
         """Delete the rows of a database; returns whether it is like a copy then."""
         assert self._template is not None
         try:
-            with self._connection(name) as used:
-                schema, size = _schema_and_size(used)
-                grown = size - self._template[1] > MOST_GROWTH
-                if schema != self._template[0] or grown or used.scalar(sa.text(_OTHERS)):
-                    return False
-                deleted = [f"DELETE FROM {one}" for one in used.scalars(sa.text(_TABLES))]
-                used.exec_driver_sql("SET session_replication_role = replica")
-                used.exec_driver_sql("; ".join([*deleted, _RESTART]))
+            if self._session is None:
+                self._session = self._connection(name)
+                self._session.exec_driver_sql("SET session_replication_role = replica")
+            schema, size = _schema_and_size(self._session)
+            grown = size - self._template[1] > MOST_GROWTH
+            if schema != self._template[0] or grown or self._session.scalar(sa.text(_OTHERS)):
+                return False
+            tables = self._session.scalars(sa.text(_TABLES))
+            deleted = [f"DELETE FROM {one}" for one in tables]
+            self._session.exec_driver_sql("; ".join([*deleted, _RESTART]))
         except sa.exc.DBAPIError:
             return False
         return True
+
+    def _close_session(self) -> None:
+        """Close the session that empties a database, if there is one."""
+        if self._session is not None:
+            self._session.close()
+            self._session = None
 
     def _connection(self, database: str) -> sa.Connection:
         """Return a connection without transactions; the caller closes it."""
