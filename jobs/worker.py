@@ -49,7 +49,7 @@ class JobWorker:
         self.access = access
         self._cancelled = threading.Event()
         self._interrupted = threading.Event()
-        self._lost = threading.Event()
+        self._over = threading.Event()
         self._stop_seen = False
         self._waiting: str | None = None
         self._early_end: SpentBudget | None = None
@@ -110,7 +110,7 @@ class JobWorker:
         return self._interrupted_now() or self._early_end is not None
 
     def _interrupted_now(self) -> bool:
-        stop = self._cancelled.is_set() or self._interrupted.is_set() or self._lost.is_set()
+        stop = self._cancelled.is_set() or self._interrupted.is_set() or self._over.is_set()
         self._stop_seen = self._stop_seen or stop
         return stop
 
@@ -142,6 +142,8 @@ class JobWorker:
         except ServiceError as error:
             logger.error("the job fails: %s", error.message)
             return self._fail(error.message)
+        finally:
+            self._over.set()
         return 0
 
     def _settle(self, result: Mapping[str, Any] | None) -> None:
@@ -200,13 +202,13 @@ class JobWorker:
         next_heartbeat = time.monotonic() + HEARTBEAT_S
         recorded: str | None = None
         silent = False
-        while not self._lost.wait(CANCEL_CHECK_S):
+        while not self._over.wait(CANCEL_CHECK_S):
             waiting = self._waiting
             due = time.monotonic() >= next_heartbeat or waiting != recorded
             try:
                 job = self.access.heartbeat(waiting, self.run_s) if due else self.access.job()
             except StaleAttempt:
-                self._lost.set()
+                self._over.set()
                 return
             except (StorageUnavailable, StorageFull) as error:
                 if not silent:

@@ -2,6 +2,7 @@
 
 import os
 import signal
+import threading
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -53,6 +54,8 @@ def run_here(store: Store, folder: Path) -> JobRecord:
     claim, job = claimed(store)
     run = runners(StoreInputs(store, folder, job.id))[job.kind]
     assert JobWorker(StoreAccess(store, folder, claim)).execute(run) == 0
+    for beat in (one for one in threading.enumerate() if one.name == "beat"):
+        beat.join()  # a process would end it
     return jobs.get_job(store, job.id)
 
 
