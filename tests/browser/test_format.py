@@ -123,6 +123,10 @@ def test_message_of_the_service_is_shown_as_a_sentence(
             "Person 1: speed of pelvis yaw 155°/s, training range 0°/s to 57°/s",
         ),
         ("time_left_s", 2.7, "time left 2.7 s, training range 0 s to 1 s"),
+        ("goal.z", 2.7, "goal z 2.7 m, training range 0 m to 1 m"),
+        ("people[1].x", 2.7, "Person 4: position x 2.7 m, training range 0 m to 1 m"),
+        ("people[0].vy", 2.7, "Person 1: speed along y 2.7 m/s, training range 0 m/s to 1 m/s"),
+        ("people", 2.7, "number of people 2.7, training range 0 to 1"),
     ],
 )
 def test_input_outside_the_training_range_has_the_name_of_its_person_and_its_unit(

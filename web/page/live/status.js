@@ -75,7 +75,6 @@ function Clearance({ metres, people, safety }) {
 /** Counters, training range and provenance. */
 export function SmallPrint({ world }) {
   const counters = world.counters ?? {};
-  const outside = world.outside ?? [];
   return html`<section class="card small-print" aria-label="Counters and provenance">
     <dl class="tiles">
       ${[["reached", "Picked"], ["broken_off", "Broken off"], ["contacts", "Contacts"],
@@ -83,16 +82,22 @@ export function SmallPrint({ world }) {
         ["switches", "Target switches"]].map(([key, label]) => html`<div key=${key}>
           <dt>${label}</dt><dd data-counter=${key}>${counters[key] ?? 0}</dd></div>`)}
     </dl>
-    ${Number.isFinite(world.elapsed_ms) && outside.length === 0 && html`<p class="range good"><${Icon} name="check" />
-          In distribution: all inputs within the training range.</p>`}
-    ${outside.length > 0 && html`<div class="range warn"><${Icon} name="alert" /><div>
-          Out of distribution: inputs outside the training range
-          <ul>${outside.slice(0, 4).map((one) => outsideText(one, world.people)).map(([name, text]) => html`<li key=${name}>
-            <b>${name}</b> ${text}</li>`)}
-            ${outside.length > 4 && html`<li>and ${outside.length - 4} more</li>`}
-          </ul></div></div>`}
+    <${TrainingRange} world=${world} />
     <${Provenance} world=${world} />
   </section>`;
+}
+
+/** Whether the inputs of the last decision lie within the training range, and those that do not. */
+export function TrainingRange({ world: { elapsed_ms: ms, outside: listed, people } }) {
+  const outside = listed ?? [];
+  return html`${Number.isFinite(ms) && outside.length === 0 && html`<p class="range good"><${Icon} name="check" />
+        In distribution: all inputs within the training range.</p>`}
+  ${outside.length > 0 && html`<div class="range warn"><${Icon} name="alert" /><div>
+        Out of distribution: inputs outside the training range
+        <ul>${outside.slice(0, 4).map((one) => outsideText(one, people)).map(([name, text]) => html`<li key=${name}>
+          <b>${name}</b> ${text}</li>`)}
+          ${outside.length > 4 && html`<li>and ${outside.length - 4} more</li>`}
+        </ul></div></div>`}`;
 }
 
 /** Checkpoint of the policy, and how long its decision took where there is one. */
@@ -113,20 +118,32 @@ export function outsideText({ field, value, low, high }, people = []) {
   return [name, `${show(value)}, training range ${show(low)} to ${show(high)}`];
 }
 
+/** Names of the observed variables of a walker. */
+const WALKER = { x: "position x", y: "position y", vx: "speed along x", vy: "speed along y", r: "radius",
+  growth: "growth of the radius" };
+
+function walkerVariable(field) {
+  return /^people\[\d+\]\.(\w+)$/.exec(field)?.[1];
+}
+
 function inUnits(field) {
   const speed = /\bqd\b/.test(field) ? "/s" : "";
+  const variable = walkerVariable(field);
+  if (field === "people") return (v) => format.number(v);
+  if (variable in WALKER) return (v) => format.quantity(v, /^(v.|growth)$/.test(variable) ? "m/s" : "m");
   if (/time_left/.test(field)) return (v) => format.quantity(v, "s");
-  if (/pelvis_[xy]\b|position|tcp/.test(field)) return (v) => format.quantity(v, `m${speed}`);
+  if (/pelvis_[xy]\b|position|tcp|^goal\b/.test(field)) return (v) => format.quantity(v, `m${speed}`);
   return (v) => `${format.number(Math.round((v * 180) / Math.PI))}°${speed}`;
 }
 
 function fieldName(field) {
-  return String(field)
+  if (field === "people") return "number of people";
+  return WALKER[walkerVariable(field)] ?? String(field)
     .replace(/^people\[\d+\]\.q(d?)[.[]?/, (_, d) => (d ? "speed of " : ""))
     .replace(/^robot\.q(d?)[.[]?/, (_, d) => (d ? "robot speed of joint " : "robot joint "))
     .replace(/([a-z]+)_([rl])(?:_([a-z]+))?\]?$/, (_, joint, side, direction) =>
       `${side === "r" ? "right" : "left"} ${joint} ${NOUNS[direction] ?? direction ?? ""}`.trim())
     .replace(/[\]]/g, "")
     .replace(/_s$/, "")
-    .replaceAll("_", " ");
+    .replaceAll(/[_.]/g, " ");
 }

@@ -3,7 +3,7 @@ import { html } from "../vendor/htm-preact-standalone.module.js";
 import * as format from "../format.js";
 import { Icon } from "../icons.js";
 import { Safety } from "../live/safety.js";
-import { Provenance, StatusPanel } from "../live/status.js";
+import { Provenance, StatusPanel, TrainingRange } from "../live/status.js";
 
 export function ReachDecision({ world }) {
   return html`<${StatusPanel} world=${world} />
@@ -15,7 +15,7 @@ export function ReachDecision({ world }) {
     <${Outcomes} world=${world} />`;
 }
 
-/** Outcome counters and provenance. */
+/** Outcome counters, training range and provenance. */
 function Outcomes({ world }) {
   const { counters, reach } = world;
   const tiles = [
@@ -36,6 +36,7 @@ function Outcomes({ world }) {
     ${counters.contacts_at_rest > 0 && html`<p class="range"><${Icon} name="alert" /><span>Contact at
       standstill: a person touched the robot while it stood still. People in this cell do not avoid
       the robot.</span></p>`}
+    <${TrainingRange} world=${world} />
     <${Provenance} world=${world} />
   </section>`;
 }
