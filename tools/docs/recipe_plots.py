@@ -31,6 +31,8 @@ AXES = (
 )
 PYTORCH = "PyTorch's initial weights"
 """Variant of the recipe of sorting."""
+FOUR = "four attempts per update"
+"""Another one."""
 POOLED = 200
 """Least number of episodes behind a drawn point."""
 Json = dict[str, Any]
@@ -53,8 +55,9 @@ ROWS = (
         "sorting, e0",
         (
             ("thesis-sorting", f"sorting-e0-thesis, {PYTORCH}", ORANGE),
-            ("thesis-sorting", "sorting-e0-thesis, four attempts per update", GREEN),
-            ("thesis-sorting", f"sorting-e0-thesis, four attempts per update, {PYTORCH}", RED),
+            ("thesis-sorting", f"sorting-e0-thesis, {FOUR}", GREEN),
+            ("thesis-sorting", f"sorting-e0-thesis, {FOUR}, continued", GREEN),
+            ("thesis-sorting", f"sorting-e0-thesis, {FOUR}, {PYTORCH}", RED),
             ("sorting-curves", "sorting-e0-dqn", BLUE),
         ),
         (),
@@ -62,7 +65,7 @@ ROWS = (
     Row(
         "sorting, e1",
         (
-            ("thesis-sorting", "sorting-e1-thesis", ORANGE),
+            ("thesis-sorting", f"sorting-e1-thesis, {FOUR}", GREEN),
             ("sorting-curves", "sorting-e1-dqn", BLUE),
         ),
         (),
