@@ -61,8 +61,16 @@ def _remove_unneeded(store: Store, folder: Path) -> None:
 
 
 def _remove_unknown(folder: Path) -> None:
-    mark = folder / _MARK
+    if is_long_unknown(folder / _MARK):
+        remove(folder)
+
+
+def is_long_unknown(mark: Path) -> bool:
+    """Whether ``KEEP_UNKNOWN_S`` has passed since the first look at files of an unknown job.
+
+    Args:
+        mark: A file whose time is that of this look, which makes it.
+    """
     if not mark.exists():
         mark.touch()
-    elif time.time() - mark.stat().st_mtime > KEEP_UNKNOWN_S:
-        remove(folder)
+    return time.time() - mark.stat().st_mtime > KEEP_UNKNOWN_S

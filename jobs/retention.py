@@ -2,7 +2,6 @@
 
 import logging
 import threading
-import time
 from collections.abc import Callable, Collection, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -16,7 +15,7 @@ from app.store.checkpoints import get_checkpoint
 from app.store.engine import Store
 from app.store.jobs import job_ids
 from jobs import resume_files
-from jobs.resume_files import KEEP_UNKNOWN_S
+from jobs.resume_files import is_long_unknown
 
 logger = logging.getLogger(__name__)
 
@@ -151,8 +150,7 @@ def remove_unknown_logs(store: Store, folder: Path) -> None:
     """Delete logs of jobs that the database does not know.
 
     A server that was killed while it deleted a job has left them. They may belong to another
-    database: they are deleted ``KEEP_UNKNOWN_S`` after the first look at them, as files to
-    resume from are.
+    database: they are deleted as long after the first look at them as files to resume from.
     """
     logs = {log.stem: log for log in folder.glob("*.log")}
     marks = {mark.stem: mark for mark in folder.glob(f"*{UNKNOWN}")}
@@ -166,8 +164,6 @@ def remove_unknown_logs(store: Store, folder: Path) -> None:
 
 
 def _remove_unknown_log(log: Path, mark: Path) -> None:
-    if not mark.exists():
-        mark.touch()
-    elif time.time() - mark.stat().st_mtime > KEEP_UNKNOWN_S:
+    if is_long_unknown(mark):
         log.unlink()
         mark.unlink()
