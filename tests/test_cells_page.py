@@ -9,7 +9,7 @@ import pytest
 
 from app.cli.entry import main
 from app.sim.cell_validation.reader import read_cell
-from app.sim.cells.cell import Cell, cell_names, lacks_for_pick
+from app.sim.cells.cell import Cell, cell_names, lacks_for_pick, load_cell
 
 TEXT = (Path(__file__).resolve().parent.parent / "docs" / "cells.md").read_text("utf-8")
 
@@ -55,6 +55,29 @@ def test_faults_are_listed_as_shown(
     Path("my-cell.json").write_text(json.dumps(cell), encoding="utf-8")
     assert main(["cells", "check", "my-cell.json"]) == 2
     assert sorted(capsys.readouterr().err.splitlines()) == sorted(block("text").splitlines())
+
+
+def test_check_states_for_what_a_cell_qualifies(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    sorting = load_cell("sorting-e0").definition()
+    for station in sorting["stations"]:
+        if station["kind"] == "cluster":
+            station["levels"] = 3
+    file = tmp_path / "low.json"
+    file.write_text(json.dumps({**sorting, "name": "low"}), "utf-8")
+    assert main(["cells", "check", str(file)]) == 0
+    _, pick, reach, own, live = capsys.readouterr().out.splitlines()
+    assert (
+        pick.startswith("pick: no, it needs") and reach == "reach: no, it needs a goal_region"
+    )
+    assert own.startswith("sorting: no, it needs at least 10 levels for each cluster")
+    assert live.removeprefix("live") == own.removeprefix("sorting")
+    file.write_text(block("json"), "utf-8")
+    assert main(["cells", "check", str(file), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["lacks_for_pick"] is None and found["lacks_for_live"] is None
+    assert "clutter" in found["lacks_for_sorting"] and "region" in found["lacks_for_reach"]
 
 
 def test_every_field_and_every_shipped_cell_is_on_the_page() -> None:

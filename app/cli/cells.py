@@ -123,7 +123,9 @@ def _read(path: Path, as_json: bool) -> "Cell":
 
 
 def _print_description(cell: "Cell", verdict: str, as_json: bool) -> None:
-    from app.sim.cells.cell import lacks_for_pick
+    from app.live.factory import lacks_for_live
+    from app.sim.cells.cell import lacks_for_pick, lacks_for_reach
+    from app.sim.sorting.layout import lacks_for_tasks
 
     n_targets = 0 if cell.goal_region is None else len(cell.goal_region.targets())
     counted = (
@@ -133,15 +135,20 @@ def _print_description(cell: "Cell", verdict: str, as_json: bool) -> None:
         (len(cell.people), "person", "people"),
     )
     parts = [f"{n} {one if n == 1 else more}" for n, one, more in counted if n]
-    lack = lacks_for_pick(cell)
+    lacks = {
+        "pick": lacks_for_pick(cell),
+        "reach": lacks_for_reach(cell),
+        "sorting": lacks_for_tasks(cell),
+        "live": lacks_for_live(cell),
+    }
     lines = [f"{cell.name} {verdict}: {', '.join(parts)}"]
-    if lack is not None:
-        lines.append(f"not for picking: it {lack}")
+    for use, lack in lacks.items():
+        lines.append(f"{use}: " + ("yes" if lack is None else f"no, it {lack}"))
     data: dict[str, Any] = {
         "name": cell.name,
         "ok": True,
         "stations": list(cell.station_ids),
         "sha256": cell.sha256,
-        "lacks_for_pick": lack,
+        **{f"lacks_for_{use}": lack for use, lack in lacks.items()},
     }
     print_result("\n".join(lines), data, as_json=as_json)
