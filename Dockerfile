@@ -1,8 +1,9 @@
 # The service as an image: same lock as a checkout, CPU build of torch, kernels compiled.
 #
 #   docker build -t tandem .
-#   docker run --read-only --tmpfs /tmp --stop-timeout 45 -p 8000:8000 \
-#       -e TANDEM_TOKEN="$(openssl rand -hex 16)" -v tandem:/data tandem
+#   export TANDEM_TOKEN="$(openssl rand -hex 16)"; echo "$TANDEM_TOKEN"  # the page asks for it
+#   docker run --read-only --tmpfs /tmp --stop-timeout 45 -p 127.0.0.1:8000:8000 \
+#       -e TANDEM_TOKEN -v tandem:/data tandem
 #
 # Inside a container the server must listen on all addresses to be reached, and there it
 # refuses to start without TANDEM_TOKEN. Database, checkpoints and compiled kernels live in

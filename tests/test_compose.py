@@ -53,6 +53,15 @@ def test_its_variables_are_settings_that_protect_the_service(
     assert services["tandem"]["volumes"] == [f"data:{settings.data}"]
 
 
+@pytest.mark.parametrize("name", ["Dockerfile", "docs/setup.md"])
+def test_shown_command_keeps_the_token_and_publishes_on_loopback(name: str) -> None:
+    """A token that is generated within `docker run` is known to nobody."""
+    before, _, run = (ROOT / name).read_text("utf-8").partition("docker run")
+    run = run.partition(":/data tandem")[0]
+    assert "-e TANDEM_TOKEN " in run and "-p 127.0.0.1:8000:8000" in run
+    assert 'export TANDEM_TOKEN="$(' in before
+
+
 def test_image_that_compiles_its_kernels_is_healthy() -> None:
     check = (ROOT / "Dockerfile").read_text().partition("HEALTHCHECK")[2]
     assert f"{HEALTH}'" in check and READY not in check

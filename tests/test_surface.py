@@ -113,7 +113,7 @@ def test_readme_commands_are_ones_that_exist() -> None:
         elif words[:3] == ["python", "-m", "app"]:
             check_call(words[3:])
         else:
-            assert words[0] in ("git", "curl", "docker")
+            assert words[0] in ("git", "curl", "docker", "export")
 
 
 def test_readme_requests_are_ones_the_service_takes() -> None:
