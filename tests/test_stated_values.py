@@ -1,5 +1,6 @@
 """Pages state the constants and fields that the code has."""
 
+import json
 import re
 from pathlib import Path
 
@@ -13,6 +14,7 @@ from app.policies.inference.task_selection import HYSTERESIS
 from app.policies.networks.outcome import MEMBERS, N_OUT, combine
 from app.sim.sorting.kernels.reward import distance_cost
 from app.sim.sorting.near_optimal_moves import MARGIN
+from app.store.cells import MAX_CELLS
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"
 PAGES = [page for page in sorted(DOCS.glob("**/*.md")) if "notebook" not in page.parts]
@@ -60,6 +62,26 @@ def test_the_sorting_page_states_the_cost_of_a_level() -> None:
     goal[0, 0] = 1
     weights = SORTING_PRESETS[0].reward.weights
     assert distance_cost(towers, goal, 3, weights) == pytest.approx(float(cost) / 10)
+
+
+def test_the_sorting_results_state_the_throughput_that_they_list() -> None:
+    stored = json.loads((DOCS / "results/sorting-cycle-time.json").read_text("utf-8"))
+    parts = {row["name"]: row["parts_per_hour"]["mean"] for row in stored["results"]}
+    lost = {name: 1.0 - parts[name] / parts["alone"] for name in parts}
+    page = " ".join((DOCS / "results/sorting.md").read_text("utf-8").split())
+    policy, nearest, straight = re.findall(
+        r"costs the policy (\d+) % of .* \((\d+) % with the nearest object first\) "
+        r"and straight moves (\d+) %",
+        page,
+    )[0]
+    assert int(policy) == round(100 * lost["policy"])
+    assert int(nearest) == round(100 * lost["policy-nearest"])
+    assert int(straight) == round(100 * lost["planner"])
+
+
+def test_the_http_page_states_how_many_cells_are_stored() -> None:
+    (most,) = re.findall(r"or (\d+) cells are stored", (DOCS / "http.md").read_text("utf-8"))
+    assert int(most) == MAX_CELLS
 
 
 def test_the_method_states_the_reward_of_picks() -> None:
