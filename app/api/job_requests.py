@@ -18,7 +18,7 @@ from app.policies.evaluation.registry import (
 )
 from app.sim.cells.cell import Cell, cell_names
 from app.store import job_actions, jobs, metrics
-from app.store.records import JobRecord, JobState, MetricRow, NewJob, References
+from app.store.records import JobKind, JobRecord, JobState, MetricRow, NewJob, References
 from app.store.references import references_of
 from jobs.spec import AnySpec, EvaluateSpec, SweepSpec
 
@@ -30,6 +30,8 @@ class PageQuery(NamedTuple):
     limit: int
     state: JobState | None
     part_of: str | None
+    kind: JobKind | None
+    preset: str | None
 
 
 def page_of_jobs(services: Services, query: PageQuery, waiting: str | None) -> bytes:

@@ -115,6 +115,8 @@ def list_jobs(
     limit: int = 50,
     state: JobState | None = None,
     part_of: str | None = None,
+    kind: str | None = None,
+    preset: str | None = None,
 ) -> Page[JobRecord]:
     """Return one page of the jobs, newest first.
 
@@ -123,6 +125,8 @@ def list_jobs(
         limit: Length of the page, 1 to 200.
         state: Only jobs in this state.
         part_of: Only parts of the job with this id; ``NO_PARTS``: no parts of other jobs.
+        kind: Only jobs of this kind.
+        preset: Only trainings and sweeps of this preset.
 
     Raises:
         InvalidInput: The cursor or limit is invalid.
@@ -130,6 +134,9 @@ def list_jobs(
     where = [] if state is None else [_in_state(state)]
     if part_of is not None:
         where.append(jobs.c.part_of == (None if part_of == NO_PARTS else part_of))
+    for column, value in ((jobs.c.kind, kind), (jobs.c.preset, preset)):
+        if value is not None:
+            where.append(column == value)
     return _page(store, cursor, limit, where)
 
 

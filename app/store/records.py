@@ -13,6 +13,8 @@ Item = TypeVar("Item")
 JobState = Literal["queued", "running", "cancelling", "succeeded", "failed", "cancelled"]
 """``cancelling`` is a running job whose cancel was requested."""
 
+JobKind = Literal["train", "evaluate", "sweep", "report"]
+
 FINAL_STATES: tuple[JobState, ...] = ("succeeded", "failed", "cancelled")
 """Final states."""
 

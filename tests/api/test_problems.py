@@ -24,7 +24,7 @@ from app.errors import (
 from app.storage_errors import StorageFull
 from tests.api.answers import problem_of
 
-JOB_PARAMETERS = ["cursor", "limit", "state", "part_of"]
+JOB_PARAMETERS = ["cursor", "limit", "state", "part_of", "kind", "preset"]
 PLAIN_DIGITS = "must be a whole number in plain digits"
 
 ERRORS: list[tuple[ServiceError, int]] = [

@@ -123,6 +123,16 @@ def test_pages_of_parts_and_without_them_are_read_by_an_index(
 
 
 @SQLITE_ONLY
+@pytest.mark.parametrize("column", ["kind", "preset"])
+def test_pages_of_a_kind_or_preset_are_read_by_an_index(store: Store, column: str) -> None:
+    add(store, 0, 300)
+    filters: dict[str, Any] = {column: "other"}
+    ((query, parameters),) = asked(store, lambda: jobs.list_jobs(store, **filters))
+    expected = f"SEARCH jobs USING INDEX ix_jobs_{column}_number ({column}=?)"
+    assert plan(store, query, parameters) == expected
+
+
+@SQLITE_ONLY
 @pytest.mark.parametrize("state", [None, *STATES])
 def test_a_page_costs_the_same_among_ten_times_as_many_jobs(
     store: Store, state: JobState | None

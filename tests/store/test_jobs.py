@@ -102,6 +102,20 @@ def test_list_shows_the_parts_of_a_job_or_leaves_parts_out(store: Store) -> None
     assert jobs.list_jobs(store, part_of=other).items == ()
 
 
+def test_list_filters_by_kind_and_preset_on_every_page(store: Store) -> None:
+    kinds = [("train", "a"), ("sweep", "a"), ("train", "b"), ("train", "a"), ("report", None)]
+    ids = [
+        jobs.create_job(store, NewJob(kind=kind, preset=preset, spec={})).id
+        for kind, preset in kinds
+    ]
+    reports = jobs.list_jobs(store, kind="report").items
+    assert [one.id for one in reports] == ids[4:]
+    of_preset = jobs.list_jobs(store, preset="a", limit=1)
+    assert [one.id for one in of_preset.items] == [ids[3]]
+    older = jobs.list_jobs(store, preset="a", kind="train", cursor=of_preset.next_cursor)
+    assert ([one.id for one in older.items], older.next_cursor) == ([ids[0]], None)
+
+
 def test_queued_job_is_cancelled_at_once(store: Store) -> None:
     (job_id,) = queue(store)
     job = jobs.request_cancel(store, job_id)

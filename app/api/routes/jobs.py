@@ -22,9 +22,11 @@ from app.api.job_requests import (
 from app.api.schemas.examples import JOBS, named
 from app.api.schemas.jobs import JobList, JobPublic, MetricsPublic
 from app.api.services import ServicesDep
+from app.errors import InvalidInput
+from app.policies.configs import presets
 from app.store import events, jobs, metrics
 from app.store.cursors import MAX_INTEGER
-from app.store.records import JobEvent, JobState
+from app.store.records import JobEvent, JobKind, JobState
 from jobs.executor import end_of_log
 from jobs.spec import JobSpec
 
@@ -70,9 +72,16 @@ async def list_jobs(
             "that are part of no other",
         ),
     ] = None,
+    kind: Annotated[JobKind | None, Query(description="only jobs of this kind")] = None,
+    preset: Annotated[
+        str | None, Query(description="only trainings and sweeps of this preset")
+    ] = None,
 ) -> Response:
     """Return one page, newest first."""
-    asked = PageQuery(cursor, limit, state, part_of), services.supervisor.waiting
+    if preset is not None and preset not in presets.PRESETS:
+        raise InvalidInput("preset", preset, "is no preset", tuple(presets.PRESETS))
+    query = PageQuery(cursor, limit, state, part_of, kind, preset)
+    asked = query, services.supervisor.waiting
     content = await services.response_cache.find(asked, lambda: page_of_jobs(services, *asked))
     return Response(content, media_type="application/json")
 

@@ -17,7 +17,9 @@ class JobPublic(Answer):
     id: str = Field(description="name in addresses")
     number: int = Field(description="running number")
     kind: str = Field(description="train, evaluate, sweep or report")
-    preset: str | None = Field(description="preset of a training; null for other kinds")
+    preset: str | None = Field(
+        description="preset of a training or sweep; null for other kinds"
+    )
     seed: int = Field(description="seed of training, episodes or ranges")
     overrides: dict[str, Any] = Field(
         description="fields that differ from the preset, by group"

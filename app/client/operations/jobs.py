@@ -37,13 +37,22 @@ class JobsOperations(Transport):
         state: Literal["queued", "running", "cancelling", "succeeded", "failed", "cancelled"]
         | None = None,
         part_of: str | None = None,
+        kind: Literal["train", "evaluate", "sweep", "report"] | None = None,
+        preset: str | None = None,
     ) -> JobList:
         """List the jobs."""
         return self._parsed(
             JobList,
             "GET",
             "/v1/jobs",
-            query={"cursor": cursor, "limit": limit, "state": state, "part_of": part_of},
+            query={
+                "cursor": cursor,
+                "limit": limit,
+                "state": state,
+                "part_of": part_of,
+                "kind": kind,
+                "preset": preset,
+            },
         )
 
     def get_job(self, job_id: str) -> JobPublic:

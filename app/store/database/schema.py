@@ -5,7 +5,7 @@ import sqlalchemy as sa
 from app.errors import Conflict
 from app.store.engine import Store
 
-REVISION = "0015"
+REVISION = "0016"
 """The newest migration."""
 
 

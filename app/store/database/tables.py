@@ -114,6 +114,8 @@ jobs = Table(
     Column("submission_digest", String(64)),
     Index("ix_jobs_state_number", "state", "number"),  # pages of jobs in a state
     Index("ix_jobs_part_of_number", "part_of", "number"),  # pages without parts, or of them
+    Index("ix_jobs_kind_number", "kind", "number"),  # pages of jobs of a kind
+    Index("ix_jobs_preset_number", "preset", "number"),  # pages of jobs of a preset
     Index("ix_jobs_end_number", "end_number"),  # the last one, and the ended jobs in order
     sqlite_autoincrement=True,
 )

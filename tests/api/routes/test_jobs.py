@@ -196,8 +196,25 @@ def test_list_shows_the_parts_of_one_job_only(client: TestClient) -> None:
     assert items[0]["id"] == whole
 
 
+def test_list_shows_the_jobs_of_a_kind_and_preset(
+    client: TestClient, queued: dict[str, Any]
+) -> None:
+    other = client.post("/v1/jobs", json={**TRAIN, "preset": "reach-td3"}).json()
+    client.post(f"/v1/jobs/{other['id']}/cancel")
+    filters = {"kind": "train", "preset": "pick-td3", "limit": 1}
+    page = client.get("/v1/jobs", params=filters).json()
+    assert [one["id"] for one in page["items"]] == [queued["id"]]
+
+
 @pytest.mark.parametrize(
-    ("query", "field"), [("limit=0", "limit"), ("cursor=x", "cursor"), ("state=odd", "state")]
+    ("query", "field"),
+    [
+        ("limit=0", "limit"),
+        ("cursor=x", "cursor"),
+        ("state=odd", "state"),
+        ("kind=odd", "kind"),
+        ("preset=odd", "preset"),
+    ],
 )
 def test_bad_query_is_refused_by_field(client: TestClient, query: str, field: str) -> None:
     assert problem_of(client.get(f"/v1/jobs?{query}"))["field"] == field
