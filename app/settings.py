@@ -48,6 +48,9 @@ class Settings(BaseSettings):
     token: SecretStr | None = Field(
         None, description="Bearer token; required for any address but loopback."
     )
+    token_file: Path | None = Field(
+        None, description="File with the token, in place of `token`, such as of a secret."
+    )
     log: Literal["text", "json"] = Field("text", description="Form of the log's lines.")
     keep_jobs: int = Field(
         1000, ge=1, description="Ended jobs to keep; older ones are deleted with their files."
@@ -116,7 +119,8 @@ def load_settings(**overrides: object) -> Settings:
         if name.startswith(PREFIX) and name not in known:
             raise InvalidInput(name, "***", "is not a setting", known)  # a misspelt secret
     try:
-        return Settings(**{k: v for k, v in overrides.items() if v is not None})  # type: ignore[arg-type]
+        given = {k: v for k, v in overrides.items() if v is not None}
+        return _with_token(Settings(**given))  # type: ignore[arg-type]
     except ValidationError as error:
         first = error.errors()[0]
         field = "_".join(str(part) for part in first["loc"])
@@ -129,6 +133,25 @@ def load_settings(**overrides: object) -> Settings:
         raise InvalidInput(PREFIX + field.upper(), shown, rule) from None
 
 
+def _with_token(settings: Settings) -> Settings:
+    """Return the settings with the token of its file, without the end of its line.
+
+    Raises:
+        InvalidInput: The file cannot be read, or a token is given, too.
+    """
+    file = settings.token_file
+    if file is None:
+        return settings
+    name = f"{PREFIX}TOKEN_FILE"
+    if settings.token is not None:
+        raise InvalidInput(name, str(file), f"must not be set beside {PREFIX}TOKEN")
+    try:
+        token = file.read_bytes().decode(errors="replace").rstrip("\r\n")
+    except OSError as error:
+        raise InvalidInput(name, str(file), f"cannot be read: {error.strerror}") from None
+    return settings.model_copy(update={"token": SecretStr(token)})
+
+
 def check_access(settings: Settings) -> None:
     """Check that the settings protect the service.
 
@@ -136,16 +159,15 @@ def check_access(settings: Settings) -> None:
         InvalidInput: A token is missing, too short, or cannot be sent in a header.
     """
     token = settings.secret
+    name = PREFIX + ("TOKEN" if settings.token_file is None else "TOKEN_FILE")
     if token is None and not settings.is_loopback:
         raise InvalidInput(
             "TANDEM_HOST",
             settings.host,
-            "is not a loopback address and needs TANDEM_TOKEN to be set",
+            "is not a loopback address and needs TANDEM_TOKEN or TANDEM_TOKEN_FILE to be set",
         )
     if token is not None and len(token) < MIN_TOKEN_LENGTH:
-        raise InvalidInput(
-            "TANDEM_TOKEN", "***", f"must have at least {MIN_TOKEN_LENGTH} characters"
-        )
+        raise InvalidInput(name, "***", f"must have at least {MIN_TOKEN_LENGTH} characters")
     if token is not None and not _TOKEN.fullmatch(token):
         rule = "must consist of printable ASCII characters and not begin or end with a space"
-        raise InvalidInput("TANDEM_TOKEN", "***", rule)
+        raise InvalidInput(name, "***", rule)

@@ -86,6 +86,7 @@ class LocalProcess:
             **(settings or {}),
         }
         self._environment.pop("TANDEM_DATABASE_URL", None)
+        self._environment.pop("TANDEM_TOKEN_FILE", None)  # a worker over HTTP has the token
         if database_url is not None:
             self._environment["TANDEM_DATABASE_URL"] = database_url
 

@@ -16,6 +16,7 @@ def no_settings(monkeypatch: pytest.MonkeyPatch) -> None:
         "DATA",
         "DATABASE_URL",
         "TOKEN",
+        "TOKEN_FILE",
         "ROOT_PATH",
         "RAY",
         "WORKER_URL",
@@ -125,6 +126,44 @@ def test_token_that_no_header_carries_is_refused(token: str) -> None:
     with pytest.raises(InvalidInput, match="printable ASCII") as refused:
         check_access(Settings(token=token))
     assert token not in str(refused.value)
+
+
+@pytest.mark.parametrize("end", ["", "\n", "\r\n"])
+def test_token_is_read_from_a_file(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, end: str
+) -> None:
+    file = tmp_path / "token"
+    file.write_bytes(f"a-token-of-this-server{end}".encode())
+    monkeypatch.setenv("TANDEM_TOKEN_FILE", str(file))
+    settings = load_settings(host="0.0.0.0")
+    check_access(settings)
+    assert settings.secret == "a-token-of-this-server"
+    assert "a-token" not in repr(settings)
+
+
+@pytest.mark.parametrize(
+    ("content", "rule"),
+    [(None, "cannot be read"), (b"", "at least 16"), (b"\xff" * 20, "printable ASCII")],
+)
+def test_file_without_a_token_is_refused_by_name(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, content: bytes | None, rule: str
+) -> None:
+    file = tmp_path / "token"
+    if content is not None:
+        file.write_bytes(content)
+    monkeypatch.setenv("TANDEM_TOKEN_FILE", str(file))
+    with pytest.raises(InvalidInput, match=f"TANDEM_TOKEN_FILE = .*{rule}"):
+        check_access(load_settings())
+
+
+def test_token_beside_its_file_is_refused(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    (tmp_path / "token").write_text("a-token-of-this-server")
+    monkeypatch.setenv("TANDEM_TOKEN_FILE", str(tmp_path / "token"))
+    monkeypatch.setenv("TANDEM_TOKEN", "another-token-of-it")
+    with pytest.raises(InvalidInput, match="must not be set beside TANDEM_TOKEN"):
+        load_settings()
 
 
 @pytest.mark.parametrize("path", ["", "/tandem", "/robots/cell-1"])

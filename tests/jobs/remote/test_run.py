@@ -4,6 +4,8 @@ from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 
+import pytest
+
 from app.store import attempts, jobs, metrics
 from app.store.engine import Store
 from jobs.executor import LocalProcess
@@ -40,7 +42,10 @@ def test_training_over_http_killed_once_ends_with_the_checkpoints_of_a_local_one
     assert not (tmp_path / "elsewhere" / "resume").exists()
 
 
-def test_stopping_server_takes_the_last_state_over_http(store: Store, tmp_path: Path) -> None:
+def test_stopping_server_takes_the_last_state_over_http(
+    store: Store, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("TANDEM_TOKEN_FILE", "/run/secrets/token")  # the server's; not read
     timeouts = replace(PATIENCE, shutdown_s=120.0)
     with serving(store, tmp_path) as (address, parts):
         executor = elsewhere(tmp_path, address)
