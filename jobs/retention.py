@@ -12,6 +12,7 @@ from app.errors import Conflict
 from app.policies.checkpoints import pretrained
 from app.store import retention
 from app.store.checkpoints import get_checkpoint
+from app.store.database.size import shrink
 from app.store.engine import Store
 from app.store.jobs import job_ids
 from jobs import resume_files
@@ -101,6 +102,8 @@ class Retention:
     def apply(self, store: Store) -> bool:
         """Remove what is beyond the numbers to keep, of at most ``MAX_JOBS_AT_ONCE`` jobs.
 
+        Then some of the free space of a SQLite file is given back to the disk.
+
         Args:
             store: The database, on the condition of the supervisor: that it holds the lease.
 
@@ -127,7 +130,7 @@ class Retention:
                 if n_jobs == MAX_JOBS_AT_ONCE:
                     return True
         remove_unknown_logs(store, self.logs)
-        return False
+        return shrink(store)
 
     def log_of(self, job_id: str) -> Path:
         """Return the file with the output of a job."""

@@ -329,6 +329,8 @@ def _prepare_connection(connection: DBAPIConnection, _entry: ConnectionPoolEntry
     # One damaged character must not keep a whole list from being read.
     connection.text_factory = partial(str, encoding="utf-8", errors="replace")
     cursor = connection.cursor()
+    if cursor.execute("PRAGMA page_count").fetchone() == (0,):  # it holds from the first page
+        cursor.execute("PRAGMA auto_vacuum = INCREMENTAL")
     for pragma in _PRAGMAS:
         cursor.execute(pragma)
     cursor.close()

@@ -1,3 +1,5 @@
+import sqlite3
+from contextlib import closing
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
@@ -17,11 +19,13 @@ from app.store import (
     retention,
 )
 from app.store.database import tables
+from app.store.database.backup import restore_backup, write_backup
+from app.store.database.size import MIN_FREE_BYTES
 from app.store.engine import Store
 from app.store.records import Claim, NewJob, ResumeState
 from jobs.retention import Retention
 from tests.store.test_checkpoints import policy, second_job
-from tests.support.databases import claimed
+from tests.support.databases import SQLITE_ONLY, claimed
 
 
 def save(store: Store, claim: Claim, step: int, content: bytes) -> str:
@@ -226,3 +230,42 @@ def test_what_was_deleted_before_the_disk_is_full_is_deleted_completely(
     kept = {job.id for job in jobs.list_jobs(store).items}
     assert {one.stem for one in tmp_path.glob("*.log")} == kept
     assert removed == [sha256 for job_id, sha256 in made.items() if job_id not in kept] != []
+
+
+@SQLITE_ONLY
+def test_space_of_deleted_rows_is_given_back_to_the_disk(
+    store: Store, claim: Claim, tmp_path: Path
+) -> None:
+    state = ResumeState(step=1, manifest={}, tensors=bytes(2 * MIN_FREE_BYTES))
+    attempts.record_checkpoint(store, claim, 1, policy(b"1"), state)
+    completion.finish(store, claim, state="cancelled")
+    keep = Retention(store=store, logs=tmp_path, keep_jobs=1, keep_states=0, acting=dict)
+    turns = [keep.apply(store) for _ in range(3)]
+    assert turns == [True, True, False]  # each is short: other writers wait
+    store.close()  # the log is now in the file
+    assert store.sqlite_path is not None
+    assert store.sqlite_path.stat().st_size < 1.2 * MIN_FREE_BYTES
+    assert jobs.get_job(store, claim.job_id).state == "cancelled"
+
+
+@SQLITE_ONLY
+def test_file_of_an_earlier_version_shrinks_once_its_backup_is_restored(
+    store: Store, claim: Claim, tmp_path: Path
+) -> None:
+    save(store, claim, 1, bytes(100_000))
+    store.close()
+    path = store.sqlite_path
+    assert path is not None
+    with closing(sqlite3.connect(path)) as database:
+        for statement in ("journal_mode = DELETE", "auto_vacuum = NONE"):
+            database.execute(f"PRAGMA {statement}")
+        database.execute("VACUUM")
+    completion.finish(store, claim, state="cancelled")
+    retention.delete_job(store, claim.job_id, {})
+    write_backup(store, tmp_path, tmp_path / "b.tar")
+    store.close()
+    restore_backup(store, tmp_path, tmp_path / "b.tar")
+    with closing(sqlite3.connect(path)) as database:
+        (mode,) = database.execute("PRAGMA auto_vacuum").fetchone()
+        (free,) = database.execute("PRAGMA freelist_count").fetchone()
+    assert (mode, free) == (2, 0)

@@ -291,7 +291,9 @@ def _is_of_database(file: Path, database: Path) -> bool:
 def _copy_database(source: Path, copy: Path, shown: str) -> None:
     if not source.exists():
         raise InvalidInput("TANDEM_DATA", str(source.parent), "has no database")
-    copy.unlink(missing_ok=True)
+    compact = copy.with_name(f"{copy.name}.compact")
+    for left in (copy, compact):
+        left.unlink(missing_ok=True)
     try:
         with (
             closing(sqlite3.connect(source, timeout=BUSY_TIMEOUT_S)) as live,
@@ -299,7 +301,10 @@ def _copy_database(source: Path, copy: Path, shown: str) -> None:
         ):
             live.backup(database)
             database.execute("PRAGMA journal_mode = DELETE")  # one file
-        _check_database(copy, shown)
+            _check_database(copy, shown)
+            database.execute("PRAGMA auto_vacuum = INCREMENTAL")  # as of a new file
+            database.execute("VACUUM INTO ?", (str(compact),))
+        compact.replace(copy)
     except sqlite3.OperationalError:
         raise
     except sqlite3.DatabaseError as error:
