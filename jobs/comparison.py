@@ -8,10 +8,12 @@ import csv
 import io
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from pydantic import ValidationError
 
 from app.errors import InvalidInput
 from app.policies.configs import presets
@@ -19,6 +21,8 @@ from app.sim.core.arrays import Vec
 from app.store import jobs, metrics
 from app.store.engine import Store
 from app.store.records import JobRecord, MetricRow
+from jobs.job_changes import JobChanges
+from jobs.spec import SweepSpec, TrainSpec, parse_spec
 
 MAX_JOBS = 20
 """Most jobs of one comparison."""
@@ -140,11 +144,20 @@ def recorded(curves: Iterable[Sequence[MetricRow]]) -> tuple[str, ...]:
 
 
 def settings_of(job: JobRecord) -> dict[str, Any]:
-    """Return what a job computes from, by dotted name: preset with overrides, seed."""
-    spec: Mapping[str, Any] = job.spec
-    if job.preset in presets.PRESETS:
-        whole = presets.resolve(str(job.preset), job.overrides).model_dump(mode="json")
-        spec = {"kind": job.kind, "preset": whole.pop("name"), **whole, "seed": job.seed}
+    """Return what a job computes from, by dotted name: spec and preset with all defaults.
+
+    The checkpoint is the one that its alias named when the job was posted.
+    """
+    spec = dict(job.spec)
+    with suppress(ValidationError, InvalidInput):  # of an earlier version: as it was posted
+        given = parse_spec(job.spec)
+        spec = given.model_dump(mode="json", exclude=set(JobChanges.model_fields))
+        if isinstance(given, TrainSpec | SweepSpec):
+            whole = presets.resolve(given.preset, given.overrides).model_dump(mode="json")
+            head = {"kind": job.kind, "preset": whole.pop("name"), **whole}
+            spec = head | {name: spec[name] for name in spec if name != "overrides"}
+    if job.checkpoint is not None:
+        spec["checkpoint"] = job.checkpoint
     return _flat(spec)
 
 

@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 
 from app.errors import InvalidInput, NotFound
-from app.store import attempts, completion, jobs
+from app.store import attempts, checkpoints, completion, jobs
 from app.store.engine import Store
+from app.store.records import NewJob
 from jobs.comparison import band, compare, curves_as_csv
 from jobs.spec import TrainSpec, parse_spec
+from tests.store.test_attempts import policy
 from tests.support.databases import claimed
 
 
@@ -67,6 +69,59 @@ def test_groups_that_a_preset_alone_does_not_tell_apart_have_the_numbers_of_jobs
     third = trained(store, 1, [0.3], preset="sorting-e1-dqn")
     labels = [group.label for group in compare(store, [first, other, third]).groups]
     assert labels == ["pick-td3 (job 1)", "pick-td3 (job 2)", "sorting-e1-dqn"]
+
+
+SWEEP = {
+    "kind": "sweep",
+    "preset": "pick-td3",
+    "ranges": {"learning.gamma": {"low": 0.9, "high": 0.99}},
+    "trials": 4,
+    "objective": {"protocol": "pick-single", "quantity": "success"},
+}
+EVALUATE = {"kind": "evaluate", "protocol": "pick-single"}
+
+
+@pytest.mark.parametrize(
+    ("body", "change", "differing"),
+    [
+        (SWEEP, {"trials": 5}, {"trials"}),
+        (
+            SWEEP,
+            {"ranges": {"learning.gamma": {"low": 0.8, "high": 0.99}}},
+            {"ranges.learning.gamma.low"},
+        ),
+        (SWEEP, {"prune": True}, set()),
+        (EVALUATE, {"seed": 0}, set()),
+        (EVALUATE, {"seed": 1}, {"seed"}),
+    ],
+)
+def test_fields_that_differ_are_those_with_another_effect(
+    store: Store, body: dict[str, Any], change: dict[str, Any], differing: set[str]
+) -> None:
+    ids = [
+        jobs.create_job(store, parse_spec({**body, **one}).new_job()).id for one in ({}, change)
+    ]
+    assert compare(store, ids).differences.keys() == differing
+
+
+def test_evaluations_of_one_alias_differ_in_the_checkpoints_that_it_named(
+    store: Store,
+) -> None:
+    ids, named = [], []
+    for content in (b"1", b"2"):
+        named.append(checkpoints.put_checkpoint(store, policy(content)).sha256)
+        checkpoints.set_alias(store, "best", named[-1])
+        spec = parse_spec({**EVALUATE, "checkpoint": "best"})
+        ids.append(jobs.create_job(store, spec.new_job()).id)
+    assert compare(store, ids).differences == {"checkpoint": tuple(named)}
+
+
+def test_job_with_a_field_of_an_earlier_version_is_compared(store: Store) -> None:
+    overrides = {"learning": {"gone": 1}}
+    spec = {"kind": "train", "preset": "pick-td3", "overrides": overrides}
+    new = NewJob(kind="train", preset="pick-td3", spec=spec, overrides=overrides)
+    ids = [jobs.create_job(store, new).id, trained(store, 1, [])]
+    assert compare(store, ids).differences["overrides.learning.gone"] == (1, None)
 
 
 def test_override_that_equals_the_preset_is_no_difference(store: Store) -> None:
