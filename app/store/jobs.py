@@ -313,8 +313,11 @@ def _check_single(connection: sa.Connection, new: NewJob) -> None:
     """Refuse a second repetition of a job while an equal one waits or runs."""
     read_job(connection, str(new.parent))  # which may be deleted
     active = jobs.c.state.in_(("queued", "running"))
+    named = named_checkpoint(connection, new.spec.get("checkpoint"))
+    values = (dict(new.spec), named, new.step_budget, new.time_budget_s)
     for equal in select_jobs(connection, jobs.c.parent == new.parent, active):
-        if dict(equal.spec) == dict(new.spec):
+        budgets = (equal.step_budget, equal.time_budget_s)
+        if (dict(equal.spec), equal.checkpoint, *budgets) == values:
             rule = (
                 f"of job {equal.number}, which repeats the same job with the same values: wait "
                 "for it, or cancel it first"

@@ -4,7 +4,7 @@ import pytest
 
 from app.errors import InvalidInput, NotFound, WrongState
 from app.storage_errors import StaleAttempt
-from app.store import attempts, completion, composed_jobs, job_actions, jobs
+from app.store import attempts, checkpoints, completion, composed_jobs, job_actions, jobs
 from app.store.engine import Store
 from app.store.records import (
     Claim,
@@ -125,6 +125,21 @@ def test_equal_repetition_waits_for_the_first(store: Store, claim: Claim) -> Non
     jobs.create_job(store, replace(again, spec={"kind": "count", "seed": 2}))
     jobs.request_cancel(store, first.id)
     assert jobs.create_job(store, again).parent == claim.job_id
+
+
+def test_repetitions_with_other_budgets_or_checkpoints_wait_for_none(
+    store: Store, claim: Claim
+) -> None:
+    spec = {"kind": "evaluate", "checkpoint": "best"}
+    again = replace(COUNT, parent=claim.job_id, spec=spec)
+    for content in (b"1", b"2"):  # the alias is pointed to another checkpoint
+        made = checkpoints.put_checkpoint(store, policy(content))
+        checkpoints.set_alias(store, "best", made.sha256)
+        jobs.create_job(store, again)
+    for budget in ({"step_budget": 20}, {"step_budget": 40}, {"time_budget_s": 60.0}):
+        jobs.create_job(store, replace(again, **budget))
+    with pytest.raises(WrongState, match="which repeats"):
+        jobs.create_job(store, replace(again, step_budget=40))
 
 
 def test_repetition_of_an_unknown_job_is_refused(store: Store) -> None:
