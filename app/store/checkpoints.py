@@ -24,7 +24,7 @@ from app.store.cursors import (
 from app.store.database.tables import aliases, checkpoints, job_checkpoints
 from app.store.engine import Store
 from app.store.records import CheckpointRecord, NewCheckpoint, Page
-from app.store.references import unfinished
+from app.store.references import to_be_evaluated
 
 logger = logging.getLogger(__name__)
 
@@ -233,7 +233,7 @@ def drop_job_checkpoints(connection: sa.Connection, job_id: str, *, beyond: int)
     dropped = set(connection.execute(sa.select(job_checkpoints.c.sha256).where(mine)).scalars())
     connection.execute(sa.delete(job_checkpoints).where(mine))
     if dropped:
-        dropped -= {references.checkpoint for _, references in unfinished(connection)}
+        dropped -= {sha256 for sha256, _ in to_be_evaluated(connection, dropped)}
     unnamed = sa.and_(
         checkpoints.c.sha256.in_(dropped),
         sa.not_(checkpoints.c.imported),

@@ -4,8 +4,7 @@ Both are checked in the transaction that queues the job or deletes the object: o
 the later one is refused.
 """
 
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import replace
+from collections.abc import Callable, Collection, Iterator, Mapping
 from typing import Any
 
 import sqlalchemy as sa
@@ -41,16 +40,21 @@ def require_stored(connection: sa.Connection, references: References) -> None:
         _require(connection, field, name, recordings, recordings.c.name == name)
 
 
-def unfinished(connection: sa.Connection) -> Iterator[tuple[int, References]]:
-    """Yield number and references of each job that has not ended, oldest first.
+def to_be_evaluated(
+    connection: sa.Connection, among: Collection[str]
+) -> Iterator[tuple[str, int]]:
+    """Yield those of some checkpoints that jobs which have not ended evaluate, by number.
 
-    Its checkpoint is the one that its alias named at the submission.
+    The checkpoint is the one that the job's alias named at the submission.
     """
-    query = sa.select(jobs.c.number, jobs.c.spec, jobs.c.overrides, jobs.c.checkpoint)
-    query = query.where(jobs.c.state.not_in(FINAL_STATES)).order_by(jobs.c.number)
-    for row in connection.execute(query):
-        found = _references(row.spec, row.overrides)
-        yield row.number, replace(found, checkpoint=row.checkpoint or found.checkpoint)
+    named = jobs.c.checkpoint.in_(among)
+    earlier = sa.and_(jobs.c.checkpoint.is_(None), jobs.c.kind == "evaluate")
+    query = sa.select(jobs.c.number, jobs.c.checkpoint, jobs.c.spec)  # before migration 0013
+    query = query.where(jobs.c.state.not_in(FINAL_STATES), named | earlier)
+    for row in connection.execute(query.order_by(jobs.c.number)):
+        sha256 = row.checkpoint or row.spec.get("checkpoint")
+        if sha256 in among:
+            yield sha256, row.number
 
 
 def require_unused(
@@ -66,9 +70,11 @@ def require_unused(
     Raises:
         WrongState: A job does.
     """
-    for number, references in unfinished(connection):
-        if refers(references):
-            rule = f"is in use by job {number}, which has not ended: cancel the job first"
+    query = sa.select(jobs.c.number, jobs.c.spec, jobs.c.overrides)
+    query = query.where(jobs.c.state.not_in(FINAL_STATES)).order_by(jobs.c.number)
+    for row in connection.execute(query):
+        if refers(_references(row.spec, row.overrides)):
+            rule = f"is in use by job {row.number}, which has not ended: cancel the job first"
             raise WrongState(field, name, rule)
 
 

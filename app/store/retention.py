@@ -12,7 +12,7 @@ from app.store.database.tables import checkpoints, jobs, resume_states
 from app.store.engine import Store
 from app.store.jobs import read_job, select_jobs
 from app.store.records import COMPOSITE_KINDS, FINAL_STATES, JobRecord
-from app.store.references import unfinished
+from app.store.references import to_be_evaluated
 
 logger = logging.getLogger(__name__)
 
@@ -154,7 +154,6 @@ def _require_unused(
         if sha256 in acting:
             rule = f"{whose}acts in {acting[sha256]}: choose another policy there"
             raise WrongState("checkpoint", sha256, rule)
-    for number, references in unfinished(connection):
-        if references.checkpoint in removed:
-            rule = f"{whose}is evaluated by job {number}: wait for its end, or cancel it first"
-            raise WrongState("checkpoint", references.checkpoint, rule)
+    for sha256, number in to_be_evaluated(connection, removed):
+        rule = f"{whose}is evaluated by job {number}: wait for its end, or cancel it first"
+        raise WrongState("checkpoint", sha256, rule)

@@ -1,3 +1,4 @@
+import json
 import sqlite3
 from contextlib import closing
 from datetime import UTC, datetime, timedelta
@@ -82,6 +83,28 @@ def test_job_whose_checkpoint_is_to_be_evaluated_is_not_deleted(
         retention.delete_job(store, claim.job_id, {})
     jobs.request_cancel(store, user.id)
     assert len(retention.delete_job(store, claim.job_id, {})) == 1
+
+
+@SQLITE_ONLY
+def test_deletion_takes_no_longer_with_many_jobs_in_the_queue(
+    store: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    read: list[str] = []
+    ended = []
+    for content in (b"1", b"2"):
+        claim = second_job(store)
+        save(store, claim, 1, content)
+        completion.finish(store, claim, state="cancelled")
+        ended.append(claim.job_id)
+    loads = json.loads
+    monkeypatch.setattr(json, "loads", lambda text: read.append(text) or loads(text))
+    retention.delete_job(store, ended[0], {})
+    few = len(read)
+    for _ in range(30):
+        jobs.create_job(store, NewJob(kind="evaluate", spec={"checkpoint": "other"}))
+    read.clear()
+    retention.delete_job(store, ended[1], {})
+    assert len(read) == few  # columns of JSON: no spec of a queued job
 
 
 def test_uploaded_checkpoint_is_deleted_once_nothing_uses_it(store: Store) -> None:
