@@ -167,6 +167,18 @@ def test_errors_of_named_joints_are_at_their_place_in_the_request(
     assert problem["field"] == "robot.q[0]" and problem["rule"].endswith(": elbow_joint")
 
 
+def test_joints_outside_the_training_range_have_their_name_in_any_order(
+    client: TestClient, url: str
+) -> None:
+    q, names = [0.0, -2.5, -2.0, 3.0, 0.0, 0.0], sorted(ROS_NAMES)
+    named = robot(url, names=names, q=[q[ROS_NAMES.index(name)] for name in names])
+    for state in (robot(url, q=q), named):
+        answer = asked(client, url, robot=state)
+        found = {one["field"]: one["value"] for one in answer["state_outside"]}
+        found |= {one["field"]: one["value"] for one in answer.get("outside", [])}
+        assert found["robot.q.elbow"] == -2.0
+
+
 FAR_PEOPLE: list[dict[str, Any]] = [
     {**WALKER, "x": 6.0},
     {**WALKER, "x": -80.0, "y": 99.0},

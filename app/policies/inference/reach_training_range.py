@@ -13,12 +13,13 @@ from app.sim.core.arrays import Vec
 from app.sim.core.kernels.bounds import are_inside
 from app.sim.core.out_of_range import OutOfRangeValue
 from app.sim.human.person import Person
+from app.sim.robot.ur10 import JOINT_NAMES
 
 HUMAN = ("x", "y", "vx", "vy", "r", "growth")
 """Observed variables of a person."""
 ROBOT = (
-    *(f"robot.q[{j}]" for j in range(6)),
-    *(f"robot.qd[{j}]" for j in range(6)),
+    *(f"robot.q.{name}" for name in JOINT_NAMES),
+    *(f"robot.qd.{name}" for name in JOINT_NAMES),
     *("goal.x", "goal.y", "goal.z"),
 )
 """Names of ``q``, ``qd`` and ``goal`` of a ``trained_range`` in messages."""

@@ -178,9 +178,9 @@ def test_states_and_people_outside_training_are_flagged_by_name() -> None:
     people = (FAR_PERSON, person_from_cylinder(0.4, 1.2, 0.0, 1.8, 0.3))
     decision = decider(trained_range=trained).decide(query(people=people))
     assert decision.nearest_person == 1
-    assert [one.field for one in decision.outside] == ["robot.q[2]", "people[1].vy"]
+    assert [one.field for one in decision.outside] == ["robot.q.elbow", "people[1].vy"]
     alone = decider(trained_range=trained).decide(query(people=()))
-    assert [one.field for one in alone.outside] == ["robot.q[2]"]
+    assert [one.field for one in alone.outside] == ["robot.q.elbow"]
 
 
 def inside_robot() -> Person:
