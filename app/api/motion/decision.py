@@ -3,6 +3,9 @@
 Source: docs/method.md 2.
 """
 
+from collections.abc import Sequence
+from dataclasses import replace
+
 from starlette.concurrency import run_in_threadpool
 
 from app.api.known_people import (
@@ -12,7 +15,7 @@ from app.api.known_people import (
     renumbered,
     require_all_tracked,
 )
-from app.api.schemas.motion import MotionAnswer, MotionRequest
+from app.api.schemas.motion import LeftOut, MotionAnswer, MotionRequest
 from app.api.schemas.numbers import Data
 from app.api.services import Services
 from app.api.tracker_sessions import TrackerSessions
@@ -25,8 +28,13 @@ NO_WEIGHT = {"separation": None, "weight": 0.0}
 """Distance and weight of a person who is not used."""
 
 
-async def answer(request: MotionRequest, services: Services) -> Data:
+async def answer(
+    request: MotionRequest, services: Services, left_out: Sequence[LeftOut] = ()
+) -> Data:
     """Return the data of the answer to one request, a :class:`MotionAnswer`.
+
+    Args:
+        left_out: Parts that a late request is answered without.
 
     Raises:
         ServiceError: The request cannot be answered.
@@ -38,7 +46,7 @@ async def answer(request: MotionRequest, services: Services) -> Data:
 
     def decided() -> Data:
         with services.span("decision"):
-            return decide(request, cell, decider, services.trackers)
+            return decide(request, cell, decider, services.trackers, left_out)
 
     # A decision takes less time than a change of thread usually does, on the event loop.
     found = (
@@ -49,7 +57,11 @@ async def answer(request: MotionRequest, services: Services) -> Data:
 
 
 def decide(
-    request: MotionRequest, cell: Cell, decider: MotionDecider, trackers: TrackerSessions
+    request: MotionRequest,
+    cell: Cell,
+    decider: MotionDecider,
+    trackers: TrackerSessions,
+    left_out: Sequence[LeftOut] = (),
 ) -> Data:
     """Return the data of the answer to one request, a :class:`MotionAnswer`.
 
@@ -57,6 +69,7 @@ def decide(
         request: State, people and goal.
         decider: The policy, trained in that cell.
         trackers: The open trackers.
+        left_out: Parts that a late request is answered without.
 
     Raises:
         ServiceError: The request cannot be answered.
@@ -77,6 +90,10 @@ def decide(
         max((one.age_s for one in people), default=0.0),
         max((one.displaced_m for one in people), default=0.0),
     )
+    if "search" in left_out:
+        query = replace(query, search=False)
+    if "rollout" in left_out:
+        query = replace(query, rollout=False)
     with request.robot.faults_in_place():
         decision = decider.decide(query)
     if not seen == monitored == list(range(len(people))):

@@ -15,7 +15,7 @@ from collections import deque
 from collections.abc import Awaitable, Callable
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
 import anyio
 from pydantic import ValidationError
@@ -189,8 +189,10 @@ class MotionSocket:
         try:
             refused, body = _malformed(request.text, instance)
             if refused is None:
-                asked, left_out = _reduced(MotionRequest.model_validate(body), left_out)
-                found = await answer(asked, self._services)
+                asked = MotionRequest.model_validate(body)
+                if asked.rollout is not None:  # it has one, or has nothing to leave out
+                    left_out = []
+                found = await answer(asked, self._services, left_out)
                 found["stream"] = use(left_out, 200)
                 return str(to_json(found, inf_nan_mode="null"), "utf-8")
         except Exception as error:
@@ -199,21 +201,6 @@ class MotionSocket:
         return json.dumps(
             {**content, "stream": use([], refused.status_code).model_dump(), **_stamp_of(body)}
         )
-
-
-def _reduced(
-    request: MotionRequest, left_out: list[LeftOut]
-) -> tuple[MotionRequest, list[LeftOut]]:
-    """Return a request without what is left out of it, and the names of that.
-
-    A request that asks for a rollout has one; one without has nothing to leave out.
-    """
-    if request.rollout is not None or not left_out:
-        return request, []
-    changes: dict[str, Any] = {"elapsed_s": 0.0}
-    if "rollout" in left_out:
-        changes["rollout"] = False
-    return request.model_copy(update=changes), left_out
 
 
 def _malformed(text: str | None, instance: str) -> tuple[ProblemResponse | None, object]:

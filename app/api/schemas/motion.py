@@ -63,7 +63,8 @@ class MotionRequest(Body):
     )
     time_left_s: Annotated[float, Field(ge=-1e9, le=1e9)] = Field(
         5.0,
-        description="time left to reach the goal [s]; clamped to 0 to 5 for the policy",
+        description="time left to reach the goal [s]; clamped to 0 to 5 for the policy; up to "
+        "4, alternatives are simulated as with `elapsed_s` from 1 on",
     )
     elapsed_s: Annotated[float, Field(ge=0.0, le=1e9)] = Field(
         0.0,
@@ -208,7 +209,7 @@ class StreamUse(Answer):
     )
     left_out: list[LeftOut] = Field(
         description="parts left out because it had waited for long: the `search` for "
-        "alternatives where the policy waits, then the whole `rollout`"
+        "alternatives where the policy's motion collides with nobody, then the whole `rollout`"
     )
 
 

@@ -22,6 +22,7 @@ from app.policies.inference.reach_training_range import (
 )
 from app.policies.inference.rollout import (
     CANDIDATES,
+    NO_CONSTRAINT,
     POLICY,
     RolloutImprovement,
     can_roll_out,
@@ -230,9 +231,12 @@ class MotionDecider:
             self._improvements[query_state] = RolloutImprovement(self.actor)
         improvement = self._improvements[query_state]
         improvement.forget()
+        state, elapsed = query_state.state, query.elapsed_s
         improvement.constraint = ssm_constraint_of(query.safety, self.arm.dt, query.age_s)
-        state = query_state.state
-        state.goal[0], state.elapsed[0] = goal, query.elapsed_s
+        if not query.search:
+            improvement.constraint, elapsed = NO_CONSTRAINT, 0.0
+            state.time_left[0] = max(state.time_left.item(0), HORIZON_S)
+        state.goal[0], state.elapsed[0] = goal, elapsed
         improved = act[None].astype(np.float32)
         chosen = int(improvement.improve(query_state, improved)[0])
         if chosen == POLICY:

@@ -47,6 +47,9 @@ class MotionQuery:
     elapsed_s: float = 0.0
     """Time since the goal was set [s]; from 1 s on, candidates are also simulated where the
     policy's rollout neither succeeds nor collides."""
+    search: bool = True
+    """Whether they may be; False simulates candidates only where the policy's rollout collides,
+    whatever the times and the assumptions of the safety layer."""
     safety: SafetySettings | None = None
     """Assumptions of speed and separation monitoring; None for no monitoring."""
     age_s: float = 0.0

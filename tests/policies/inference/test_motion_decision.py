@@ -34,6 +34,7 @@ from app.sim.safety.layer import SafetySettings
 from tests.policies.reach_actor import RandomActor
 from tests.sim.driven_batches import drive
 
+MEASURED_VELOCITY = SafetySettings(use_measured_velocity=True)
 CELL = load_cell("shared-workspace")
 HOME = np.array(CELL.robot.home_q)
 GOAL = np.array([0.05, 0.75, 0.31])
@@ -322,15 +323,21 @@ def test_an_answer_does_not_hang_on_what_was_asked_before() -> None:
         assert np.array_equal(one.decide(late).act, first.act)
 
 
-def test_after_a_long_time_further_candidates_are_simulated() -> None:
-    rng = np.random.default_rng(6)
+@pytest.mark.parametrize(
+    "cause", [{"elapsed_s": 2.0}, {"time_left_s": 3.0}, {"safety": MEASURED_VELOCITY}]
+)
+def test_search_simulates_candidates_also_where_the_policy_does_not_collide(
+    cause: dict[str, Any],
+) -> None:
+    rng, counts = np.random.default_rng(6), np.zeros(3, dtype=int)
     one = MotionDecider(ReachPolicy(pretrained.load("reach")), CELL)
-    tried = 0
     for _ in range(60):
         asked = random_query(rng)
-        if one.decide(asked).candidate is None:
-            tried += one.decide(replace(asked, elapsed_s=2.0)).candidate is not None
-    assert tried > 0
+        hurried = replace(asked, **cause)
+        queries = asked, hurried, replace(hurried, search=False)
+        counts += [one.decide(each).candidate is not None for each in queries]
+    collides, searched, without = counts.tolist()
+    assert 0 < without == pytest.approx(collides, abs=1) and without + 1 < searched
 
 
 def test_the_observed_remaining_time_is_at_most_that_of_training() -> None:
