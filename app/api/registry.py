@@ -12,7 +12,7 @@ from typing import Any, Generic, Protocol, TypeVar
 
 from starlette.concurrency import run_in_threadpool
 
-from app.errors import Damaged, InvalidInput, NotFound
+from app.errors import CheckpointMismatch, Damaged, InvalidInput, NotFound
 from app.store.checkpoints import (
     list_aliases,
     put_checkpoint,
@@ -27,7 +27,7 @@ from jobs.checkpoints import read_sound
 logger = logging.getLogger(__name__)
 
 MAX_POLICIES = 32
-"""Largest number of policies in a registry."""
+"""Largest number of policies in a registry, and of checkpoints that it knows not to fit."""
 DEFAULT_ALIAS = "pick"
 """Default policy for task selection."""
 SORTING_ALIASES = ("sorting-e0", "sorting-e1")
@@ -45,6 +45,7 @@ class Loaded(Protocol):
 
 
 P = TypeVar("P", bound=Loaded)
+Q = TypeVar("Q")
 Build = Callable[[Mapping[str, Any], bytes], P]
 """Makes a policy from a manifest and safetensors bytes."""
 
@@ -182,22 +183,30 @@ class PolicyRegistry(Generic[P]):
         self._default = default
         self._lock = threading.Lock()
         self._policies: OrderedDict[str, P] = OrderedDict()
+        self._mismatches: OrderedDict[str, CheckpointMismatch] = OrderedDict()
         names.registries.append(self)
 
     @property
     def held(self) -> set[str]:
-        """SHA-256 of the policies in memory."""
+        """SHA-256 of the policies in memory, and of the checkpoints known not to fit."""
         with self._lock:
-            return set(self._policies)
+            return {*self._policies, *self._mismatches}
 
     def _loaded(self, reference: str | None) -> P | None:
-        """Return a policy by SHA-256 or alias if it is in memory, without disk access."""
+        """Return a policy by SHA-256 or alias if it is in memory, without disk access.
+
+        Raises:
+            CheckpointMismatch: It is known not to fit.
+        """
         sha256 = self._names.aliases.get(self._or_default(reference), reference)
         with self._lock:
             policy = self._policies.get(sha256 or "")
             if policy is not None:
                 self._policies.move_to_end(policy.checkpoint)
-            return policy
+            known = self._mismatches.get(sha256 or "")
+        if known is not None:
+            raise CheckpointMismatch(known.field, known.expected, known.actual)
+        return policy
 
     def _or_default(self, reference: str | None) -> str:
         return self._default if reference is None else reference
@@ -207,6 +216,7 @@ class PolicyRegistry(Generic[P]):
         with self._lock:
             for sha256 in removed:
                 self._policies.pop(sha256, None)
+                self._mismatches.pop(sha256, None)
 
     def check(self, manifest: Mapping[str, Any], tensors: bytes) -> None:
         """Check that a checkpoint can be loaded as a policy of this kind.
@@ -232,13 +242,22 @@ class PolicyRegistry(Generic[P]):
         if policy is not None:
             return policy
         record, tensors = self._names.read(self._or_default(reference))
-        policy = self._build(record.manifest, tensors)
-        with self._lock:
-            self._policies[record.sha256] = policy
-            while len(self._policies) > MAX_POLICIES:
-                self._policies.popitem(last=False)
-        self._names.forget_unstored()
+        try:
+            policy = self._build(record.manifest, tensors)
+        except CheckpointMismatch as error:
+            known = CheckpointMismatch(error.field, error.expected, error.actual)
+            self._keep(self._mismatches, record.sha256, known)
+            raise
+        self._keep(self._policies, record.sha256, policy)
         return policy
+
+    def _keep(self, kept: OrderedDict[str, Q], sha256: str, one: Q) -> None:
+        """Keep what became of a stored checkpoint, in place of the oldest one."""
+        with self._lock:
+            kept[sha256] = one
+            while len(kept) > MAX_POLICIES:
+                kept.popitem(last=False)
+        self._names.forget_unstored()
 
     async def get(self, reference: str | None) -> P:
         """Return a policy as :meth:`load` does; one that is not in memory is read on a thread.

@@ -6,7 +6,7 @@ import sqlalchemy as sa
 from fastapi.testclient import TestClient
 
 from app.api.registry import CheckpointNames, PolicyRegistry
-from app.errors import Damaged, InvalidInput
+from app.errors import CheckpointMismatch, Damaged, InvalidInput
 from app.policies.checkpoints.upload import join
 from app.store import attempts, checkpoints, completion, jobs, retention
 from app.store.database import tables
@@ -39,6 +39,28 @@ def test_checkpoint_deleted_while_it_is_loaded_answers_no_later_request(store: S
     names = CheckpointNames(store)
     registry = PolicyRegistry(names, build, "pick")
     assert registry.load(new.sha256).checkpoint == new.sha256
+    with pytest.raises(InvalidInput, match="is no stored checkpoint"):
+        registry.load(new.sha256)
+
+
+def test_checkpoint_that_does_not_fit_is_read_once_until_it_is_deleted(store: Store) -> None:
+    new, built = policy(b"1"), list[object]()
+    checkpoints.put_checkpoint(store, new)
+
+    def build(*content: object) -> OnlyName:
+        built.append(content)
+        raise CheckpointMismatch("purpose", "reaching goals", "choosing tasks")
+
+    names = CheckpointNames(store)
+    registry = PolicyRegistry(names, build, "pick")
+    for _ in range(3):
+        with pytest.raises(
+            CheckpointMismatch, match="'choosing tasks', expected 'reaching goals'"
+        ):
+            registry.load(new.sha256)
+    assert len(built) == 1
+    retention.delete_checkpoint(store, new.sha256, {})
+    names.forget_unstored()
     with pytest.raises(InvalidInput, match="is no stored checkpoint"):
         registry.load(new.sha256)
 
