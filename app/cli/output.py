@@ -13,6 +13,14 @@ import typer
 from app.durable_files import write_durably
 from app.errors import BadCell, BadRecording, InvalidInput
 
+UNITS = ("_s", "_m", "_rad")
+"""Ends of the names of means of quantities with a unit."""
+COUNTS = frozenset(
+    {"attempts_over_expected", "moves_over_minimum", "parts_per_hour"}
+    | {"contacts_at_rest", "grasps", "late_motions", "moving_contacts"}
+)
+"""Names of means of counts, and of ratios that are not shares; all other means are rates."""
+
 
 def print_result(text: str, data: Mapping[str, Any], *, as_json: bool) -> None:
     """Print a result for people or as JSON."""
@@ -64,7 +72,7 @@ def table(result: Mapping[str, Any]) -> str:
     columns = list(
         dict.fromkeys(key for row in rows for key in row if not isinstance(row[key], list))
     )
-    lines = [columns, *([_cell(row.get(key)) for key in columns] for row in rows)]
+    lines = [columns, *([_cell(key, row.get(key)) for key in columns] for row in rows)]
     widths = [max(len(line[k]) for line in lines) for k in range(len(columns))]
     texts = [
         "  ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=True)).rstrip()
@@ -75,16 +83,22 @@ def table(result: Mapping[str, Any]) -> str:
     return "\n".join([head, *tested, "", *texts])
 
 
-def _cell(value: Any) -> str:
-    """Return a value as text: a rate in percent with its interval, a number, or the text."""
+def _cell(name: str, value: Any) -> str:
+    """Return a value as text: a mean with its interval, a number, or the text.
+
+    Args:
+        name: Key of the value; the mean is a rate, in percent, unless it names a quantity.
+    """
     if isinstance(value, Mapping) and {"mean", "low", "high"} <= value.keys():
-        mean, low, high = (100.0 * value[key] for key in ("mean", "low", "high"))
-        return f"{mean:.1f} % [{low:.1f}, {high:.1f}]"
+        ends = (value[key] for key in ("mean", "low", "high"))
+        if name in COUNTS or name.endswith(UNITS):
+            return "{:.3g} [{:.3g}, {:.3g}]".format(*ends)
+        return "{:.1f} % [{:.1f}, {:.1f}]".format(*(100.0 * one for one in ends))
     if isinstance(value, Mapping):
-        known = ((name, one) for name, one in value.items() if one is not None)
-        return ", ".join(f"{name} {_cell(one)}" for name, one in known)
+        known = ((key, one) for key, one in value.items() if one is not None)
+        return ", ".join(f"{key} {_cell(key, one)}" for key, one in known)
     if isinstance(value, list):
-        return " to ".join("any" if one is None else _cell(one) for one in value)
+        return " to ".join("any" if one is None else _cell(name, one) for one in value)
     if isinstance(value, float):
         return f"{value:.3g}"
     return "" if value is None else str(value)
