@@ -30,7 +30,11 @@ from app.sim.pick.kernels.grasp import GraspRules
 from app.sim.robot.kernels.arm import CONTROLLED
 
 SPARE_STATE_BYTES = 1 << 24
-"""Bound of what a state has beside networks and perturbed actors: environments, generators."""
+"""Bound of what a state has beside networks, perturbed actors, environments and priorities."""
+ENV_BYTES = 1 << 15
+"""Bound of what a state has of an environment, with four people."""
+PRIORITY_BYTES = 32
+"""Bound of what a state has of a transition in a replay memory with priorities."""
 
 
 class PickLearning(TD3Learning):
@@ -279,14 +283,16 @@ class PickPreset(TrainingConfig):
         # Weights, biases and the gains and shifts of the normalisation.
         per_unit = (networks.layers - 1) * networks.width + 3 * networks.layers
         per_unit += N_PLAIN + CONTROLLED
-        size = 4 * learning.n_envs * (networks.width * per_unit + CONTROLLED)
-        # Networks and their targets, and two moments of each weight, are in a state, too.
-        most = MAX_STATE_BYTES - SPARE_STATE_BYTES - 4 * networks.n_bytes
+        copy = 4 * (networks.width * per_unit + CONTROLLED)
+        size = learning.n_envs * (copy + ENV_BYTES)
+        # Networks, targets, averages, and two moments of each weight are in a state, too.
+        most = MAX_STATE_BYTES - SPARE_STATE_BYTES - 5 * networks.n_bytes
+        most -= PRIORITY_BYTES * learning.buffer_size if learning.alpha > 0.0 else 0
         if size > most:
             rule = (
-                f"makes perturbed actors of {size / 2**20:.0f} MB with networks.width = "
-                f"{networks.width} and layers = {networks.layers}; must stay below "
-                f"{most // 2**20} MB"
+                f"makes environments and perturbed actors of {size / 2**20:.0f} MB with "
+                f"networks.width = {networks.width} and layers = {networks.layers}; must stay "
+                f"below {most // 2**20} MB"
             )
             raise InvalidInput("learning.n_envs", learning.n_envs, rule)
 

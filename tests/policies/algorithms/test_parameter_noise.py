@@ -8,8 +8,11 @@ import torch
 from torch import nn
 
 from app.policies.algorithms.parameter_noise import FACTOR, ParameterNoise, distance, forward
+from app.policies.configs import presets
+from app.policies.configs.pick import ENV_BYTES, PickPreset
 from app.policies.networks.forward import Layer, layers_of
 from app.policies.networks.pick import NormedActor
+from app.policies.training.pick import batch_of
 from app.sim.cells.cell import load_cell
 from app.sim.pick.batch import PickBatch, PickSettings
 
@@ -120,3 +123,12 @@ def test_without_noise_the_copies_act_as_the_actor(batch, actor) -> None:
     expected = actor(torch.as_tensor(batch.obs)).detach().numpy()
     taken = noise.apply(expected)
     np.testing.assert_allclose(taken, expected, atol=1e-6)
+
+
+def test_the_state_of_an_environment_is_within_the_bound_of_the_configuration() -> None:
+    people, episode = {"n_people": 4}, {"safety": "ssm", "curriculum_steps": 0}
+    preset = presets.resolve("pick-td3-thesis", {"people": people, "episode": episode})
+    assert isinstance(preset, PickPreset)
+    state = batch_of(preset, load_cell(preset.cell), 64, 1).state_dict()
+    size = sum(one.nbytes for one in state.values() if isinstance(one, np.ndarray))
+    assert 0.5 * ENV_BYTES < size / 64 < ENV_BYTES

@@ -118,6 +118,22 @@ def test_a_bad_override_is_refused_by_name(overrides, field):
             {"learning": {"n_envs": 125}, "networks": {"width": 1024}},
             "overrides.learning.n_envs",
         ),
+        (
+            "pick-td3-thesis",
+            {"learning": {"n_envs": 2500}, "networks": {"width": 128}},
+            "overrides.learning.n_envs",
+        ),
+        (
+            "pick-td3-thesis",
+            {
+                "learning": {
+                    **{"n_envs": 1900, "total_steps": 3_800_000, "progress_steps": 38_000},
+                    **{"checkpoint_steps": 38_000, "alpha": 0.6, "buffer_size": 2_000_000},
+                },
+                "networks": {"width": 128},
+            },
+            "overrides.learning.n_envs",
+        ),
     ],
 )
 def test_what_would_fail_late_or_have_no_effect_is_refused(preset, overrides, field):
