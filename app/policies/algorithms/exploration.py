@@ -68,6 +68,7 @@ class PerEnvAR1Noise(Stateful):
         n_envs = shape[0]
         self.n_greedy = config.n_greedy(n_envs)
         scales = np.geomspace(0.1, 1.0, n_envs - self.n_greedy) * config.sigma_max
+        scales[-1:] = config.sigma_max  # also where only one environment has noise
         self._sigma = np.concatenate([np.zeros(self.n_greedy), scales])[:, None]
         self._memory = math.exp(-dt / config.noise_time_s)
         self._noise, self._rng = np.zeros(shape), rng

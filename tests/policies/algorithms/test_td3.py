@@ -75,6 +75,13 @@ def test_greedy_rows_explore_nothing_and_noise_grows_with_the_row(model):
     assert spread[-1] > 2.0 * spread[exploration.n_greedy + 1] > 0.0
 
 
+@pytest.mark.parametrize("n_envs", [2, 3, 9])
+def test_noise_of_the_last_row_has_the_largest_scale(n_envs):
+    config = NoiseExploration(sigma_max=0.4)
+    noise = PerEnvAR1Noise((n_envs, 5), 0.05, config, np.random.default_rng(1))
+    assert noise._sigma[noise.n_greedy - 1 :: n_envs - 1].tolist() == [[0.0], [0.4]]
+
+
 def test_critics_learn_the_value_of_an_episode_that_ends_at_once(model):
     """With done = 1 everywhere the value is the reward, whatever the networks say."""
     obs = np.random.default_rng(0).normal(size=(16, N_PICK)).astype(np.float32)
