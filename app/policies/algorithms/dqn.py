@@ -185,7 +185,7 @@ class SortingDQN(DQN, Stateful):
         error = functional.smooth_l1_loss(taken, target, reduction="none")
         loss = (drawn.weights * error).mean()
         if self._expert is not None:
-            n = round(self.preset.expert.share * batch_size)
+            n = max(1, round(self.preset.expert.share * batch_size))
             best = self._expert(drawn.observations[:n].numpy())
             short = large_margin_loss(
                 values[:n], torch.as_tensor(best), self.preset.expert.margin

@@ -67,7 +67,7 @@ class Reporter(BaseCallback, Stateful, ABC):
     def report(self) -> bool:
         """Report after a step and its updates; return whether the training continues."""
         step, intervals = self._run.step, self._run.preset.learning
-        if step % intervals.progress_steps == 0:
+        if step % intervals.progress_steps == 0 or step >= intervals.total_steps:
             self._callbacks.on_progress(self._point(step))
             self._begin_window()
             if step % intervals.checkpoint_steps == 0:

@@ -63,6 +63,20 @@ def test_the_double_target_takes_the_online_networks_move():
     assert (target.argmax(dim=1) != moves).any() or not torch.equal(online, target)
 
 
+def test_a_small_share_labels_a_state_of_each_minibatch():
+    model = model_of(share=0.001)
+    expert, labelled = model._expert, []
+
+    def counting(obs):
+        labelled.append(len(obs))
+        return expert(obs)
+
+    model._expert = counting
+    model.learn(64 + 16 * 3)
+    assert len(labelled) == model._n_updates > 0
+    assert set(labelled) == {1}
+
+
 def test_the_target_network_is_copied_every_so_many_updates():
     model = model_of(target_update_interval=7)
     model.learn(64 + 16 * 6)

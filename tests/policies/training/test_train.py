@@ -25,6 +25,13 @@ def test_the_curve_lies_on_the_grid_and_counts_updates(tiny_run):
     assert tiny_run.progress[-1].time_left_s == 0.0
 
 
+def test_the_curve_ends_with_the_training():
+    recorder = Recorder()
+    recorder.run(preset_of("pick-td3", TINY, {"learning.total_steps": 1_152}))
+    assert [point.step for point in recorder.progress] == [256, 512, 768, 1024, 1152]
+    assert [step for step, _, _ in recorder.checkpoints][-1] == 1152
+
+
 def test_remaining_time_is_reported_from_the_first_updates_on(tiny_run):
     reported = [point.time_left_s is not None for point in tiny_run.progress]
     assert reported == [point.updates > 0 for point in tiny_run.progress]
