@@ -79,7 +79,8 @@ class MoveSnapshot(ReadModel):
     block: str | None
     """id of the block; null if it is gone"""
     value: float | None
-    """Q(s, a) of the sorting policy; null if only the planner decides"""
+    """Q(s, a) of the sorting policy, or minus the expected grasps of the planner; null where
+    neither values it"""
     best: bool
     """whether it begins a shortest plan of the exact planner"""
 
@@ -123,7 +124,7 @@ class SortingSnapshot(ReadModel):
     duplicates: tuple[str, ...]
     """ids of the blocks that the robot may take; of several the critic selects one"""
     ranked: tuple[MoveSnapshot, ...]
-    """best valid moves, best first"""
+    """best valid moves, best first; the present move is last where it is none of them"""
     moves_to_go: int
     """fewest moves to the goal; a held block counts at its former place"""
     attempts_to_go: float

@@ -48,7 +48,6 @@ def task_snapshot(inputs: SnapshotInputs) -> SortingSnapshot:
     """Return the read model of the sorting task."""
     table, decision = inputs.table, inputs.controller.decision
     policy, choice = inputs.controller.policy, inputs.choice
-    ranked = () if decision is None else decision.ranked[:MAX_RANKED]
     return SortingSnapshot(
         blocks=tuple(_block(inputs, one) for one in table.blocks),
         goal=_goal(inputs),
@@ -60,7 +59,7 @@ def task_snapshot(inputs: SnapshotInputs) -> SortingSnapshot:
         decided_by=None if choice is None or decision is None else decision.by,
         order=inputs.controller.order,
         duplicates=() if choice is None else _duplicates(table, choice),
-        ranked=tuple(_ranked(table, one) for one in ranked),
+        ranked=_ranked(inputs),
         moves_to_go=0 if decision is None else decision.fewest_moves,
         attempts_to_go=0.0 if decision is None else decision.expected_attempts,
         counters=inputs.counters,
@@ -144,7 +143,17 @@ def _duplicates(table: SortingTable, choice: MoveChoice) -> tuple[str, ...]:
     return tuple(block.id for block, _ in choice.options if block in table.blocks)
 
 
-def _ranked(table: SortingTable, one: RankedMove) -> MoveSnapshot:
+def _ranked(inputs: SnapshotInputs) -> tuple[MoveSnapshot, ...]:
+    """Return the best moves; the present one is last where it is none of them."""
+    decision, choice = inputs.controller.decision, inputs.choice
+    ranked = () if decision is None else decision.ranked[:MAX_RANKED]
+    if choice is None or any(one.move == choice.move for one in ranked):
+        return tuple(_valued(inputs.table, one) for one in ranked)
+    best = (_valued(inputs.table, one) for one in ranked[: MAX_RANKED - 1])
+    return (*best, _current(inputs, choice))
+
+
+def _valued(table: SortingTable, one: RankedMove) -> MoveSnapshot:
     held = table.held is not None and one.move.pick == table.held_position
     block = table.held if held else table.top(one.move.pick)
     return _move(table, one.move, block, one.value, one.fewest)

@@ -45,9 +45,9 @@ function Decider({ sorting }) {
   const over = by === "planner" && policy !== null;
   const text = by === "policy" ? "by the policy" : over ? "planner fallback" : "by the planner";
   const help = by === "policy"
-    ? "The sorting policy values every move; the best is chosen."
+    ? "The sorting policy values every move. The best is chosen, or another with about as many expected grasps."
     : over
-      ? "The policy made no progress: fallback to the exact planner."
+      ? "The exact planner decides: the policy made no progress, or was not trained for this task."
       : "No sorting policy is active: the exact planner finds the fewest moves. The value of a move is minus its expected number of grasps.";
   return html`<span class=${over ? "hint is-over" : "hint"} tabindex="0" data-role="decider"
     data-by=${by} aria-describedby="decider-help">${text}${PHASES[phase] ? `, ${PHASES[phase]}` : ""}
