@@ -1,4 +1,4 @@
-"""Numbers and texts on the page have one form each, the same as in status messages."""
+"""Numbers and texts on the page and its plots have one form each, as in status messages."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -15,6 +15,22 @@ FILES = Path(__file__).parents[2] / "web" / "page"
 ORIGIN = "http://page.test"
 CALL = "([name, of]) => import('/format.js').then((one) => of.map((v) => one[name](v)))"
 LENGTHS = [0.0, 1e-5, 4.9e-4, 5.1e-4, 0.004, 0.00949, 0.0096, 0.0149, 0.3, 0.994, 1.236]
+PLOTTED = """([steps, values]) => {
+  window.written = [];
+  const {prototype} = CanvasRenderingContext2D, write = prototype.fillText;
+  prototype.fillText = function (text, x, y) {
+    const left = this.textAlign === "right" ? x - this.measureText(text).width : x;
+    if (this.textAlign === "right") window.written.push([text, left]);
+    return write.call(this, text, x, y);
+  };
+  document.body.innerHTML = "<div style='width: 400px'></div>";
+  return Promise.all(["/vendor/htm-preact-standalone.module.js", "/plots.js"]
+    .map((path) => import(path))).then(([{html, render}, {CurvePlot}]) =>
+      render(html`<${CurvePlot} height=${160} label="plot"
+        rows=${steps.map((step, i) => ({step, value: values[i]}))}
+        lines=${[{key: "value", label: "value", colour: "accent"}]} />`,
+        document.body.firstChild));
+}"""
 VALUES = [-5.126, -0.52, -0.004, 0.0, 0.004, 3.3201]
 
 
@@ -66,6 +82,19 @@ def test_counts_agree_with_their_noun(page: Page) -> None:
     code = "of => import('/format.js').then((one) => of.map((v) => one.count(v, 'step')))"
     texts = page.evaluate(code, [0, 1, 2, 12_400])
     assert texts == ["0 steps", "1 step", "2 steps", "12.4\u00a0k steps"]
+
+
+@pytest.mark.parametrize("values", [[-500.0], [481_600.0, 481_900.0], [0.0, 2.6e6], [0.2, 2]])
+def test_ticks_of_a_plot_have_labels_that_differ_and_fit(
+    page: Page, values: list[float]
+) -> None:
+    page.add_script_tag(url=f"{ORIGIN}/vendor/uPlot.iife.min.js")
+    page.evaluate(PLOTTED, [list(range(1, len(values) + 1)), values])
+    page.wait_for_function("window.written.length > 2")
+    labels = page.evaluate("window.written")
+    texts = [text for text, _ in labels]
+    assert len(set(texts)) == len(texts)
+    assert min(left for _, left in labels) >= 0.0
 
 
 def test_times_are_given_in_days_from_two_days_on(page: Page) -> None:

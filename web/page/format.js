@@ -107,6 +107,13 @@ export function quantity(v, unit, digits = 3) {
   return `${number(v, digits)}${NB}${unit}`;
 }
 
+/** Labels of the ticks of an axis, with the digits that tell them apart. */
+export function ticks(values) {
+  const step = Math.abs(values[1] - values[0]);
+  const decimals = step > 0 ? Math.min(20, Math.max(0, 1 - Math.floor(Math.log10(step)))) : 3;
+  return values.map((v) => grouped(Number(v.toFixed(decimals))));
+}
+
 /** A value with all its digits, those of whole numbers from 10 000 on in groups of three. */
 export function grouped(v) {
   if (typeof v !== "number") return typeof v === "string" ? v : JSON.stringify(v);

@@ -7,6 +7,7 @@ import { themeColours } from "./palette.js";
 
 const [LEAST_NAME, MOST_NAME] = [58, 120];
 const FONT = "11px Inter, system-ui, sans-serif";
+const LABEL_GAP = 10; // between the labels of an axis and its line, and beside them [px]
 
 /** The page's colours; changes with the system's light and dark. */
 export function useTheme() {
@@ -53,6 +54,28 @@ export function axis(theme, more) {
   };
 }
 
+/** A vertical axis of numbers, at least `size` pixels wide and as wide as its labels need. */
+export function numberAxis(theme, { size, ...more }) {
+  return axis(theme, {
+    size: (plot, labels, k, cycle) => (cycle > 1 ? plot.axes[k]._size
+      : Math.max(size, Math.ceil(widest(labels ?? [], FONT)) + LABEL_GAP)),
+    values: (_, values) => format.ticks(values),
+    ...more,
+  });
+}
+
+/** Width of the widest of some texts [px]. */
+function widest(texts, font) {
+  const context = document.createElement("canvas").getContext("2d");
+  context.font = font;
+  return Math.max(0, ...texts.map((text) => context.measureText(text).width));
+}
+
+/** Labels of an axis of rates. */
+export function percents(_, values) {
+  return values.map((v) => `${Math.round(v * 100)} %`);
+}
+
 export function secondsAgo(v) {
   return v === 0 ? "now" : format.quantity(v, "s");
 }
@@ -82,7 +105,7 @@ function valueOptions(theme, ids, live) {
     },
     axes: [
       axis(theme, { size: 24, space: 70, values: (_, ticks) => ticks.map(secondsAgo) }),
-      axis(theme, { size: 40, space: 32, values: (_, t) => t.map((v) => format.number(v)) }),
+      numberAxis(theme, { size: 40, space: 32 }),
     ],
     series: [{}, ...ids.map((id) => ({ label: id, paths: () => null, points: { show: false } }))],
     hooks: {
@@ -94,10 +117,8 @@ function valueOptions(theme, ids, live) {
 
 /** Width of the names beside the value plot [px]; longer ones are cut. */
 function roomForNames(names) {
-  const context = document.createElement("canvas").getContext("2d");
-  context.font = FONT.replace("11px", "650 11px");
-  const widest = Math.max(0, ...names.map((name) => context.measureText(name).width));
-  return Math.ceil(Math.min(MOST_NAME, Math.max(LEAST_NAME, widest + 10)));
+  const width = widest(names, FONT.replace("11px", "650 11px")) + 10;
+  return Math.ceil(Math.min(MOST_NAME, Math.max(LEAST_NAME, width)));
 }
 
 function padded(low, high, least) {
@@ -121,7 +142,6 @@ export function CurvePlot({ rows, lines, height, label, unit, range, sync, onHov
 }
 
 function curveOptions(theme, lines, unit, range, sync, hover) {
-  const show = unit === "%" ? (v) => `${Math.round(v * 100)} %` : (v) => format.number(v);
   return {
     legend: { show: false },
     padding: [8, 16, 0, 0],
@@ -137,7 +157,7 @@ function curveOptions(theme, lines, unit, range, sync, hover) {
     },
     axes: [
       axis(theme, { size: 24, space: 64, values: (_, t) => t.map((v) => (v ? format.steps(v) : "0")) }),
-      axis(theme, { size: 46, space: 30, values: (_, ticks) => ticks.map(show) }),
+      numberAxis(theme, { size: 46, space: 30, ...(unit === "%" && { values: percents }) }),
     ],
     series: [
       {},

@@ -3,7 +3,7 @@ import { html, useEffect, useMemo, useRef, useState } from "../vendor/htm-preact
 import * as format from "../format.js";
 import { Alert, Close } from "../icons.js";
 import { GOALS } from "../palette.js";
-import { axis, Plot, useTheme } from "../plots.js";
+import { axis, numberAxis, percents, Plot, useTheme } from "../plots.js";
 import { FieldName, fieldOf, fieldValue, presetTitle } from "./fieldnames.js";
 import { useAnswer } from "./formfields.js";
 
@@ -121,7 +121,6 @@ function GroupPlot({ found, onHover }) {
 
 function groupOptions(theme, { groups, quantity }, hover) {
   const rate = RATES.has(quantity);
-  const show = rate ? (v) => `${Math.round(v * 100)} %` : (v) => format.number(v);
   const edge = { points: { show: false }, width: 0, spanGaps: true };
   return {
     legend: { show: false },
@@ -133,7 +132,7 @@ function groupOptions(theme, { groups, quantity }, hover) {
     },
     axes: [
       axis(theme, { size: 24, space: 64, values: (_, t) => t.map((v) => (v ? format.steps(v) : "0")) }),
-      axis(theme, { size: 52, space: 30, values: (_, t) => t.map(show) }),
+      numberAxis(theme, { size: 52, space: 30, ...(rate && { values: percents }) }),
     ],
     series: [{}, ...groups.flatMap((group, i) => [
       { stroke: colour(i), width: 2, dash: patternOf(i), spanGaps: true,
