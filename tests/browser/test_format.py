@@ -31,6 +31,28 @@ PLOTTED = """([steps, values]) => {
         lines=${[{key: "value", label: "value", colour: "accent"}]} />`,
         document.body.firstChild));
 }"""
+COMPARISON: dict[str, Any] = {
+    "jobs": [{"id": "a", "number": 1, "seed": 1, "preset": "p" * 90, "name": None}],
+    "quantity": "success",
+    "quantities": ["success"],
+    "steps": [100, 200],
+    "groups": [
+        {"jobs": ["a"], "mean": [0.1, 0.9], "low": [0.1, 0.9], "high": [0.1, 0.9], "n": [1, 1]}
+    ],
+    "differences": [],
+}
+COMPARED = """() => {
+  window.written = [];
+  const {prototype} = CanvasRenderingContext2D, write = prototype.fillText;
+  prototype.fillText = function (text, x, y) {
+    const end = x + this.measureText(text).width;
+    if (!this.canvas.isConnected) window.written.push([text, end, this.canvas.width]);
+    return write.call(this, text, x, y);
+  };
+  return Promise.all(["/vendor/htm-preact-standalone.module.js", "/training/compare.js"]
+    .map((path) => import(path))).then(([{html, render}, {Comparison}]) => render(
+      html`<${Comparison} ids=${["a"]} presets=${{items: []}} />`, document.body));
+}"""
 VALUES = [-5.126, -0.52, -0.004, 0.0, 0.004, 3.3201]
 
 
@@ -95,6 +117,18 @@ def test_ticks_of_a_plot_have_labels_that_differ_and_fit(
     texts = [text for text, _ in labels]
     assert len(set(texts)) == len(texts)
     assert min(left for _, left in labels) >= 0.0
+
+
+def test_picture_of_a_comparison_is_as_wide_as_its_legend(page: Page) -> None:
+    page.set_viewport_size({"width": 360, "height": 780})
+    page.add_script_tag(url=f"{ORIGIN}/vendor/uPlot.iife.min.js")
+    page.route(f"{ORIGIN}/v1/comparison**", lambda route: route.fulfill(json=COMPARISON))
+    page.evaluate(COMPARED)
+    with page.expect_download():
+        page.locator('[data-action="png"]').click()
+    written = page.evaluate("window.written")
+    assert any("last 90.0" in text for text, *_ in written)
+    assert all(end <= width for _, end, width in written)
 
 
 def test_times_are_given_in_days_from_two_days_on(page: Page) -> None:

@@ -189,26 +189,32 @@ function labelOf(group, { jobs, groups, differences }, presets) {
   return parts.join(", ") + more;
 }
 
-/** Save the plot with its title and legend as a PNG file. */
+/** Save the plot with its title and legend as a PNG file, as wide as the longest of their lines. */
 function savePicture(dialog, found) {
   const plot = dialog.querySelector(".plot canvas");
   const style = getComputedStyle(dialog);
   const scale = plot.width / plot.clientWidth;
-  const [line, margin, top] = [20, 16, 40].map((v) => v * scale);
+  const [line, margin, top, indent] = [20, 16, 40, 26].map((v) => v * scale);
   const picture = document.createElement("canvas");
-  picture.width = plot.width + 2 * margin;
-  picture.height = top + plot.height + line * (found.groups.length + 2) + margin;
   const pen = picture.getContext("2d");
+  const fontOf = (weight) => `${weight} ${13 * scale}px Inter, system-ui, sans-serif`;
+  const title = `${format.capital(quantityName(found.quantity))} over environment steps`;
+  const texts = found.groups.map((group) => `${group.label} · ${seedsOf(group, found)} · last ${
+    readout(group, lastOf(group), found.quantity)}`);
+  pen.font = fontOf(600);
+  const widths = [plot.width, pen.measureText(title).width];
+  pen.font = fontOf(400);
+  widths.push(...texts.map((text) => indent + pen.measureText(text).width));
+  picture.width = Math.ceil(Math.max(...widths)) + 2 * margin;
+  picture.height = top + plot.height + line * (texts.length + 2) + margin;
   pen.fillStyle = style.backgroundColor;
   pen.fillRect(0, 0, picture.width, picture.height);
-  const write = (text, x, y, weight = 400) => {
-    pen.fillStyle = style.color;
-    pen.font = `${weight} ${13 * scale}px Inter, system-ui, sans-serif`;
-    pen.fillText(text, x, y);
-  };
-  write(`${format.capital(quantityName(found.quantity))} over environment steps`, margin, 26 * scale, 600);
+  pen.fillStyle = style.color;
+  pen.font = fontOf(600);
+  pen.fillText(title, margin, 26 * scale);
   pen.drawImage(plot, margin, top);
-  found.groups.forEach((group, i) => {
+  pen.font = fontOf(400);
+  texts.forEach((text, i) => {
     const y = top + plot.height + line * (i + 1.5);
     pen.strokeStyle = colour(i);
     pen.lineWidth = 3 * scale;
@@ -217,8 +223,7 @@ function savePicture(dialog, found) {
     pen.moveTo(margin, y - 4.5 * scale);
     pen.lineTo(margin + 16 * scale, y - 4.5 * scale);
     pen.stroke();
-    const last = readout(group, lastOf(group), found.quantity);
-    write(`${group.label} · ${seedsOf(group, found)} · last ${last}`, margin + 26 * scale, y);
+    pen.fillText(text, margin + indent, y);
   });
   picture.toBlob((blob) => {
     const link = document.createElement("a");
