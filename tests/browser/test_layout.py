@@ -14,6 +14,7 @@ pytestmark = pytest.mark.browser
 
 DESKTOPS = ((1440, 900), (1280, 720), (1024, 700))
 PHONE = (390, 844)
+WIDTHS = (320, 480, 700, 860, 870, 900, 950, 1024, 1180, 1190, 1480, 1760)
 SCENE_PX = 150
 """Least height that the dock leaves to the scene of a desktop."""
 
@@ -24,6 +25,16 @@ BARE_BUTTONS = """() => {
   return { icons: icons.length, faults: faults.map((one) => one.outerHTML) };
 }"""
 """Number of visible buttons without a visible text, and those without a name or a hint."""
+
+BEYOND_THE_DOCK = """() => {
+  const dock = document.querySelector(".dock").getBoundingClientRect();
+  const controls = [...document.querySelectorAll(".dock :is(button, select, input)")];
+  return controls.filter((one) => {
+    const { left, right, width } = one.getBoundingClientRect();
+    return width > 0 && !one.closest(".cases") && (left < dock.left || right > dock.right);
+  }).map((one) => one.ariaLabel ?? one.innerText);
+}"""
+"""Controls beside the scene's dock; scenarios are scrolled to on a phone."""
 
 
 @pytest.fixture(params=cell_names())
@@ -60,6 +71,17 @@ def test_page_fits_its_window_and_its_text_stands_out(open_page: Callable[..., P
         page.set_viewport_size({"width": PHONE[0], "height": PHONE[1]})
         assert size_of(page)[0] == PHONE[0]
     assert page.problems == []  # type: ignore[attr-defined]
+
+
+@pytest.mark.usefixtures("shown")
+def test_controls_of_the_cell_stay_in_the_dock_at_every_width(
+    open_page: Callable[..., Page],
+) -> None:
+    page = open_page((1280, 800), scene=False)
+    page.wait_for_selector('[data-action="remove-person"]')
+    for width in WIDTHS:
+        page.set_viewport_size({"width": width, "height": 800})
+        assert page.evaluate(BEYOND_THE_DOCK) == [], width
 
 
 @pytest.mark.usefixtures("shown")

@@ -85,7 +85,7 @@ function MotionSource({ person, send, sized, onSized }) {
     else if (list?.length && !playing) send(playOf(id, list[0].name));
     else refresh();
   };
-  return html`<div class="dock-row">
+  return html`<div class="dock-row dock-wrap">
       <span class="dock-label" id="mode-label">Motion source</span>
       <${Segmented} labelledby="mode-label" value=${open && !playing ? "recorded" : mode}
         items=${MODES} onPick=${pick} mark=${(one) => ({ "data-mode": one })} />
