@@ -53,6 +53,11 @@ COMPARED = """() => {
     .map((path) => import(path))).then(([{html, render}, {Comparison}]) => render(
       html`<${Comparison} ids=${["a"]} presets=${{items: []}} />`, document.body));
 }"""
+CLONED = """(job) => Promise.all(["/vendor/htm-preact-standalone.module.js",
+    "/training/trainform.js"].map((path) => import(path)))
+  .then(([{html, render}, {TrainForm}]) => render(html`<${TrainForm} from=${job}
+    presets=${{items: [{name: job.preset, title: "Preset", fields: []}], error: null}}
+    onStarted=${() => {}} onClose=${() => {}} />`, document.body))"""
 VALUES = [-5.126, -0.52, -0.004, 0.0, 0.004, 3.3201]
 
 
@@ -129,6 +134,28 @@ def test_picture_of_a_comparison_is_as_wide_as_its_legend(page: Page) -> None:
     written = page.evaluate("window.written")
     assert any("last 90.0" in text for text, *_ in written)
     assert all(end <= width for _, end, width in written)
+
+
+def test_integers_that_a_number_would_round_are_no_numbers_of_a_form(page: Page) -> None:
+    texts = ["9007199254740991", "9007199254740993", "-9_007_199_254_740_993", "1e3", "0.5"]
+    call = "of => import('/training/formfields.js').then((one) => of.map(one.parsed))"
+    expected = [9007199254740991, "9007199254740993", "-9007199254740993", 1000, 0.5]
+    assert page.evaluate(call, texts) == expected
+
+
+@pytest.mark.parametrize(("typed", "sent"), [(None, {}), ("7", {"seed": 7})])
+def test_clone_has_the_seed_of_its_job_unless_another_is_typed(
+    page: Page, typed: str | None, sent: dict[str, int]
+) -> None:
+    page.route(f"{ORIGIN}/v1/jobs/**", lambda route: route.fulfill(json={}))
+    job = {"id": "a", "number": 1, "preset": "p", "seed": 2**53, "overrides": {}}
+    page.evaluate(CLONED, job)
+    if typed is not None:
+        page.fill("#train-seed", typed)
+    with page.expect_request(f"{ORIGIN}/v1/jobs/a/clone") as request:
+        page.click("form.train [type=submit]")
+    body = request.value.post_data_json
+    assert {name: body[name] for name in body if name == "seed"} == sent
 
 
 def test_times_are_given_in_days_from_two_days_on(page: Page) -> None:

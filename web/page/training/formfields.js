@@ -205,10 +205,14 @@ function choices(field) {
   return field.type === "bool" ? ["true", "false"] : field.choices.map(String);
 }
 
-/** Text as the JSON it stands for; what is no JSON goes as text, and the service says so. */
+/**
+ * Text as the JSON it stands for. What is no JSON goes as text, and so do integers that a number
+ * would round: the service says that it does not take them.
+ */
 export function parsed(text) {
   const plain = String(text).trim().replaceAll("_", "").replace("\u2212", "-")
     .replace(/(?<=\d)[\s\u202f](?=\d)/g, "");
+  if (/^-?\d+$/.test(plain) && !Number.isSafeInteger(Number(plain))) return plain;
   try {
     return JSON.parse(plain);
   } catch {

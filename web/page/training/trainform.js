@@ -28,7 +28,9 @@ export function TrainForm({ presets: { items: presets, error }, cell, from, onSt
   const values = from ? form.typed : { ...shownCell(preset, cell), ...form.typed };
   const send = (key) => {
     const own = overrides(preset, values);
-    const body = { seed: parsed(values.seed), name: values.name || null, ...budgetBody(values) };
+    const body = { name: values.name || null, ...budgetBody(values) };
+    // A seed that is not changed is left to the service: beyond 2^53 the page knows it rounded.
+    if (!from || values.seed !== String(from.seed)) body.seed = parsed(values.seed);
     return from
       ? post(`v1/jobs/${from.id}/clone`, { ...body, overrides: patchOf(from.overrides, own) }, key)
       : post("v1/jobs", { kind: "train", preset: preset.name, ...body, overrides: own }, key);
