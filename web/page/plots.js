@@ -73,7 +73,7 @@ function widest(texts, font) {
 
 /** Labels of an axis of rates. */
 export function percents(_, values) {
-  return values.map((v) => `${Math.round(v * 100)} %`);
+  return format.ticks(values.map((v) => 100 * v)).map((text) => `${text} %`);
 }
 
 export function secondsAgo(v) {
