@@ -62,6 +62,26 @@ def posture(name: str, floor_z: float, scale: float = 1.0) -> np.ndarray:
     return scale * points @ facing_the_robot + [0.2, 1.4, floor_z]
 
 
+def looking_down(name: str, floor_z: float, pitch: float) -> np.ndarray:
+    """Return key-points as :func:`posture`, with the face turned down from level [rad]."""
+    points = posture(name, floor_z)
+    ears = 0.5 * (points[K["ear_r"]] + points[K["ear_l"]])
+    ahead = np.array([0.0, -np.cos(pitch), -np.sin(pitch)])
+    points[K["nose"]] = ears + 0.12 * ahead
+    for s in "rl":
+        points[K[f"eye_{s}"]] = points[K[f"ear_{s}"]] + 0.1 * ahead
+    return points
+
+
+def kneeling_and_looking_down(floor_z: float) -> np.ndarray:
+    """Return key-points of a kneeling person, hands on the floor, toes behind the heels."""
+    points = looking_down("on all fours", floor_z, pitch=1.8)
+    for s in "rl":
+        for part in ("big_toe", "small_toe"):
+            points[K[f"{part}_{s}"]] = points[K[f"heel_{s}"]] + [0.0, 0.15, -0.04]
+    return points
+
+
 FRAMES: dict[str, np.ndarray] = {
     "a camera's, y down and z ahead": np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0]]),
     "a camera's that looks down": np.diag([1, -1, -1]),

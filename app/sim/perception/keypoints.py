@@ -125,7 +125,10 @@ def faces_backward(points: Vec, group: Group) -> bool:
     """Return whether a group's sides contradict the facing direction, from one frame.
 
     Shoulders are compared with the nose before the ears, hips with the toes before the
-    heels; these directions stay right where left and right are mistaken.
+    heels; these directions stay right where left and right are mistaken. The nose of a person
+    who leans forward and looks down is behind the ears: the direction from neck to ears is
+    added. The toes of a kneeling person are behind the heels: feet count under upright shanks
+    only.
 
     Args:
         points: Key-points [m], shape (25, 3), NaN where missing.
@@ -135,8 +138,24 @@ def faces_backward(points: Vec, group: Group) -> bool:
         return False
     if group == "arms":
         across = points[K["shoulder_l"]] - points[K["shoulder_r"]]
-        ahead = points[K["nose"]] - 0.5 * (points[K["ear_r"]] + points[K["ear_l"]])
+        ears = 0.5 * (points[K["ear_r"]] + points[K["ear_l"]])
+        ahead = _unit(points[K["nose"]] - ears)
+        if ahead[2] < 0.0:
+            ahead += np.nan_to_num(_unit(ears - points[K["neck"]]))
     else:
         across = points[K["hip_l"]] - points[K["hip_r"]]
         ahead = sum(points[K[f"big_toe_{s}"]] - points[K[f"heel_{s}"]] for s in "rl")
+        if any(_is_level(points[K[f"ankle_{s}"]] - points[K[f"knee_{s}"]]) for s in "rl"):
+            return False
     return bool(across[1] * ahead[0] - across[0] * ahead[1] < 0.0)
+
+
+def _unit(vector: Vec) -> Vec:
+    """Return a vector of length 1; the same where the length is 0."""
+    length = float(np.linalg.norm(vector))
+    return vector if length == 0.0 else vector / length
+
+
+def _is_level(direction: Vec) -> bool:
+    """Return whether a direction is within 45 degrees of the horizontal; not if unknown."""
+    return bool(np.hypot(direction[0], direction[1]) > abs(direction[2]))

@@ -13,6 +13,7 @@ from app.sim.perception.keypoints import (
     swap_sides,
     swapped_against,
 )
+from tests.sim.postures import kneeling_and_looking_down, looking_down, posture
 from tests.sim.tracked_person import CELL, seen, work
 
 
@@ -56,3 +57,24 @@ def test_exchanged_sides_are_found_with_and_without_history(group: str) -> None:
         assert swapped_against(crossed, points, group)
         assert not faces_backward(points, group)
         assert faces_backward(crossed, group)
+
+
+@pytest.mark.parametrize("pitch", [0.0, 0.6, 1.8, 2.3])
+def test_a_person_who_looks_down_does_not_face_backward(pitch: float) -> None:
+    assert not faces_backward(looking_down("bent by 90 degrees", CELL.floor_z, pitch), "arms")
+
+
+def test_a_person_who_looks_up_with_the_head_back_does_not_face_backward() -> None:
+    points = looking_down("standing", CELL.floor_z, -1.2)
+    head = [K[name] for name in ("nose", "eye_r", "eye_l", "ear_r", "ear_l")]
+    points[head] += [0.0, 0.15, -0.05]
+    assert not faces_backward(points, "arms")
+    assert faces_backward(swap_sides(points, "arms"), "arms")
+
+
+def test_toes_of_a_kneeling_person_do_not_tell_where_the_person_faces() -> None:
+    assert not faces_backward(kneeling_and_looking_down(CELL.floor_z), "legs")
+    assert faces_backward(swap_sides(posture("standing", CELL.floor_z), "legs"), "legs")
+    hidden = posture("standing", CELL.floor_z)
+    hidden[[K["knee_r"], K["knee_l"]]] = np.nan
+    assert faces_backward(swap_sides(hidden, "legs"), "legs")

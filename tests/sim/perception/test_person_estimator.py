@@ -14,7 +14,7 @@ from app.sim.perception.keypoints import K, swap_sides
 from app.sim.perception.person_estimator import EstimatorSettings, PersonEstimator
 from app.sim.scene.scene import capsule_speeds_of, people_geometry_of, people_of
 from tests.sim.perception.cylinder_contents import holds
-from tests.sim.postures import POSTURES, posture
+from tests.sim.postures import POSTURES, kneeling_and_looking_down, posture
 from tests.sim.tracked_person import CELL, seen, work
 from tests.sim.tracker_errors import errors, follow
 
@@ -318,6 +318,14 @@ def test_single_mirrored_frame_counts_long_after_another_one() -> None:
     again = estimator.update(10.0, mirrored)
     assert first.flags == ("mirrored", "arms-swapped", "legs-swapped")
     assert "mirrored" in again.flags and "foreign-frame" not in again.flags
+
+
+def test_a_kneeling_person_who_looks_down_stays_seen() -> None:
+    estimator = PersonEstimator(CELL.body, floor_z=CELL.floor_z)
+    points = kneeling_and_looking_down(CELL.floor_z)
+    for k in range(60):
+        estimate = estimator.update(k * DT, points)
+        assert estimate.flags == ("misfit",) and estimate.age_s == 0.0
 
 
 @pytest.mark.parametrize("t", [np.nan, np.inf, 29 * DT, 0.0])
