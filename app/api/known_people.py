@@ -238,10 +238,12 @@ def _from_keypoints(entry: KeypointsPerson, place: str, cell: Cell) -> KnownPers
     speeds = entry.speeds()
     estimate = estimate_once(points, size, trust, speeds, place, cell.floor_z)
     person = person_from_estimate(estimate)
-    assert person is not None  # estimate_once always returns a cylinder
+    monitored = as_monitored(estimate)
+    assert person is not None and monitored is not None  # there is always a cylinder
+    is_same = (monitored.cylinder is None) == (person.cylinder is None)
     return KnownPerson(
         person=person,
-        observed=as_monitored(estimate) if estimate.held else person,
+        observed=person if is_same else monitored,
         source="keypoints",
         speeds="zero" if speeds is None else "given",
         estimate=estimate,

@@ -266,7 +266,7 @@ class PersonUse(Answer):
     )
     monitored_as_cylinder: bool = Field(
         description="whether speed and separation monitoring uses a cylinder: no joint angles "
-        "are known, or an arm is not observed"
+        "are known, an arm is not observed, or a hand is not where they place it"
     )
     speeds: Speeds = Field(description="origin of the speeds; zero: unknown")
     flags: list[str] = Field(

@@ -77,7 +77,7 @@ def joint_motion(
     return q, qd, held
 
 
-def fit_errors(q: Vec, size: Vec, points: Vec) -> tuple[float, float]:
+def fit_errors(q: Vec, size: Vec, points: Vec) -> tuple[float, float, float]:
     """Return the distances of the model's joints from key-points [m]; NaN if all are unseen.
 
     Args:
@@ -87,13 +87,15 @@ def fit_errors(q: Vec, size: Vec, points: Vec) -> tuple[float, float]:
 
     Returns:
         The median over all joints; for the trunk alone the greater one of the median over neck
-        and shoulders and of the error of the hips' height, which the model does not fit.
+        and shoulders and of the error of the hips' height, which the model does not fit; and
+        the greater one of both wrists, 0 if they are unseen.
     """
     joints = human.joint_points(q, size)
     away = [float(np.linalg.norm(points[K[name]] - joints[name])) for name in FITTED]
     hips = abs(float(points[K["mid_hip"], 2] - joints["pelvis"][2]))
     trunk = [_median(one for one, name in zip(away, FITTED, strict=True) if name in _TRUNK)]
-    return _median(away), max((d for d in (*trunk, hips) if d == d), default=math.nan)
+    unfit = max((d for d in (*trunk, hips) if d == d), default=math.nan)
+    return _median(away), unfit, max((d for d in away[-2:] if d == d), default=0.0)
 
 
 def _median(values: Iterable[float]) -> float:

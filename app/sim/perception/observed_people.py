@@ -41,6 +41,8 @@ WIDEST = 3.0 * FARTHEST_M
 """Largest radius of a cylinder [m], which covers the whole hall."""
 KNOWN_RADIUS, KNOWN_GROWTH, KNOWN_WALK = 5.0, 5.0, 10.0
 """Largest radius [m], growth [m/s] and past walking speed [m/s] in observations."""
+MOST_WRIST_MISFIT = 0.1
+"""Largest distance of a monitored wrist from where it was observed [m]."""
 _YAW, _MOST_YAW = 2, 1e6
 _SLACK = 1e-6
 _QD_LIMIT = np.full(18, FASTEST)
@@ -117,13 +119,14 @@ def person_from_estimate(estimate: PersonEstimate) -> Person | None:
 def as_monitored(observed: PersonEstimate) -> Person | None:
     """Return the person that a safety layer monitors; None without one.
 
-    An unseen joint may have any angle: the person is then the safety cylinder, which covers the
-    reach of unseen limbs.
+    An unseen joint may have any angle, and a hand may be where no joint angles within the
+    model's limits place it: the person is then the safety cylinder, which covers both.
 
     Args:
         observed: Estimate at the last frame that showed the person.
     """
-    return _in_cylinder(observed) if observed.held else person_from_estimate(observed)
+    placed = not observed.held and observed.wrist_misfit_m <= MOST_WRIST_MISFIT
+    return person_from_estimate(observed) if placed else _in_cylinder(observed)
 
 
 def _in_cylinder(estimate: PersonEstimate) -> Person | None:

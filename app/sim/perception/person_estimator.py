@@ -98,7 +98,7 @@ class EstimatorSettings:
     """Time until a group with exchanged sides is restarted, and a mirrored frame rejected
     [s]."""
     misfit: float = 0.10
-    """Median distance of the model's joints from the key-points that counts as misfit [m]."""
+    """Median distance of the model's joints, or one of a wrist, that counts as misfit [m]."""
     unfit: float = 0.25
     """Misfit of the trunk beyond which there are no joint angles [m]; the median model fits
     statures between the 1st and 99th percentile within 0.2 m."""
@@ -144,6 +144,8 @@ class PersonEstimate:
     displaced_m: float = 0.0
     """Greatest distance of a key-point of trunk or arms, or of a hand, at ``t`` from where it
     was last measured [m]."""
+    wrist_misfit_m: float = 0.0
+    """Greatest distance of a wrist of the model from its filtered key-point [m]."""
 
     @property
     def stale(self) -> bool:
@@ -201,10 +203,8 @@ class PersonEstimator:
             InvalidInput: See :func:`~app.sim.perception.keypoint_check.check_keypoints`, or
                 ``t`` is not later than the previous time; the state is unchanged.
         """
-        least = self.settings.min_confidence
-        self.take_frame(
-            t, check_keypoints(keypoints, confidences, least, floor_z=self._floor_z)
-        )
+        least, floor_z = self.settings.min_confidence, self._floor_z
+        self.take_frame(t, check_keypoints(keypoints, confidences, least, floor_z=floor_z))
 
     def take_frame(self, t: float, frame: Keypoints, fresh: bool = False) -> None:
         """Process one validated frame; see :meth:`take`.
@@ -340,12 +340,12 @@ class PersonEstimator:
         flags, age = list(self._flags), t - self._seen_at
         points, speeds = self._points.at(t)
         known = np.isfinite(points).all(axis=1)
-        person, held, misfit = self._person(points, speeds)
+        person, held, (misfit, _, wrist_misfit) = self._person(points, speeds)
         if self.last_points is None:
             flags.append("never-seen")
         elif age > self.settings.stale_s:
             flags.append("stale")
-        if misfit > self.settings.misfit:
+        if max(wrist_misfit, misfit) > self.settings.misfit:
             flags.append("misfit")
         return PersonEstimate(
             t=t,
@@ -361,13 +361,13 @@ class PersonEstimator:
             implausible=None if self._frame is None else self._frame.implausible,
             carried_s=self._carried_at(t),
             displaced_m=greatest_distance(self._measured, points, _DECIDING),
+            wrist_misfit_m=wrist_misfit,
         )
 
     def _carried_at(self, t: float) -> float:
         """Return the longest current prediction of a key-point of trunk and arms [s]."""
         carried = t - self._points.seen_at[_DECIDING]
-        known = carried <= self.settings.filter.hold_s
-        return float(carried[known].max(initial=0.0))
+        return float(carried[carried <= self.settings.filter.hold_s].max(initial=0.0))
 
     def person_at(self, t: float) -> Person | None:
         """Return only joint angles and speeds of :meth:`at` at ``t`` [s]."""
@@ -380,12 +380,12 @@ class PersonEstimator:
 
     def _person(
         self, points: Vec, speeds: Vec
-    ) -> tuple[Person | None, NDArray[np.bool_], float]:
-        """Return joint angles and speeds, the held joints, and the misfit [m]."""
+    ) -> tuple[Person | None, NDArray[np.bool_], tuple[float, float, float]]:
+        """Return joint angles and speeds, the held joints, and the errors of the fit [m]."""
         if self._q is None:
-            return None, np.ones(18, dtype=np.bool_), math.nan
+            return None, np.ones(18, dtype=np.bool_), (math.nan, math.nan, 0.0)
         q, qd, held = joint_motion(points, speeds, self._q, self._size, self.settings.qd_max)
-        return Person(q=q, qd=qd, size=self._size), held, fit_errors(q, self._size, points)[0]
+        return Person(q=q, qd=qd, size=self._size), held, fit_errors(q, self._size, points)
 
     def _cylinder_at(self, t: float, points: Vec, age: float) -> SafetyCylinder | None:
         """Return the cylinder around known key-points at ``t``, else the last one, grown."""

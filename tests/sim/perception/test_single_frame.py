@@ -6,7 +6,7 @@ import pytest
 from app.errors import InvalidInput
 from app.sim.human import model as human
 from app.sim.perception.keypoints import BODY_25, K, keypoints_of, swap_sides
-from app.sim.perception.observed_people import person_from_estimate
+from app.sim.perception.observed_people import as_monitored, person_from_estimate
 from app.sim.perception.single_frame import estimate_once
 from tests.sim.perception.cylinder_contents import holds
 from tests.sim.postures import FRAMES, POSTURES, posture
@@ -127,3 +127,34 @@ def test_a_person_of_another_size_is_found_in_that_size() -> None:
     assert estimate.person is not None and estimate.person.size is not None
     np.testing.assert_array_equal(estimate.person.size, size)
     assert estimate.misfit_m < 0.01
+
+
+def hand_behind_the_head() -> np.ndarray:
+    """Return key-points of a standing person who stretches the right arm up and backward."""
+    points = posture("standing", CELL.floor_z)
+    points[K["elbow_r"]] = points[K["shoulder_r"]] + [0.05, 0.1, 0.26]
+    points[K["wrist_r"]] = points[K["elbow_r"]] + [0.0, 0.1, 0.24]
+    return points
+
+
+@pytest.mark.parametrize(
+    "points", [posture("leaning over the table", CELL.floor_z), hand_behind_the_head()]
+)
+def test_a_hand_beyond_the_joint_limits_is_monitored_where_it_is_seen(
+    points: np.ndarray,
+) -> None:
+    estimate = estimate_once(points, CELL.body, floor_z=CELL.floor_z)
+    monitored = as_monitored(estimate)
+    assert estimate.person is not None and not estimate.held and "misfit" in estimate.flags
+    assert monitored is not None and monitored.cylinder is not None
+    x, y, r = monitored.cylinder
+    wrists = points[[K["wrist_r"], K["wrist_l"]]]
+    assert (np.hypot(wrists[:, 0] - x, wrists[:, 1] - y) < r).all()
+
+
+@pytest.mark.parametrize("name", ["standing", "arms up", "arms wide", "reaching forward"])
+def test_hands_within_the_joint_limits_are_monitored_by_joint_angles(name: str) -> None:
+    estimate = estimate_once(posture(name, CELL.floor_z), CELL.body, floor_z=CELL.floor_z)
+    monitored = as_monitored(estimate)
+    assert monitored is not None and monitored.cylinder is None
+    assert estimate.wrist_misfit_m < 0.1
