@@ -62,7 +62,7 @@ def keep(store: Store, alias: str, shipped: str = "pick") -> str:
 
 def state_of(service: TestClient) -> dict[str, Any]:
     state: dict[str, Any] = service.get("/v1/worlds/main").json()["state"]
-    return {**state, "previous": None}
+    return {**state, "previous": None, "phase": "approach", "closing_s": 0.0}
 
 
 def named(answer: Any, alias: str, sha256: str) -> bool:
