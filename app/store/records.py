@@ -14,6 +14,7 @@ JobState = Literal["queued", "running", "cancelling", "succeeded", "failed", "ca
 """``cancelling`` is a running job whose cancel was requested."""
 
 JobKind = Literal["train", "evaluate", "sweep", "report"]
+"""Kinds of jobs, as :mod:`jobs.spec` defines them."""
 
 FINAL_STATES: tuple[JobState, ...] = ("succeeded", "failed", "cancelled")
 """Final states."""

@@ -190,7 +190,8 @@ class MotionSocket:
             refused, body = _malformed(request.text, instance)
             if refused is None:
                 asked = MotionRequest.model_validate(body)
-                if asked.rollout is not None:  # it has one, or has nothing to leave out
+                # A rollout that was asked for is not left out; without one there is nothing to.
+                if asked.rollout is not None:
                     left_out = []
                 found = await answer(asked, self._services, left_out)
                 found["stream"] = use(left_out, 200)
