@@ -5,6 +5,7 @@ the bound of the key-points along them. In plan view the box is symmetric about 
 that the axis of the smallest vertical cylinder around it passes through the centre, and its
 radius is the distance of the farthest corner. The radius is multiplied by 1.1 and increased by
 a flesh margin, because key-points lie inside the body and the hands extend beyond the wrists.
+The top has the flesh margin too, above the box and above hands that point up from the wrists.
 
 Where a key-point of arms or head is unseen for longer than the hold time, the cylinder widens
 to its possible positions: every seen key-point bounds them by the length of the bones between.
@@ -58,7 +59,8 @@ class SafetyCylinder:
     bottom: float
     """Height of the lowest corner of the box [m]; take the floor where it is hidden."""
     top: float
-    """Height of the highest corner of the box with the flesh margin [m]."""
+    """Height of the highest corner of the box, or of a hand raised above its wrist, with the
+    flesh margin [m]."""
     velocity: Vec
     """Velocity of the axis [m/s], shape (2,)."""
 
@@ -138,7 +140,8 @@ def safety_cylinder(
     corners = bounding_box(points[seen])
     center = 0.5 * (corners[0] + corners[7])[:2]
     radius = float(np.linalg.norm(corners[:, :2] - center, axis=1).max())
-    top = float(corners[:, 2].max())
+    fingertips = points[list(_WRISTS), 2] + HAND_M  # a hand may point up from any forearm
+    top = float(np.nanmax([*corners[:, 2], *fingertips]))
     wide, high = _unseen_reach(points, seen, center)
     return SafetyCylinder(
         center=center,

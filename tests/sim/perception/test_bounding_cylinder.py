@@ -51,6 +51,20 @@ def test_cylinder_holds_all_keypoints_and_the_whole_surface_of_the_body() -> Non
             assert (ends[:, :, 2] + radii).max() <= found.top
 
 
+@pytest.mark.parametrize("percentile", [5.0, 50.0, 95.0])
+def test_cylinder_holds_the_body_in_any_posture_of_the_model(percentile: float) -> None:
+    """Among them arms stretched up, whose fingertips no key-point shows."""
+    size = percentile_body(percentile, percentile, percentile).vector(CELL.floor_z)
+    radii = human.capsule_radii(size)[:, None]
+    for q in np.random.default_rng(7).uniform(human.Q_MIN, human.Q_MAX, (400, 18)):
+        found = safety_cylinder(keypoints_of(q, size, CELL.floor_z))
+        assert found is not None
+        ends = human.capsules(q, size, CELL.floor_z)
+        away = np.linalg.norm(ends[:, :, :2] - found.center, axis=2) + radii
+        assert away.max() <= found.radius
+        assert (ends[:, :, 2] + radii).max() <= found.top
+
+
 def test_an_arm_never_seen_is_inside_wherever_it_is() -> None:
     for seed in (1, 2, 3):
         for q in work(seed, 12.0)[1][::5]:
