@@ -229,9 +229,10 @@ def render() -> dict[str, str]:
 
 if __name__ == "__main__":
     parser_of(__doc__).parse_args()
+    modules = render()
     TARGET.mkdir(exist_ok=True)
     for stale in TARGET.glob("*.py"):
         stale.unlink()
-    for name, text in render().items():
+    for name, text in modules.items():
         (TARGET / f"{name}.py").write_text(text, "utf-8")
         print(f"wrote {name}: {len(text.splitlines())} lines")
