@@ -1,60 +1,29 @@
 """Poses of robot and people, recorded and checked again with FCL.
 
-Evaluations of both scenarios keep the poses of some episodes and test with FCL on the raw
+Evaluations of picking and reaching keep the poses of some episodes and test with FCL on the raw
 meshes whether the kernels missed a contact.
 """
 
 from collections.abc import Sequence
-from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from app.policies.evaluation.statistics import Index
 from app.sim.cells.cell import Cell
 from app.sim.collision.fcl_recheck import Trajectory, recheck_trajectories
 from app.sim.core.arrays import Vec
 from app.sim.human import model as human
-from app.sim.robot.actions import ActionSettings
-from app.sim.robot.kernels.arm import Arm
+from app.sim.pick.batch import PickBatch
+from app.sim.reach.batch import ReachBatch
+from app.sim.robot.trajectory_segment import executed_coefficients
 from app.sim.scenario.kernels.episode import COLLISION
 from app.sim.scene.scene import FAR_AWAY
 
-Index = NDArray[np.int64]
-
-
-class RecordedSettings(Protocol):
-    """Settings of a scenario as a recording needs them."""
-
-    @property
-    def action(self) -> ActionSettings:
-        """Meaning of actions."""
-
-
-class RecordedBatch(Protocol):
-    """Batch of a scenario as a recording needs it."""
-
-    @property
-    def arm(self) -> Arm:
-        """The robot."""
-
-    @property
-    def state(self) -> Any:
-        """States of robot and people."""
-
-    @property
-    def settings(self) -> RecordedSettings:
-        """Settings of the episodes."""
-
 
 class Trace:
-    """Record robot and people of the first environments several times per control period.
+    """Record robot and people of the first environments ``parts`` times per control period."""
 
-    Args:
-        n_recorded: Number of recorded environments.
-        parts: Recorded poses per control period.
-    """
-
-    def __init__(self, batch: RecordedBatch, n_recorded: int, parts: int = 5) -> None:
+    def __init__(self, batch: PickBatch | ReachBatch, n_recorded: int, parts: int = 5) -> None:
         self._batch, self._n, self._parts = batch, n_recorded, parts
         self._robot: list[list[Vec]] = [[] for _ in range(n_recorded)]
         self._people: list[list[tuple[Vec, ...]]] = [[] for _ in range(n_recorded)]
@@ -69,24 +38,20 @@ class Trace:
 
     def after(self) -> None:
         """Add the poses of the period, except where the episode ended in a contact."""
-        state, dt = self._batch.state, self._batch.arm.dt
-        for row in self._rows:
-            if state.outcome[row] == COLLISION:
-                continue
-            c = (state.qd[row] - self._qd0[row]) / (2.0 * dt)
-            d = np.zeros(6)
-            if self._batch.settings.action.degree == 3:
-                c = 0.5 * self._qdd0[row]
-                d = (state.qdd[row] - self._qdd0[row]) / (6.0 * dt)
-            pairs = [
-                (before[row], now[row])
+        state, dt, n = self._batch.state, self._batch.arm.dt, self._n
+        rows = self._rows[state.outcome[self._rows] != COLLISION]
+        ends = (self._qd0, state.qd[:n]), (self._qdd0, state.qdd[:n])
+        c, d = executed_coefficients(self._batch.settings.action.degree, dt, *ends)
+        for part in range(1, self._parts + 1):
+            x, blend = dt * part / self._parts, part / self._parts
+            q = self._q0 + x * (self._qd0 + x * (c + x * d))
+            people = [
+                before + blend * (now[:n] - before)
                 for before, now in zip(self._people0, self._of_people(), strict=True)
             ]
-            for part in range(1, self._parts + 1):
-                x, blend = dt * part / self._parts, part / self._parts
-                q = self._q0[row] + x * (self._qd0[row] + x * (c + x * d))
-                self._robot[row].append(q)
-                self._people[row].append(tuple(a + blend * (b - a) for a, b in pairs))
+            for row in rows:
+                self._robot[row].append(q[row])
+                self._people[row].append(tuple(one[row] for one in people))
 
     def _of_people(self) -> tuple[Vec, Vec, Vec]:
         """Return joints and sizes of the workers, and the cylinders."""

@@ -8,6 +8,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from app.sim.pick.batch import OUTCOMES
 
+Index = NDArray[np.int64]
+Flags = NDArray[np.bool_]
+
 
 def wilson(hits: int, n: int) -> dict[str, float]:
     """Return a rate and its 95 % Wilson interval.
@@ -25,17 +28,22 @@ def wilson(hits: int, n: int) -> dict[str, float]:
     return {"mean": hits / n, "low": float(interval.low), "high": float(interval.high)}
 
 
-def outcome_intervals(outcome: NDArray[np.int64]) -> dict[str, Any]:
+def rate_of(held: Flags) -> dict[str, float]:
+    """Return the share of episodes in which something held, shape (n,), as :func:`wilson`."""
+    return wilson(int(held.sum()), len(held))
+
+
+def outcome_intervals(outcome: Index) -> dict[str, Any]:
     """Return the number of episodes and the rate of each outcome; unfeasible only if met.
 
     Args:
         outcome: Index of each episode into OUTCOMES, shape (n,).
     """
-    n = len(outcome)
-    counts = {name: int((outcome == k).sum()) for k, name in enumerate(OUTCOMES) if k > 0}
-    if counts["unfeasible"] == 0:
-        del counts["unfeasible"]
-    return {"n": n} | {name: wilson(count, n) for name, count in counts.items()}
+    flags = {name: outcome == k for k, name in enumerate(OUTCOMES) if k > 0}
+    rates = {name: rate_of(held) for name, held in flags.items()}
+    if not flags["unfeasible"].any():
+        del rates["unfeasible"]
+    return {"n": len(outcome), **rates}
 
 
 def mean_of(values: ArrayLike) -> dict[str, float] | None:

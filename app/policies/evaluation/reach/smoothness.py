@@ -14,22 +14,21 @@ Source: thesis 4.4.3 (joint positions and velocities over an episode, "no discon
 Deviates: accelerations and jerk are ours.
 """
 
-from dataclasses import dataclass
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from app.policies.checkpoints.checkpoint import Checkpoint
 from app.policies.evaluation.reach.bench import ReachBench
 from app.policies.evaluation.reach.episodes import run_to_end
 from app.policies.evaluation.rows import EvaluationRequest, Json
-from app.policies.evaluation.statistics import wilson
+from app.policies.evaluation.statistics import Index, rate_of
 from app.policies.inference.controllers import Controller, controller_of
 from app.sim.core.arrays import Vec
 from app.sim.reach.batch import ReachBatch
 from app.sim.reach.blocked_batch import new_reach_batch
 from app.sim.robot.kernels.arm import Arm
+from app.sim.robot.trajectory_segment import executed_coefficients
 from app.sim.scenario.kernels import episode as kernel
 
 DEFAULT_EPISODES = 1000
@@ -41,8 +40,7 @@ DIGITS = 5
 """Decimals stored of that episode."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Paths:
+class Paths(NamedTuple):
     """Robots at the ends of all control periods, NaN after the end of an episode."""
 
     q: Vec
@@ -55,7 +53,7 @@ class Paths:
     """Distance of robot and people [m], shape (n_periods + 1, n)."""
     distance: Vec
     """Distance of tcp and goal [m], same shape."""
-    outcome: NDArray[np.int64]
+    outcome: Index
     """Index into OUTCOMES, shape (n,)."""
 
 
@@ -64,7 +62,6 @@ def record_paths(batch: ReachBatch, controller: Controller, goals: Vec) -> Paths
 
     Args:
         batch: Environments, not reset.
-        controller: Controller of the robots.
         goals: Goal of each environment [m], shape (n_envs, 3).
     """
     batch.reset()
@@ -82,49 +79,8 @@ def record_paths(batch: ReachBatch, controller: Controller, goals: Vec) -> Paths
 
     record()
     run_to_end(batch, controller.acts, after=record)
-    q, qd, qdd, clearance, distance = (
-        np.array([period[i] for period in kept]) for i in range(5)
-    )
-    return Paths(
-        q=q,
-        qd=qd,
-        qdd=qdd,
-        clearance=clearance,
-        distance=distance,
-        outcome=state.outcome.copy(),
-    )
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ExecutedSegments:
-    """Polynomial segments ``q0 + v0 x + c x^2 + d x^3`` of all periods."""
-
-    q0: Vec
-    """Position at the start of each segment [rad], shape (n_periods, n, 6)."""
-    v0: Vec
-    """Speed at the start [rad/s]."""
-    c: Vec
-    """Second coefficient [rad/s^2]."""
-    d: Vec
-    """Third coefficient [rad/s^3]."""
-
-    def at(self, x: float) -> tuple[Vec, Vec, Vec]:
-        """Return positions, speeds and accelerations at local time ``x`` [s]."""
-        q = self.q0 + x * (self.v0 + x * (self.c + x * self.d))
-        v = self.v0 + x * (2.0 * self.c + 3.0 * x * self.d)
-        return q, v, 2.0 * self.c + 6.0 * x * self.d
-
-
-def segments_of(paths: Paths, degree: int, dt: float) -> ExecutedSegments:
-    """Return the executed segments, from speeds or accelerations at their ends."""
-    q0, v0 = paths.q[:-1], paths.qd[:-1]
-    if degree == 3:
-        c = 0.5 * paths.qdd[:-1]
-        return ExecutedSegments(
-            q0=q0, v0=v0, c=c, d=(paths.qdd[1:] - paths.qdd[:-1]) / (6.0 * dt)
-        )
-    c = (paths.qd[1:] - paths.qd[:-1]) / (2.0 * dt)
-    return ExecutedSegments(q0=q0, v0=v0, c=c, d=0.0 * c)
+    q, qd, qdd, clearance, distance = map(np.array, zip(*kept, strict=True))
+    return Paths(q, qd, qdd, clearance, distance, state.outcome.copy())
 
 
 def measure(paths: Paths, degree: int, arm: Arm) -> dict[str, float]:
@@ -133,9 +89,18 @@ def measure(paths: Paths, degree: int, arm: Arm) -> dict[str, float]:
     The step of the speed is the largest one consistent with the differences of positions and
     speeds between the end of a segment and the start of the next one.
     """
-    segments, dt = segments_of(paths, degree, arm.dt), arm.dt
-    q_end, v_end, a_end = segments.at(dt)
-    inside = [segments.at(dt * k / PARTS) for k in range(PARTS + 1)]
+    q0, v0, dt = paths.q[:-1], paths.qd[:-1], arm.dt
+    c, d = executed_coefficients(
+        degree, dt, (v0, paths.qd[1:]), (paths.qdd[:-1], paths.qdd[1:])
+    )
+
+    def at(x: float) -> tuple[Vec, Vec, Vec]:
+        """Return positions, speeds and accelerations at local time ``x`` [s]."""
+        q, v = q0 + x * (v0 + x * (c + x * d)), v0 + x * (2.0 * c + 3.0 * x * d)
+        return q, v, 2.0 * c + 6.0 * x * d
+
+    q_end, v_end, a_end = at(dt)
+    inside = [at(dt * k / PARTS) for k in range(PARTS + 1)]
     margins = [np.fmin(q - arm.limits.q_min, arm.limits.q_max - q) for q, _, _ in inside]
     q_step = np.nanmax(np.abs(q_end - paths.q[1:]))
     change = np.abs(np.diff(paths.qdd, axis=0)) / dt
@@ -152,15 +117,12 @@ def measure(paths: Paths, degree: int, arm: Arm) -> dict[str, float]:
         "rms_acceleration_rad_s2": np.sqrt(np.nanmean(np.square(paths.qdd[1:]))),
     }
     if degree == 3:
-        jerk = {
-            "jerk_rad_s3": np.nanmax(change),
-            "jerk_limit_rad_s3": arm.limits.jerk_max.max(),
-        }
-        found |= jerk
+        found["jerk_rad_s3"] = np.nanmax(change)
+        found["jerk_limit_rad_s3"] = arm.limits.jerk_max.max()
     return {name: float(value) for name, value in found.items()}
 
 
-def shown_episode(paths: Paths, dt: float) -> dict[str, Any] | None:
+def shown_episode(paths: Paths, dt: float) -> Json | None:
     """Return the longest of the first successes for the plot; None without a success."""
     won = np.flatnonzero(paths.outcome == kernel.SUCCESS)[:SHOWN_OF]
     if not len(won):
@@ -168,14 +130,14 @@ def shown_episode(paths: Paths, dt: float) -> dict[str, Any] | None:
     lengths = np.isfinite(paths.distance[:, won]).sum(axis=0)
     e = int(won[lengths.argmax()])
     n = int(lengths.max())
-    kept = {
-        "q_rad": paths.q[:n, e],
-        "qd_rad_s": paths.qd[:n, e],
-        "qdd_rad_s2": paths.qdd[:n, e],
-        "clearance_m": paths.clearance[:n, e],
-        "distance_m": paths.distance[:n, e],
+    shown = {
+        "q_rad": paths.q,
+        "qd_rad_s": paths.qd,
+        "qdd_rad_s2": paths.qdd,
+        "clearance_m": paths.clearance,
+        "distance_m": paths.distance,
     }
-    rounded = {name: np.round(part, DIGITS).tolist() for name, part in kept.items()}
+    rounded = {key: np.round(part[:n, e], DIGITS).tolist() for key, part in shown.items()}
     return {"episode": e, "dt_s": dt, **rounded}
 
 
@@ -189,7 +151,7 @@ def run_smoothness(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
     row = {
         "name": f"degree-{settings.action.degree}",
         "n": n,
-        "success": wilson(int((paths.outcome == kernel.SUCCESS).sum()), n),
+        "success": rate_of(paths.outcome == kernel.SUCCESS),
         **measure(paths, settings.action.degree, batch.arm),
     }
     bench.add(row, bench.variant("", goals))

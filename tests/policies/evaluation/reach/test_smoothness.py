@@ -1,7 +1,5 @@
 """Tests of measures of joint trajectories: limits, and steps at segment boundaries."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -47,7 +45,7 @@ def test_a_speed_that_jumps_is_found(paths) -> None:
     found, degree, batch = paths
     jumping = found.qd.copy()
     jumping[10, 3, 1] += 1e-4
-    row = measure(replace(found, qd=jumping), degree, batch.arm)
+    row = measure(found._replace(qd=jumping), degree, batch.arm)
     assert row["speed_jump_rad_s"] > 1e-5
 
 
@@ -55,7 +53,7 @@ def test_a_position_that_jumps_is_found(paths) -> None:
     found, degree, batch = paths
     jumping = found.q.copy()
     jumping[10:, 3, 1] += 1e-6
-    row = measure(replace(found, q=jumping), degree, batch.arm)
+    row = measure(found._replace(q=jumping), degree, batch.arm)
     assert row["position_jump_rad"] == pytest.approx(1e-6, rel=1e-3)
 
 
@@ -79,4 +77,4 @@ def test_the_shown_episode_is_the_longest_success(paths) -> None:
 
 def test_without_a_success_there_is_nothing_to_show(paths) -> None:
     found, _, _ = paths
-    assert shown_episode(replace(found, outcome=np.full(20, 2)), 0.02) is None
+    assert shown_episode(found._replace(outcome=np.full(20, 2)), 0.02) is None
