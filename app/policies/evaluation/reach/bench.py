@@ -14,7 +14,6 @@ from app.policies.checkpoints.trained_cell import cell_of
 from app.policies.evaluation.reach.episodes import (
     MAX_TIME_LEFT_S,
     ReachEpisodes,
-    random_goals,
     recheck_contacts,
     run_episodes,
     target_goals,
@@ -98,7 +97,7 @@ class ReachBench:
         self._seed, self._on_row = seed, on_row
         self._rows: list[Json] = []
         self._stated: dict[str, Json] = {}
-        self._recheck: Json | None = None
+        self._recheck: Json = {}
 
     @property
     def usual(self) -> ReachSettings:
@@ -125,10 +124,6 @@ class ReachBench:
         """Return the goals of ``n`` episodes that cycle through the targets [m], (n, 3)."""
         return target_goals(self.targets, n)
 
-    def random_goals(self, n: int) -> Vec:
-        """Return ``n`` random goals in the box [m], shape (n, 3)."""
-        return random_goals(*goal_region_of(self.cell).box(), n, self._seed)
-
     def run(self, variant: Variant) -> ReachEpisodes:
         """Run one episode per goal of a variant."""
         controller = variant.controller or controller_of(self.actor, variant.mode)
@@ -154,9 +149,8 @@ class ReachBench:
     def recheck(self, variant: Variant) -> None:
         """Check the poses of a variant's first episodes with FCL; the result states them."""
         controller = controller_of(self.actor, variant.mode)
-        self._recheck = recheck_contacts(
-            self.cell, variant.settings, controller, variant.goals, self._seed
-        )
+        shared = self.cell, variant.settings, controller, variant.goals, self._seed
+        self._recheck = {"fcl_recheck": recheck_contacts(*shared)}
 
     def add(self, row: Json, variant: Variant, n_rows: int = 1) -> None:
         """Add a row and its rules."""
@@ -171,7 +165,6 @@ class ReachBench:
 
     def result(self, **more: Any) -> Json:
         """Return the result."""
-        found = {} if self._recheck is None else {"fcl_recheck": self._recheck}
         return {
             "policy": self.actor.title,
             "settings": {
@@ -186,5 +179,5 @@ class ReachBench:
                 "rows": self._stated,
             },
             "results": self._rows,
-            **found,
+            **self._recheck,
         }

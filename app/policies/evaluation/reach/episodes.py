@@ -15,15 +15,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.policies.evaluation.contact_recheck import Trace, recheck
-from app.policies.evaluation.statistics import mean_of, outcome_intervals, wilson
+from app.policies.evaluation.statistics import Index, mean_of, outcome_intervals, rate_of
 from app.policies.inference.controllers import Controller
 from app.sim.cells.cell import Cell
 from app.sim.core.arrays import Vec
-from app.sim.reach.batch import ReachBatch, ReachSettings
+from app.sim.reach.batch import ReachBatch, ReachSettings, goal_region_of
 from app.sim.reach.blocked_batch import new_reach_batch
 from app.sim.scenario.kernels import episode as kernel
 
-Index = NDArray[np.int64]
 N_ENVS = 500
 """Maximum number of environments; fixed, because the people of an episode depend on it."""
 MAX_TIME_LEFT_S = 5.0
@@ -69,7 +68,7 @@ class ReachEpisodes:
 
     def initial_contact(self) -> dict[str, float]:
         """Return the share of episodes that begin in contact, which no policy can solve."""
-        return wilson(int((self.start_m <= 0.0).sum()), len(self.outcome))
+        return rate_of(self.start_m <= 0.0)
 
 
 def against(one: ReachEpisodes, other: ReachEpisodes) -> dict[str, float] | None:
@@ -81,82 +80,56 @@ def against(one: ReachEpisodes, other: ReachEpisodes) -> dict[str, float] | None
     return mean_of(won[0] - won[1])
 
 
-class _Queue:
-    """Run a list of episodes in a batch with fewer environments.
-
-    Args:
-        batch: Environments, not reset.
-        controller: Controller of the robots.
-        goals: Goal of each episode [m], shape (n, 3).
-    """
-
-    def __init__(self, batch: ReachBatch, controller: Controller, goals: Vec) -> None:
-        n, n_envs = len(goals), batch.n_envs
-        self._batch, self._controller, self._goals = batch, controller, goals
-        self._limit = batch.settings.time_limit_s
-        self._episode = np.arange(n_envs)
-        self._hidden = np.zeros(n_envs)
-        """Remaining time beyond the observed one [s], shape (n_envs,)."""
-        self._steps = np.zeros(n_envs, dtype=np.int64)
-        self._outcome, self._redrawn = np.zeros((2, n), dtype=np.int64)
-        self._duration, self._start = np.zeros((2, n))
-        batch.reset()
-        self._begin(np.arange(n_envs))
-
-    def _begin(self, envs: Index) -> None:
-        """Set goals and remaining times of environments that were reset."""
-        state, which = self._batch.state, self._episode[envs]
-        self._start[which] = state.clear[envs, 0]
-        self._redrawn[which] = state.n_redrawn[envs]
-        self._steps[envs] = 0
-        self._hidden[envs] = max(0.0, self._limit - MAX_TIME_LEFT_S)
-        state.time_left[envs] = min(self._limit, MAX_TIME_LEFT_S)
-        self._batch.set_goals(envs, self._goals[which])
-
-    def _period(self) -> None:
-        batch, dt = self._batch, self._batch.arm.dt
-        act = self._controller.acts(batch)
-        spent = np.minimum(self._hidden, dt)
-        np.add(batch.state.time_left, spent, out=batch.state.time_left)
-        self._hidden -= spent
-        ended = batch.step(act).ended
-        self._steps += 1
-        envs = np.flatnonzero((ended != kernel.RUNNING) & (self._episode < len(self._goals)))
-        if len(envs):
-            which = self._episode[envs]
-            self._outcome[which] = ended[envs]
-            self._duration[which] = dt * self._steps[envs]
-            self._episode[envs] += batch.n_envs
-            more = self._episode[envs] < len(self._goals)
-            batch.state.outcome[envs[~more]] = kernel.TIMEOUT
-            self._begin(envs[more])
-
-    def run(self) -> ReachEpisodes:
-        """Run until every episode has ended."""
-        while (self._episode < len(self._goals)).any():
-            self._period()
-        return ReachEpisodes(
-            goals=self._goals,
-            outcome=self._outcome,
-            duration_s=self._duration,
-            start_m=self._start,
-            redrawn=self._redrawn,
-            limit_s=self._limit,
-        )
-
-
 def run_episodes(
     cell: Cell, settings: ReachSettings, controller: Controller, goals: Vec, seed: int
 ) -> ReachEpisodes:
-    """Run one episode per goal.
+    """Run one episode per goal, in a batch with fewer environments.
 
     Args:
         settings: Start, end and people; their rule for goals is not used.
-        controller: Controller of the robots.
         goals: Goal of each episode [m], shape (n, 3).
     """
-    batch = new_reach_batch(cell, min(N_ENVS, len(goals)), seed, settings)
-    return _Queue(batch, controller, goals).run()
+    n, n_envs, limit = len(goals), min(N_ENVS, len(goals)), settings.time_limit_s
+    batch = new_reach_batch(cell, n_envs, seed, settings)
+    state, dt, episode = batch.state, batch.arm.dt, np.arange(n_envs)
+    hidden, steps = np.zeros(n_envs), np.zeros(n_envs, dtype=np.int64)
+    outcome, redrawn = np.zeros((2, n), dtype=np.int64)
+    duration, start = np.zeros((2, n))
+
+    def begin(envs: Index) -> None:
+        """Set goals and remaining times of environments that were reset."""
+        which = episode[envs]
+        start[which], redrawn[which] = state.clear[envs, 0], state.n_redrawn[envs]
+        steps[envs] = 0
+        hidden[envs] = max(0.0, limit - MAX_TIME_LEFT_S)  # beyond the observed time [s]
+        state.time_left[envs] = min(limit, MAX_TIME_LEFT_S)
+        batch.set_goals(envs, goals[which])
+
+    batch.reset()
+    begin(episode.copy())
+    while (episode < n).any():
+        act = controller.acts(batch)
+        spent = np.minimum(hidden, dt)
+        state.time_left[:] += spent
+        hidden -= spent
+        ended = batch.step(act).ended
+        steps += 1
+        envs = np.flatnonzero((ended != kernel.RUNNING) & (episode < n))
+        outcome[episode[envs]] = ended[envs]
+        duration[episode[envs]] = dt * steps[envs]
+        episode[envs] += n_envs
+        more = episode[envs] < n
+        state.outcome[envs[~more]] = kernel.TIMEOUT
+        if more.any():
+            begin(envs[more])
+    return ReachEpisodes(
+        goals=goals,
+        outcome=outcome,
+        duration_s=duration,
+        start_m=start,
+        redrawn=redrawn,
+        limit_s=limit,
+    )
 
 
 def run_to_end(
@@ -203,14 +176,11 @@ def target_goals(targets: Vec, n: int) -> Vec:
     return np.asarray(targets[np.arange(n) % len(targets)])
 
 
-def random_goals(low: Vec, high: Vec, n: int, seed: int) -> Vec:
-    """Return ``n`` uniform random goals in a box [m], shape (n, 3); fewer are the first ones.
+def random_goals(cell: Cell, n: int, seed: int) -> Vec:
+    """Return ``n`` uniform random goals in the box of a cell's goals [m], shape (n, 3).
 
-    Args:
-        low: Lower corner [m], shape (3,).
-        high: Upper corner [m], shape (3,).
-        n: Number of goals.
-        seed: Seed of the episodes; training uses other random streams.
+    Fewer goals of a seed are the first ones. Training uses other random streams.
     """
+    low, high = goal_region_of(cell).box()
     rng = np.random.default_rng([seed, 0x60A15])
     return np.asarray(low + (high - low) * rng.random((n, 3)))

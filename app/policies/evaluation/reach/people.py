@@ -101,11 +101,7 @@ def at_speed(cell: Cell, speed: float) -> Cell:
     Raises:
         InvalidInput: The cell has no pedestrian.
     """
-    walker = pedestrian_of(cell)
-    kept = set(FixedSpeedWalker.model_fields) & set(type(walker).model_fields) - {
-        "kind",
-        "speed",
-    }
-    fields = {name: getattr(walker, name) for name in kept}
-    person = FixedSpeedWalker(kind="fixed-speed", speed=speed, **fields)
+    kept = set(FixedSpeedWalker.model_fields) - {"kind", "speed"}
+    rules = pedestrian_of(cell).model_dump(include=kept)
+    person = FixedSpeedWalker(kind="fixed-speed", speed=speed, **rules)
     return cell.model_copy(update={"people": (person,)})

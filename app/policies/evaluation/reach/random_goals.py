@@ -19,13 +19,12 @@ Source: thesis 4.4.3; docs/method.md 2.4 and 2.6.
 
 from dataclasses import replace
 from itertools import pairwise, product
-from typing import Any
 
 import numpy as np
 
 from app.policies.checkpoints.checkpoint import Checkpoint
 from app.policies.evaluation.reach.bench import ReachBench, Variant, suffix_of
-from app.policies.evaluation.reach.episodes import ReachEpisodes, against
+from app.policies.evaluation.reach.episodes import ReachEpisodes, against, random_goals
 from app.policies.evaluation.rows import EvaluationRequest, Json
 from app.sim.core.arrays import Vec
 
@@ -37,20 +36,17 @@ RINGS = (0.0, 0.06, 0.09, 0.11, 0.13, 0.18)
 """Bounds of the groups by distance to the nearest target [m]."""
 
 
-def between(episodes: ReachEpisodes, targets: Vec) -> list[dict[str, Any]]:
+def between(episodes: ReachEpisodes, targets: Vec) -> list[Json]:
     """Return the rates of outcomes by the distance of goals to the nearest target.
 
     Args:
         targets: Targets [m], shape (k, 3).
     """
     distances = np.linalg.norm(episodes.goals[:, None] - targets, axis=2).min(axis=1)
-    groups = [
-        (low, high, (low <= distances) & (distances < high)) for low, high in pairwise(RINGS)
-    ]
     return [
         {"low_m": low, "high_m": high, **episodes.rates(which)}
-        for low, high, which in groups
-        if which.any()
+        for low, high in pairwise(RINGS)
+        if (which := (low <= distances) & (distances < high)).any()
     ]
 
 
@@ -58,10 +54,14 @@ def run_random(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
     """Evaluate on random goals in the box."""
     bench = ReachBench(checkpoint, request.seed, request.on_row)
     n = request.episodes or DEFAULT_EPISODES
-    usual, grid, goals = bench.usual, bench.target_goals(n), bench.random_goals(n)
+    usual, grid, goals = (
+        bench.usual,
+        bench.target_goals(n),
+        random_goals(bench.cell, n, request.seed),
+    )
     at_targets: dict[str, ReachEpisodes] = {}
 
-    def compared(variant: Variant, episodes: ReachEpisodes) -> dict[str, Any]:
+    def compared(variant: Variant, episodes: ReachEpisodes) -> Json:
         """Return the comparison with the targets for random goals within the usual time."""
         if variant.goal_set == "grid":
             at_targets[suffix_of(variant.mode)] = episodes

@@ -71,7 +71,7 @@ from app.policies.inference.controllers import Controller, RolloutController, co
 from app.policies.inference.reach_policy import ReachPolicy
 from app.policies.inference.rollout import NO_CONSTRAINT, can_roll_out, ssm_constraint_of
 from app.sim.cells.cell import Cell
-from app.sim.reach.batch import ReachSettings, goal_region_of
+from app.sim.reach.batch import ReachSettings
 from app.sim.reach.crossings import N_CROSSINGS, SEED, crossings, recorded_crossings
 from app.sim.reach.monitored.batch import HORIZON_S, MonitoredReachBatch
 from app.sim.reach.oracle_search import Acts
@@ -128,7 +128,7 @@ def random_episodes(
     cell: Cell, batch: MonitoredReachBatch, acts: Acts, n: int, seed: int
 ) -> MonitoredEpisodes:
     """Run ``n`` episodes of ``reach-random`` under the safety layer."""
-    goals, found = random_goals(*goal_region_of(cell).box(), n, seed), []
+    goals, found = random_goals(cell, n, seed), []
     for number, first in enumerate(range(0, n, N_ENVS)):
         some = goals[first : first + N_ENVS]
         batch.state.episode[:] = number

@@ -26,7 +26,7 @@ from app.policies.checkpoints.checkpoint import Checkpoint
 from app.policies.evaluation.reach.bench import ReachBench, Variant, suffix_of
 from app.policies.evaluation.reach.episodes import ReachEpisodes
 from app.policies.evaluation.rows import EvaluationRequest, Json
-from app.policies.evaluation.statistics import wilson
+from app.policies.evaluation.statistics import rate_of
 from app.sim.core.arrays import Vec
 from app.sim.reach.batch import StartRule
 from app.sim.scenario.kernels.episode import COLLISION, SUCCESS
@@ -79,13 +79,6 @@ def ends_over_time(episodes: ReachEpisodes) -> list[Json]:
     ]
 
 
-def reached_after_contact(episodes: ReachEpisodes) -> dict[str, float]:
-    """Return the share of episodes that reached the goal after a contact."""
-    early = episodes.duration_s < episodes.limit_s - 1e-6
-    reached = (episodes.outcome == COLLISION) & early
-    return wilson(int(reached.sum()), len(reached))
-
-
 def run_targets(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
     """Evaluate on all targets of the grid under three start rules."""
     bench = ReachBench(checkpoint, request.seed, request.on_row)
@@ -94,15 +87,17 @@ def run_targets(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
 
     def by_targets(variant: Variant, episodes: ReachEpisodes) -> Json:
         cells = by_target(episodes, bench.targets, bench.cell.table.height)
-        continued = not variant.settings.collision_ends
-        return {
+        row: Json = {
             "initial_contact": episodes.initial_contact(),
             "starts_redrawn": float(np.mean(episodes.redrawn > 0)),
             "worst": worst_of(cells),
             "ends": ends_over_time(episodes),
             "targets": cells,
-            **({"reached_after_contact": reached_after_contact(episodes)} if continued else {}),
         }
+        if not variant.settings.collision_ends:
+            early = episodes.duration_s < episodes.limit_s - 1e-6
+            row["reached_after_contact"] = rate_of((episodes.outcome == COLLISION) & early)
+        return row
 
     variants = [
         bench.variant(

@@ -19,7 +19,6 @@ cylinders.
 """
 
 from dataclasses import asdict, dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -167,7 +166,7 @@ def run_tracker(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
     return bench.result()
 
 
-def axis_errors(variant: Variant, _episodes: ReachEpisodes) -> dict[str, Any]:
+def axis_errors(variant: Variant, _episodes: ReachEpisodes) -> Json:
     """Return median and 95th percentile of the distance of observed and true axes [mm]."""
     if not isinstance(variant.controller, CylinderObserver):
         return {}

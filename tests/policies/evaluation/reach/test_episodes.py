@@ -1,5 +1,6 @@
 """Tests of reach episodes: which are run, and how they are counted."""
 
+from collections.abc import Generator
 from dataclasses import replace
 
 import numpy as np
@@ -8,6 +9,7 @@ import pytest
 from app.policies.evaluation.reach import episodes as reach_episodes
 from app.policies.evaluation.reach.episodes import (
     MAX_TIME_LEFT_S,
+    ReachEpisodes,
     against,
     random_goals,
     recheck_contacts,
@@ -35,9 +37,17 @@ class StillController:
         return np.zeros((batch.n_envs, 6), dtype=np.float32)
 
 
-@pytest.fixture(autouse=True)
-def few_rows(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(reach_episodes, "N_ENVS", 40)
+@pytest.fixture(autouse=True, scope="module")
+def few_rows() -> Generator[None]:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(reach_episodes, "N_ENVS", 40)
+        yield
+
+
+@pytest.fixture(scope="module")
+def straight() -> ReachEpisodes:
+    """Episodes of a robot that moves straight to its goal."""
+    return run_episodes(CELL, USUAL, Straight(), target_goals(TARGETS, 100), 5)
 
 
 def one_by_one(settings: ReachSettings, goals: np.ndarray, seed: int) -> np.ndarray:
@@ -54,18 +64,18 @@ def one_by_one(settings: ReachSettings, goals: np.ndarray, seed: int) -> np.ndar
     return np.array(found)
 
 
-def test_an_episode_does_not_depend_on_the_other_episodes_of_a_batch() -> None:
-    goals = target_goals(TARGETS, 90)
-    found = run_episodes(CELL, USUAL, Straight(), goals, 5)
-    np.testing.assert_array_equal(found.outcome, one_by_one(USUAL, goals, 5))
-    assert {SUCCESS, COLLISION} <= set(found.outcome.tolist())
+def test_an_episode_does_not_depend_on_the_other_episodes_of_a_batch(
+    straight: ReachEpisodes,
+) -> None:
+    alone = one_by_one(USUAL, straight.goals[:90], 5)
+    np.testing.assert_array_equal(straight.outcome[:90], alone)
+    assert {SUCCESS, COLLISION} <= set(alone.tolist())
 
 
-def test_fewer_episodes_are_the_first_ones() -> None:
-    goals = target_goals(TARGETS, 100)
-    every, some = (run_episodes(CELL, USUAL, Straight(), goals[:n], 5) for n in (100, 61))
-    np.testing.assert_array_equal(every.outcome[:61], some.outcome)
-    np.testing.assert_array_equal(every.duration_s[:61], some.duration_s)
+def test_fewer_episodes_are_the_first_ones(straight: ReachEpisodes) -> None:
+    some = run_episodes(CELL, USUAL, Straight(), straight.goals[:61], 5)
+    np.testing.assert_array_equal(straight.outcome[:61], some.outcome)
+    np.testing.assert_array_equal(straight.duration_s[:61], some.duration_s)
 
 
 def test_a_longer_limit_changes_only_what_would_time_out() -> None:
@@ -103,33 +113,27 @@ def test_starts_in_contact_are_those_that_end_at_once() -> None:
 
 def test_random_goals_fill_the_box_and_fewer_are_the_first_ones() -> None:
     low, high = TARGETS.min(axis=0), TARGETS.max(axis=0)
-    goals = random_goals(low, high, 2000, 5)
+    goals = random_goals(CELL, 2000, 5)
     assert ((goals >= low) & (goals <= high)).all()
     np.testing.assert_allclose(goals.mean(axis=0), 0.5 * (low + high), atol=0.03)
-    np.testing.assert_array_equal(goals[:70], random_goals(low, high, 70, 5))
-    assert not np.array_equal(goals[:70], random_goals(low, high, 70, 6))
+    np.testing.assert_array_equal(goals[:70], random_goals(CELL, 70, 5))
+    assert not np.array_equal(goals[:70], random_goals(CELL, 70, 6))
 
 
-def test_a_row_counts_every_episode_once() -> None:
-    goals = target_goals(TARGETS, 100)
-    found = run_episodes(CELL, USUAL, Straight(), goals, 5)
-    row = found.row("straight")
+def test_a_row_counts_every_episode_once(straight: ReachEpisodes) -> None:
+    row = straight.row("straight")
     assert row["n"] == 100
     shares = [row[name]["mean"] for name in ("success", "collision", "timeout")]
     assert sum(shares) == pytest.approx(1.0)
-    won = found.outcome == SUCCESS
-    assert row["time_to_goal_s"] == pytest.approx(found.duration_s[won].mean())
+    won = straight.outcome == SUCCESS
+    assert row["time_to_goal_s"] == pytest.approx(straight.duration_s[won].mean())
 
 
-def test_a_difference_is_paired() -> None:
-    goals = target_goals(TARGETS, 100)
-    one, other = (
-        run_episodes(CELL, USUAL, controller, goals, 5)
-        for controller in (Straight(), StillController())
-    )
-    same = against(one, one)
-    assert same == {"mean": 0.0, "low": 0.0, "high": 0.0}
-    assert against(one, other)["mean"] == pytest.approx((one.outcome == SUCCESS).mean())
+def test_a_difference_is_paired(straight: ReachEpisodes) -> None:
+    still = run_episodes(CELL, USUAL, StillController(), straight.goals, 5)
+    assert against(straight, straight) == {"mean": 0.0, "low": 0.0, "high": 0.0}
+    won = (straight.outcome == SUCCESS).mean()
+    assert against(straight, still)["mean"] == pytest.approx(won)
 
 
 def test_the_recheck_finds_no_missed_contact() -> None:

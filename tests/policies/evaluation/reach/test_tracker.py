@@ -1,7 +1,8 @@
 """Tests of policies that observe people through a tracker."""
 
+from functools import cache
+
 import numpy as np
-import pytest
 
 from app.policies.evaluation.reach.tracker import ROWS, CylinderObserver, CylinderSensorRow
 from app.sim.cells.cell import load_cell
@@ -30,10 +31,11 @@ class Watching(Straight):
         return super().acts(batch)
 
 
+@cache
 def watched(
     row: CylinderSensorRow | None, steps: int = 40
 ) -> tuple[Watching, np.ndarray, ReachBatch]:
-    """Run some steps; return the controller, the true people and the batch."""
+    """Run some steps, once per row; return the controller, the true people and the batch."""
     batch = ReachBatch(load_cell("shared-workspace"), N, 5, ReachSettings())
     batch.reset()
     watching, true = Watching(), []
@@ -87,9 +89,8 @@ def test_a_controller_without_observation_moves_as_without_tracker() -> None:
     np.testing.assert_array_equal(seen.state.outcome, alone.state.outcome)
 
 
-@pytest.mark.parametrize("steps", [1])
-def test_the_first_look_already_knows_the_person(steps: int) -> None:
-    watching, true, _ = watched(ROWS["100ms"], steps)
+def test_the_first_look_already_knows_the_person() -> None:
+    watching, true, _ = watched(ROWS["100ms"], 1)
     assert off(watching, true) < 1e-6
 
 
