@@ -32,7 +32,7 @@ from app.policies.checkpoints.checkpoint import Checkpoint
 from app.policies.evaluation.reach.bench import ReachBench
 from app.policies.evaluation.reach.episodes import N_ENVS
 from app.policies.evaluation.rows import EvaluationRequest, Json
-from app.policies.evaluation.statistics import wilson
+from app.policies.evaluation.statistics import Index, rate_of
 from app.policies.inference.controllers import Controller, controller_of
 from app.sim.cells.cell import Cell
 from app.sim.core.arrays import Vec
@@ -61,7 +61,6 @@ def started(cell: Cell, settings: ReachSettings, goals: Vec, seed: int) -> Reach
     """Return a batch with the first states of the episodes of ``run_episodes``.
 
     Args:
-        settings: Rules.
         goals: Goal of each episode [m], shape (n, 3).
     """
     found = ReachBatch(cell, len(goals), seed, settings)
@@ -98,43 +97,33 @@ def soonest_arrivals(cell: Cell, settings: ReachSettings, goals: Vec, seed: int)
     return np.asarray(search.resimulations.soonest[which])
 
 
-class StagedSearch:
-    """Oracle search in stages over one set of episodes.
+def search_in_stages(
+    batch: ReachBatch, controller: Controller, seed: int, rows: list[Json]
+) -> OracleSearch:
+    """Run all stages over one set of episodes; return the search.
 
     Args:
         batch: From :func:`started`.
-        rows: Receives a row of each stage.
+        rows: Receives a row of each stage, with the episodes solved so far.
     """
+    search, acts = OracleSearch(batch, seed), controller.acts
+    stages: list[tuple[str, Callable[[Index], None]]] = [
+        ("policy", lambda _: search.simulate_policy(acts)),
+        *((f"scripted-{n}", partial(search.scripted, n_each=n)) for n in SCRIPTED),
+        ("disturbed", partial(search.disturbed, n_each=DISTURBED, acts=acts)),
+        ("long", partial(search.scripted, n_each=LONG)),
+    ]
+    for name, resimulate in stages:
+        resimulate(search.unsolved())
+        solved = rate_of(search.resimulations.reached > 0)
+        rows.append({"name": name, "n": search.n, "solved": solved, **_counts(search)})
+    return search
 
-    def __init__(self, batch: ReachBatch, seed: int, rows: list[Json]) -> None:
-        self.search, self._rows = OracleSearch(batch, seed), rows
 
-    def stage(self, name: str, resimulate: Callable[[], None]) -> None:
-        """Run a stage and report the episodes solved so far."""
-        resimulate()
-        found = self.search.resimulations
-        row = {
-            "name": name,
-            "n": self.search.n,
-            "solved": wilson(int((found.reached > 0).sum()), self.search.n),
-            "doomed": wilson(int((found.untouched == 0).sum()), self.search.n),
-            "resimulations": int(found.n.sum()),
-        }
-        self._rows.append(row)
-
-    def run(self, controller: Controller) -> None:
-        """Run all stages."""
-        search = self.search
-        self.stage("policy", lambda: search.simulate_policy(controller.acts))
-        for n_each in SCRIPTED:
-            self.stage(f"scripted-{n_each}", partial(self._scripted, n_each))
-        self.stage(
-            "disturbed", lambda: search.disturbed(search.unsolved(), DISTURBED, controller.acts)
-        )
-        self.stage("long", partial(self._scripted, LONG))
-
-    def _scripted(self, n_each: int) -> None:
-        self.search.scripted(self.search.unsolved(), n_each)
+def _counts(search: OracleSearch) -> Json:
+    """Return the share of doomed episodes, and the number of resimulations."""
+    found = search.resimulations
+    return {"doomed": rate_of(found.untouched == 0), "resimulations": int(found.n.sum())}
 
 
 def verdict(search: OracleSearch, never: Any, targets: Vec, goals: Vec) -> Json:
@@ -146,23 +135,21 @@ def verdict(search: OracleSearch, never: Any, targets: Vec, goals: Vec) -> Json:
         targets: All targets [m], shape (k, 3).
         goals: Goal of each episode, one of the targets [m], shape (n, 3).
     """
-    n, solved = search.n, search.resimulations.reached > 0
-    undecided = ~solved & ~never
-    worst = []
-    for target in targets:
-        of_it = (goals == target).all(axis=1)
-        if of_it.any():
-            worst.append({"goal": target.tolist(), "solvable": float(solved[of_it].mean())})
-    worst.sort(key=lambda one: one["solvable"])
+    solved = search.resimulations.reached > 0
+    by_target = [(target, solved[(goals == target).all(axis=1)]) for target in targets]
+    shares = [
+        {"goal": target.tolist(), "solvable": float(won.mean())}
+        for target, won in by_target
+        if won.size
+    ]
     return {
         "name": "oracle",
-        "n": n,
-        "solvable": wilson(int(solved.sum()), n),
-        "never": wilson(int((never & ~solved).sum()), n),
-        "undecided": wilson(int(undecided.sum()), n),
-        "doomed": wilson(int((search.resimulations.untouched == 0).sum()), n),
-        "resimulations": int(search.resimulations.n.sum()),
-        "worst_targets": worst[:5],
+        "n": search.n,
+        "solvable": rate_of(solved),
+        "never": rate_of(never & ~solved),
+        "undecided": rate_of(~solved & ~never),
+        **_counts(search),
+        "worst_targets": sorted(shares, key=lambda one: one["solvable"])[:5],
     }
 
 
@@ -174,8 +161,7 @@ def run_oracle(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
     cell, settings = bench.cell, bench.usual
     batch = started(cell, settings, goals, request.seed)
     stages = request.rows(len(SCRIPTED) + 4)
-    search = StagedSearch(batch, request.seed, stages)
-    search.run(controller_of(bench.actor, "direct"))
+    search = search_in_stages(batch, controller_of(bench.actor, "direct"), request.seed, stages)
     arm = batch.arm
     soonest = soonest_arrivals(cell, settings, goals, request.seed)
     base = load_robot_capsules(cell.robot.tool_length, cell.robot.tool_radius).radius[0]
@@ -183,7 +169,7 @@ def run_oracle(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
     never = presumably_unsolvable(
         walks, goals, soonest, arm.dt, cell.robot.tool_radius, float(base)
     )
-    row = verdict(search.search, never, bench.targets, goals)
+    row = verdict(search, never, bench.targets, goals)
     stages.append(row)
     variant = replace(bench.variant("oracle", goals), goal_set="training targets in turn")
     bench.add(row, variant)

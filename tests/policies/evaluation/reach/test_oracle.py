@@ -6,7 +6,7 @@ import pytest
 from app.policies.evaluation.reach import oracle as reach_oracle
 from app.policies.evaluation.reach.episodes import run_episodes, target_goals
 from app.policies.evaluation.reach.oracle import (
-    StagedSearch,
+    search_in_stages,
     soonest_arrivals,
     started,
     verdict,
@@ -43,8 +43,7 @@ def short(monkeypatch) -> None:
 @pytest.mark.usefixtures("short")
 def test_every_stage_solves_as_much_or_more():
     goals, rows = target_goals(TARGETS, 54), []
-    staged = StagedSearch(started(CELL, RULES, goals, 6), 1, rows)
-    staged.run(Straight())
+    search = search_in_stages(started(CELL, RULES, goals, 6), Straight(), 1, rows)
     solved = [row["solved"]["mean"] for row in rows]
     assert solved == sorted(solved)
     assert solved[-1] > solved[0] + 0.05
@@ -52,7 +51,7 @@ def test_every_stage_solves_as_much_or_more():
         *("policy", "scripted-6", "scripted-6", "disturbed", "long")
     ]
     never = np.zeros(54, dtype=bool)
-    row = verdict(staged.search, never, TARGETS, goals)
+    row = verdict(search, never, TARGETS, goals)
     assert row["solvable"]["mean"] + row["undecided"]["mean"] == pytest.approx(1.0)
     assert row["doomed"]["mean"] <= 1.0 - row["solvable"]["mean"] + 1e-9
 
