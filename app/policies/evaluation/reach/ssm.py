@@ -57,7 +57,6 @@ from app.policies.evaluation.reach.ssm_crossings import (
     MARGIN,
     Comparison,
     CrossingRuns,
-    best_resimulations,
     run_monitored,
 )
 from app.policies.evaluation.reach.ssm_rows import (
@@ -112,15 +111,11 @@ def compare(
     comparison: Comparison, controllers: Mapping[str, Controller], rows: list[Json], suffix: str
 ) -> dict[str, CrossingRuns]:
     """Run policies, planners and the oracle over a set of crossings; add and return rows."""
-    found, limit = {}, comparison.settings.time_limit_s
-    for name, run in comparison.run(controllers).items():
-        found[name] = run()
-        rows.append(crossing_row(name + suffix, found[name].episodes, limit))
-    rng = np.random.default_rng(comparison.seed)
-    best = best_resimulations(comparison, comparison.settings.n_resimulations, rng)
-    for name, episodes in best.items():
-        rows.append(crossing_row(name + suffix, episodes, limit))
-        found[name] = CrossingRuns(episodes=episodes, overrides=[])
+    found = {}
+    for name, runs in comparison.run(controllers):
+        found[name] = runs
+        limit = comparison.settings.time_limit_s
+        rows.append(crossing_row(name + suffix, runs.episodes, limit))
     return found
 
 

@@ -1,8 +1,8 @@
 """Policies, planners and an oracle on the same crossings under the safety layer."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property
 from itertools import count
 
 import numpy as np
@@ -97,9 +97,7 @@ class Comparison:
 
     Args:
         reach: Action and observation of the policy; time limit and people are replaced.
-        safety: Assumptions of the safety layer.
         seed: Seed of planners and oracle.
-        settings: Planners and limits.
     """
 
     def __init__(
@@ -116,7 +114,6 @@ class Comparison:
         self._reach = replace(
             reach, people=("walker",), time_limit_s=settings.time_limit_s, start="uniform"
         )
-        self._configurations: list[Vec] | None = None
 
     def batch(self, *, no_person: bool = False, monitored: bool = True) -> MonitoredReachBatch:
         """Return a batch at the start of all crossings."""
@@ -127,10 +124,12 @@ class Comparison:
 
     def copies(self, number: int, n: int) -> MonitoredReachBatch:
         """Return a batch of ``n`` copies of one crossing; actions are joint speeds."""
-        tracks = np.repeat(self.crossed.tracks[number][None], n, axis=0)
-        goals = np.repeat(self.crossed.goals[number][None], n, axis=0)
+        rows = np.full(n, number)
         reach = replace(self._reach, action=ActionSettings())
-        return self._batch(tracks, goals, reach, MonitoringSettings(rest_ends=False))
+        monitoring = MonitoringSettings(rest_ends=False)
+        return self._batch(
+            self.crossed.tracks[rows], self.crossed.goals[rows], reach, monitoring
+        )
 
     def _batch(
         self, tracks: Vec, goals: Vec, reach: ReachSettings, monitoring: MonitoringSettings
@@ -143,12 +142,10 @@ class Comparison:
         batch.set_goals(np.arange(n), goals)
         return batch
 
+    @cached_property
     def configurations(self) -> list[Vec]:
-        """Return the configurations at each goal [rad], shape (k, 6) each."""
-        if self._configurations is None:
-            arm = arm_of(self.cell)
-            self._configurations = goal_configurations_of(arm, self.crossed.goals, self.seed)
-        return self._configurations
+        """Configurations at each goal [rad], shape (k, 6) each."""
+        return goal_configurations_of(arm_of(self.cell), self.crossed.goals, self.seed)
 
     def policy(self, controller: Controller, *, no_person: bool = False) -> CrossingRuns:
         """Run a policy over all crossings."""
@@ -165,24 +162,24 @@ class Comparison:
         """Run a planner over all crossings; a blind one ignores people."""
         batch = self.batch(no_person=no_person, monitored=monitored)
         overrides, _ = drive_planner(
-            batch, self.configurations(), settings, self.seed + 1, blind=blind
+            batch, self.configurations, settings, self.seed + 1, blind=blind
         )
         return CrossingRuns(episodes=batch.runs(), overrides=overrides)
 
-    def run(
-        self, controllers: Mapping[str, Controller]
-    ) -> dict[str, Callable[[], CrossingRuns]]:
-        """Return the runs of policies and planners by row, each started when called."""
-        runs: dict[str, Callable[[], CrossingRuns]] = {
-            name: partial(self.policy, controller) for name, controller in controllers.items()
-        }
+    def run(self, controllers: Mapping[str, Controller]) -> Iterator[tuple[str, CrossingRuns]]:
+        """Yield the runs of policies, planners and the oracle, by row."""
+        for name, controller in controllers.items():
+            yield name, self.policy(controller)
         for name, settings in self.settings.planners.items():
-            runs[name] = partial(self.planner, settings)
-        runs["policy-no-person"] = partial(self.policy, controllers["policy"], no_person=True)
-        planner = partial(self.planner, self.settings.without_people)
-        runs["planner-no-person"] = partial(planner, no_person=True)
-        runs["planner-no-ssm"] = partial(planner, blind=True, monitored=False)
-        return runs
+            yield name, self.planner(settings)
+        planner = self.settings.without_people
+        yield "policy-no-person", self.policy(controllers["policy"], no_person=True)
+        yield "planner-no-person", self.planner(planner, no_person=True)
+        yield "planner-no-ssm", self.planner(planner, blind=True, monitored=False)
+        rng = np.random.default_rng(self.seed)
+        best = best_resimulations(self, self.settings.n_resimulations, rng)
+        for name, episodes in best.items():
+            yield name, CrossingRuns(episodes=episodes, overrides=[])
 
 
 def best_resimulations(
@@ -192,23 +189,21 @@ def best_resimulations(
 
     If no resimulation of a crossing arrives untouched, the first one represents it; the
     least-stopped one only has to arrive.
-
-    Args:
-        n_each: Resimulations of each crossing.
     """
-    earliest, least_stopped = [], []
-    for number, configurations in enumerate(comparison.configurations()):
+    found: dict[str, list[MonitoredEpisodes]] = {"oracle": [], "oracle-least-stopped": []}
+    for number, configurations in enumerate(comparison.configurations):
         batch = comparison.copies(number, n_each)
         first, until = sample_detours(batch.arm, rng, n_each, LONGEST_WAIT)
         until[0] = 0.0
         last = configurations[rng.integers(len(configurations), size=n_each)]
         run_to_end(batch, _detours(batch.arm, first, until, last), features=False)
         runs = batch.runs()
-        good = runs.arrived & ~runs.touched_at_rest
-        earliest.append(_least(runs, np.where(good, runs.seconds, np.inf)))
-        stops = runs.stopped_s + 1e-3 * runs.seconds
-        least_stopped.append(_least(runs, np.where(runs.arrived, stops, np.inf)))
-    return {"oracle": joined(earliest), "oracle-least-stopped": joined(least_stopped)}
+        untouched = np.where(runs.touched_at_rest, np.inf, runs.seconds)
+        costs = untouched, runs.stopped_s + 1e-3 * runs.seconds
+        for best, cost in zip(found.values(), costs, strict=True):
+            least = np.argmin(np.where(runs.arrived, cost, np.inf), keepdims=True)
+            best.append(selected(runs, least))
+    return {name: joined(best) for name, best in found.items()}
 
 
 def _detours(arm: Arm, first: Vec, until: Vec, last: Vec) -> Acts:
@@ -220,8 +215,3 @@ def _detours(arm: Arm, first: Vec, until: Vec, last: Vec) -> Acts:
         return toward(arm, batch.state.q, np.where(early[:, None], first, last))
 
     return acts
-
-
-def _least(runs: MonitoredEpisodes, cost: Vec) -> MonitoredEpisodes:
-    """Return the run with the least cost."""
-    return selected(runs, np.argmin(cost, keepdims=True))

@@ -1,28 +1,24 @@
 """Rows and comparisons of ``reach-ssm``, from episodes under the safety layer."""
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 
-from app.policies.evaluation.statistics import mean_of, ratio_values, wilson
+from app.policies.evaluation.rows import Json
+from app.policies.evaluation.statistics import Flags, mean_of, rate_of, ratio_values
+from app.sim.core.arrays import Vec
 from app.sim.scenario.monitoring import MonitoredEpisodes
-
-Json = dict[str, Any]
 
 
 def crossing_row(name: str, runs: MonitoredEpisodes, time_limit_s: float) -> Json:
     """Return the result row of crossings; `ssm.py` defines the measures.
 
     Args:
-        runs: Runs of all crossings.
         time_limit_s: Time of runs that do not arrive in ``time_capped_s`` [s].
     """
-    n, arrived = len(runs.arrived), runs.arrived
+    arrived = runs.arrived
     return {
         "name": name,
-        "n": n,
-        "arrived": wilson(int(arrived.sum()), n),
+        "n": len(arrived),
+        "arrived": rate_of(arrived),
         "time_s": _spread(runs.seconds[arrived]),
         "time_capped_s": _spread(np.where(arrived, runs.seconds, time_limit_s)),
         "time_untouched_s": _spread(runs.seconds[arrived & ~runs.touched_at_rest]),
@@ -30,8 +26,8 @@ def crossing_row(name: str, runs: MonitoredEpisodes, time_limit_s: float) -> Jso
         "stopped_s": _spread(runs.stopped_s),
         "standstill_s": _spread(runs.standstill_s),
         "standstill_stopped_s": _spread(runs.standstill_stopped_s),
-        "never_stopped": wilson(int((runs.stopped_s == 0.0).sum()), n),
-        "never_at_standstill": wilson(int((runs.standstill_stopped_s == 0.0).sum()), n),
+        "never_stopped": rate_of(runs.stopped_s == 0.0),
+        "never_at_standstill": rate_of(runs.standstill_stopped_s == 0.0),
         "joint_path_rad": _spread(runs.joint_path[arrived]),
         "tool_path_m": _spread(runs.tool_path[arrived]),
         **_contacts(runs),
@@ -40,15 +36,14 @@ def crossing_row(name: str, runs: MonitoredEpisodes, time_limit_s: float) -> Jso
 
 def random_row(name: str, runs: MonitoredEpisodes) -> Json:
     """Return the result row of random episodes."""
-    n = len(runs.arrived)
     touched = runs.touched_moving | runs.touched_at_rest | runs.touched_cell
     return {
         "name": name,
-        "n": n,
-        "success": wilson(int(runs.arrived.sum()), n),
-        "contact": wilson(int(touched.sum()), n),
-        "moving_rate": wilson(int(runs.touched_moving.sum()), n),
-        "timeout": wilson(int((~runs.arrived & ~touched).sum()), n),
+        "n": len(touched),
+        "success": rate_of(runs.arrived),
+        "contact": rate_of(touched),
+        "moving_rate": rate_of(runs.touched_moving),
+        "timeout": rate_of(~runs.arrived & ~touched),
         "time_s": _spread(runs.seconds[runs.arrived]),
         **_contacts(runs),
     }
@@ -66,7 +61,7 @@ def _contacts(runs: MonitoredEpisodes) -> Json:
     }
 
 
-def _spread(values: NDArray[np.floating]) -> dict[str, float] | None:
+def _spread(values: Vec) -> dict[str, float] | None:
     """Return mean, standard deviation and 95 % interval; None without values."""
     found = mean_of(values)
     if found is None:
@@ -82,14 +77,12 @@ def against(one: MonitoredEpisodes, other: MonitoredEpisodes, time_limit_s: floa
     to the other's time, over all of them.
 
     Args:
-        one: Runs of all crossings.
-        other: Runs of the same crossings.
         time_limit_s: Time of runs that do not arrive [s].
     """
     untouched = one.arrived & other.arrived & ~one.touched_at_rest & ~other.touched_at_rest
     times = [np.where(runs.arrived, runs.seconds, time_limit_s) for runs in (one, other)]
 
-    def saving(which: NDArray[np.bool_]) -> Json | None:
+    def saving(which: Flags) -> Json | None:
         if not which.any():
             return None
         saved, usual = (times[1] - times[0])[which], times[1][which]
