@@ -72,14 +72,21 @@ def is_as_expected(case: Case, run: CaseRun) -> bool | None:
         return None
     if run.end != "reached" or not run.choices:
         return False
-    least, most = case.switches
-    switches = len(run.choices) - 1
-    return (
-        run.choices[-1].goal == case.expected
-        and case.first in (None, run.choices[0].goal)
-        and least <= switches
-        and (most is None or switches <= most)
-    )
+    return all(clauses_of(case, run).values())
+
+
+def clauses_of(case: Case, run: CaseRun) -> dict[str, bool]:
+    """Return whether first choice, switches and last goal of a run are those of a case.
+
+    Args:
+        run: A run with a choice.
+    """
+    (least, most), switches = case.switches, len(run.choices) - 1
+    return {
+        "first": case.first in (None, run.choices[0].goal),
+        "switches": least <= switches and (most is None or switches <= most),
+        "end": run.choices[-1].goal == case.expected,
+    }
 
 
 def judge(case: Case, run: CaseRun, label: Label) -> Verdict:
