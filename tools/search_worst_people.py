@@ -21,12 +21,11 @@ from scipy.optimize import differential_evolution
 
 from app.policies.checkpoints import pretrained
 from app.policies.checkpoints.checkpoint import Checkpoint
-from app.policies.checkpoints.trained_cell import cell_of
 from app.policies.evaluation.pick import selection_rules
-from app.policies.evaluation.pick.episodes import CANDIDATES, Evaluator, settings_for
+from app.policies.evaluation.pick.episodes import PickBench
 from app.policies.evaluation.pick.worst_people import FILE, HandMotion, beside
+from app.policies.evaluation.rows import EvaluationRequest
 from app.policies.inference.task_selection import HYSTERESIS
-from app.policies.inference.value_networks import ValueNetworks, pick_preset_of
 from app.sim.core.arrays import Vec
 from tools.arguments import parser_of
 
@@ -71,12 +70,9 @@ def success_beside(
     Returns:
         Rates with one success and one failure added, shape (len(motions),).
     """
-    cell, usual = (
-        cell_of(checkpoint.manifest),
-        settings_for(CANDIDATES, pick_preset_of(checkpoint)),
-    )
-    settings, n = beside(usual, cell, motions), per_motion * len(motions)
-    evaluator = Evaluator(ValueNetworks(checkpoint), cell, n, seed, settings)
+    request = EvaluationRequest(episodes=per_motion * len(motions), seed=seed)
+    bench = PickBench(checkpoint, request)
+    evaluator = bench.evaluator(beside(bench.usual, bench.cell, motions))
     won = evaluator.run(selection_rules.critic(HYSTERESIS)).succeeded
     track = evaluator.batch.state.people.track[:, 0]
     hits = np.bincount(track, weights=won, minlength=len(motions))

@@ -25,12 +25,11 @@ import torch
 from app.cli.recordings import clean_runs
 from app.errors import InvalidInput
 from app.policies.checkpoints.checkpoint import Checkpoint, load
-from app.policies.checkpoints.trained_cell import cell_of
 from app.policies.evaluation.pick import selection_rules
-from app.policies.evaluation.pick.episodes import CANDIDATES, Evaluator, settings_for
+from app.policies.evaluation.pick.episodes import PickBench
+from app.policies.evaluation.rows import EvaluationRequest
 from app.policies.evaluation.statistics import clustered
 from app.policies.inference.task_selection import HYSTERESIS
-from app.policies.inference.value_networks import ValueNetworks, pick_preset_of
 from app.provenance import describe
 from app.sim.mocap.importer import Motion
 from app.sim.people.human_motion_config import at_the_table
@@ -92,15 +91,12 @@ def tests(usual: PickSettings, recorded: tuple[Motion, ...]) -> dict[str, PickSe
 
 def successes(checkpoint: Checkpoint, motions: Sequence[Motion], episodes: int) -> Json:
     """Return the success rate of a policy in each test."""
-    cell = cell_of(checkpoint.manifest)
-    recorded = tuple(at_the_table(motion, cell) for motion in motions)
-    usual = settings_for(CANDIDATES, pick_preset_of(checkpoint))
-    networks, rates = ValueNetworks(checkpoint), {}
-    for name, settings in tests(usual, recorded).items():
-        evaluator = Evaluator(networks, cell, episodes, SEED, settings)
+    bench, rates = PickBench(checkpoint, EvaluationRequest(episodes=episodes, seed=SEED)), {}
+    recorded = tuple(at_the_table(motion, bench.cell) for motion in motions)
+    for name, settings in tests(bench.usual, recorded).items():
         one = settings.n_candidates == (1, 1)
         rule = selection_rules.fixed(0) if one else selection_rules.critic(HYSTERESIS)
-        rates[name] = evaluator.run(rule).row(name)["success"]["mean"]  # type: ignore[index]
+        rates[name] = bench.evaluator(settings).run(rule).row(name)["success"]["mean"]
     return rates
 
 

@@ -19,22 +19,20 @@ Source: Guo et al., *On calibration of modern neural networks* (2017); Brier (19
 
 from dataclasses import replace
 from functools import partial
-from typing import Any
 
 import numpy as np
 import scipy  # loads scipy.stats where it is first used
-from numpy.typing import NDArray
 
 from app.errors import InvalidInput
 from app.policies.checkpoints.checkpoint import Checkpoint
-from app.policies.checkpoints.trained_cell import cell_of
-from app.policies.evaluation.pick.episodes import Evaluator, SelectionInput, settings_for
+from app.policies.evaluation.pick.episodes import PickBench, SelectionInput
 from app.policies.evaluation.pick.people import beside_recordings
 from app.policies.evaluation.pick.tasks import FASTER, PAIR, settings_of
 from app.policies.evaluation.rows import EvaluationRequest, Json
+from app.policies.evaluation.statistics import Flags, Index
 from app.policies.inference.recalibration import fit_map, with_timeout
-from app.policies.inference.value_networks import ValueNetworks, pick_preset_of
 from app.policies.training.pick import work_of, workers_of
+from app.sim.core.arrays import Vec
 from app.sim.pick.batch import PickBatch, PickSettings
 from app.sim.scenario.kernels.episode import COLLISION, SUCCESS
 
@@ -47,7 +45,6 @@ LATEST_S = 4.0
 """Latest time at which a prediction is taken [s]."""
 SHORT_TIME = "short-time"
 """Row of episodes with any time left."""
-Float = NDArray[np.float64]
 
 
 class _Predictions:
@@ -56,16 +53,12 @@ class _Predictions:
     def __init__(self, n: int, dt: float, seed: int) -> None:
         self._at = np.random.default_rng(seed).integers(1, round(LATEST_S / dt), n)
         self._step = 0
-        self.rows: list[NDArray[np.int64]] = []
-        self.predictions: list[Float] = []
+        self.rows: list[Index] = []
+        self.predictions: list[Vec] = []
         """Probabilities of success and contact, half widths of their intervals, (k, 4)."""
 
-    def __call__(self, view: SelectionInput) -> NDArray[np.int64]:
-        wanted = (
-            np.ones(len(view.rows), dtype=bool)
-            if view.first
-            else self._at[view.rows] == self._step
-        )
+    def __call__(self, view: SelectionInput) -> Index:
+        wanted = view.first | (self._at[view.rows] == self._step)
         self._step += 1
         if wanted.any() and view.outcomes is not None:
             self.rows.append(view.rows[wanted])
@@ -79,32 +72,31 @@ def run_calibration(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
     Raises:
         InvalidInput: The checkpoint predicts no outcomes, or there is too much recorded motion.
     """
-    networks, cell = ValueNetworks(checkpoint), cell_of(checkpoint.manifest)
-    if not networks.predicts:
+    bench = PickBench(checkpoint, request, (1, 1), DEFAULT_EPISODES)
+    if not bench.networks.predicts:
         raise InvalidInput("checkpoint", checkpoint.sha256[:12], "must predict outcomes")
-    preset = pick_preset_of(checkpoint)
-    usual = settings_for((1, 1), preset)
-    trained = replace(work_of(preset.people), seed=usual.work.seed)
+    usual, trained_beside = bench.usual, bench.preset.people
+    trained = replace(work_of(trained_beside), seed=usual.work.seed)
     kinds: dict[str, PickSettings] = {
         "library": usual,
         "faster": replace(usual, work=replace(usual.work, pace=FASTER)),
         "two-people": replace(usual, people=PAIR),
         "off-task": replace(usual, work=replace(usual.work, off_task=1.0)),
         "stops": replace(usual, work=replace(usual.work, at_rest=1.0)),
-        "mixture": replace(usual, people=workers_of(preset.people), work=trained),
+        "mixture": replace(usual, people=workers_of(trained_beside), work=trained),
         SHORT_TIME: usual,
     }
     if request.motions:
-        kinds["recorded"] = beside_recordings(usual, request.motions, cell)
-    n, rows, stated = request.episodes or DEFAULT_EPISODES, request.rows(len(kinds)), {}
+        kinds["recorded"] = beside_recordings(usual, request.motions, bench.cell)
+    n, rows, stated = bench.n, request.rows(len(kinds)), {}
     for name, settings in kinds.items():
-        evaluator = Evaluator(networks, cell, n, request.seed, settings)
+        evaluator = bench.evaluator(settings)
         rule = _Predictions(n, evaluator.batch.arm.dt, request.seed)
-        start = partial(_shorten, seed=request.seed) if name == SHORT_TIME else _keep
+        start = partial(_shorten, seed=request.seed) if name == SHORT_TIME else None
         run = evaluator.run(rule, start=start, predicts=True)
         kept = np.concatenate(rule.rows)
         found = np.concatenate(rule.predictions)
-        row: dict[str, Any] = {"name": name, "n": n, "predictions": len(kept)}
+        row: Json = {"name": name, "n": n, "predictions": len(kept)}
         corrected = _recalibrated(found, run.outcome, kept, request.seed)
         for k, (what, outcome) in enumerate((("success", SUCCESS), ("contact", COLLISION))):
             happened = run.outcome[kept] == outcome
@@ -113,12 +105,8 @@ def run_calibration(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
                 size: _errors(one[:, k], happened) for size, one in corrected.items()
             }
         rows.append(row)
-        stated[name] = settings_of(evaluator)
+        stated[name] = settings_of(evaluator.batch)
     return {"settings": stated, "results": rows}
-
-
-def _keep(batch: PickBatch) -> None:
-    """Leave the starts of the episodes as they are."""
 
 
 def _shorten(batch: PickBatch, seed: int) -> None:
@@ -128,12 +116,12 @@ def _shorten(batch: PickBatch, seed: int) -> None:
 
 
 def calibration(
-    probability: Float,
-    spread: Float,
-    happened: NDArray[np.bool_],
-    episode: NDArray[np.int64],
+    probability: Vec,
+    spread: Vec,
+    happened: Flags,
+    episode: Index,
     seed: int,
-) -> dict[str, Any]:
+) -> Json:
     """Return measures of calibration of predicted probabilities.
 
     Args:
@@ -167,9 +155,7 @@ def calibration(
     }
 
 
-def _recalibrated(
-    found: Float, outcome: NDArray[np.int64], episode: NDArray[np.int64], seed: int
-) -> dict[str, Float]:
+def _recalibrated(found: Vec, outcome: Index, episode: Index, seed: int) -> dict[str, Vec]:
     """Return probabilities after recalibrations, each half of the episodes by the other one.
 
     Args:
@@ -192,29 +178,26 @@ def _recalibrated(
     return corrected
 
 
-def _errors(probability: Float, happened: NDArray[np.bool_]) -> dict[str, float]:
+def _errors(probability: Vec, happened: Flags) -> dict[str, float]:
     """Return expected calibration error and Brier score."""
     brier = float(((probability - happened) ** 2).mean())
     return {"ece": _ece(probability, happened, _bins(probability)), "brier": brier}
 
 
-def _bins(probability: Float) -> list[NDArray[np.int64]]:
+def _bins(probability: Vec) -> list[Index]:
     """Return the predictions of each bin; fewer bins where there are fewer predictions."""
     return np.array_split(np.argsort(probability, kind="stable"), min(BINS, len(probability)))
 
 
-def _ece(
-    probability: Float, happened: NDArray[np.bool_], parts: list[NDArray[np.int64]]
-) -> float:
+def _ece(probability: Vec, happened: Flags, parts: list[Index]) -> float:
     errors = [abs(probability[one].mean() - happened[one].mean()) * len(one) for one in parts]
     return float(sum(errors) / len(probability))
 
 
-def _auc(probability: Float, happened: NDArray[np.bool_]) -> float | None:
+def _auc(probability: Vec, happened: Flags) -> float | None:
     """Return the area under the ROC curve; None where all outcomes are equal."""
-    positive = int(happened.sum())
-    negative = len(happened) - positive
-    if not positive or not negative:
+    positive, negative = probability[happened], probability[~happened]
+    if not len(positive) or not len(negative):
         return None
-    ranks = scipy.stats.rankdata(probability)[happened].sum()
-    return float((ranks - positive * (positive + 1) / 2) / (positive * negative))
+    higher = scipy.stats.mannwhitneyu(positive, negative).statistic
+    return float(higher / (len(positive) * len(negative)))

@@ -12,7 +12,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from app.policies.checkpoints.checkpoint import Checkpoint
-from app.policies.evaluation.pick.cases import ENDS, SETTINGS, CaseBench, CaseEpisodes
+from app.policies.evaluation.pick.cases import ENDS, SETTINGS, CaseEpisodes, run_together
+from app.policies.evaluation.pick.episodes import PickBench
 from app.policies.evaluation.rows import EvaluationRequest, Json
 from app.policies.evaluation.statistics import clustered
 from app.sim.pick.batch import OUTCOMES
@@ -31,7 +32,7 @@ Shares = dict[str, float | None]
 
 def run_case_variants(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
     """Evaluate all variants of the four case studies from jittered starts."""
-    bench, n = CaseBench(checkpoint, request.seed), request.episodes or DEFAULT_STARTS
+    bench = PickBench(checkpoint, request, default=DEFAULT_STARTS)
     cases, each = cases_of(bench.cell), []
     rows = request.rows(len(cases) + 1)
     for number, case in enumerate(cases):
@@ -39,32 +40,25 @@ def run_case_variants(checkpoint: Checkpoint, request: EvaluationRequest) -> Jso
         rngs = [np.random.default_rng([request.seed, number, k]) for k in range(len(variants))]
         jobs, shares = list(zip(variants, rngs, strict=True)), []
         for first in range(0, len(jobs), TOGETHER):
-            found, _ = bench.run(jobs[first : first + TOGETHER], n)
+            found, _ = run_together(bench, jobs[first : first + TOGETHER])
             shares += [shares_of(one) for one in found]
-        rows.append(row_of(case.id, n, shares))
+        rows.append(row_of(case.id, bench.n, shares))
         pairs = list(zip(variants, shares, strict=True))
         each += [{"name": one.id, "expected": one.expected, **share} for one, share in pairs]
         if case.id == WITH_PART:
-            part = [
-                share for one, share in pairs if not other_goal_free_at_end(bench.cell, one)
-            ]
-            rows.append(row_of(f"{case.id}, other goal not free at the end", n, part))
+            name = f"{case.id}, other goal not free at the end"
+            part = [one for case, one in pairs if not other_goal_free_at_end(bench.cell, case)]
+            rows.append(row_of(name, bench.n, part))
     settings = {**SETTINGS, "definition": dict(DEFINITION)}
     return {"settings": settings, "results": rows, "variants": each}
 
 
 def row_of(name: str, n: int, shares: Sequence[Shares]) -> Json:
-    """Return a row: means over variants, with intervals.
-
-    Args:
-        name: Name of the row.
-        n: Starts of each variant.
-        shares: Shares of each variant.
-    """
-    means = {}
-    for key in shares[0]:
-        known = [share for one in shares if (share := one[key]) is not None]
-        means[key] = clustered(known)
+    """Return a row: means over variants of ``n`` starts each, with intervals."""
+    means = {
+        key: clustered([share for one in shares if (share := one[key]) is not None])
+        for key in shares[0]
+    }
     return {"name": name, "n": n, "variants": len(shares), "runs": n * len(shares), **means}
 
 

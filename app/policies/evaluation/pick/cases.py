@@ -8,31 +8,28 @@ too. The same starts are run with the nearest candidate and with each goal alone
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from app.policies.checkpoints.checkpoint import Checkpoint
-from app.policies.checkpoints.trained_cell import cell_of
 from app.policies.evaluation.pick import selection_rules
 from app.policies.evaluation.pick.episodes import (
     Episodes,
     Evaluator,
+    PickBench,
     Rule,
     SelectionInput,
-    settings_for,
 )
+from app.policies.evaluation.pick.people import played
 from app.policies.evaluation.rows import EvaluationRequest, Json
-from app.policies.evaluation.statistics import wilson
+from app.policies.evaluation.statistics import Flags, Index, rate_of
 from app.policies.inference.task_selection import HYSTERESIS
-from app.policies.inference.value_networks import ValueNetworks, pick_preset_of
 from app.sim.cells.cell import Cell
-from app.sim.core.arrays import Vec
 from app.sim.mocap.importer import Motion
 from app.sim.people.human_motion_config import HumanMotionConfig
-from app.sim.pick.batch import OUTCOMES, Flags, PickBatch
-from app.sim.pick.case_verdict import CaseRun, End, is_as_expected
+from app.sim.pick.batch import OUTCOMES, PickBatch
+from app.sim.pick.case_verdict import CaseRun, End, clauses_of, is_as_expected
 from app.sim.pick.cases import Case, cases_of, script_of
 
 DEFAULT_EPISODES = 200
@@ -42,8 +39,8 @@ JITTER_PALM = 0.015
 """Largest change of the palm per coordinate [m]."""
 JITTER_DELAY = 0.2
 """Largest change of the time at which the person moves [s]."""
-TRACK_S, TRACK_DT = 9.0, 0.02
-"""Length and sampling of the person's motion [s]; the person rests after its end."""
+TRACK_S = 9.0
+"""Length of the person's motion [s]; the person rests after its end."""
 CURVE_DT = 0.1
 """Time between the values of the curves [s]."""
 SETTINGS: Json = {
@@ -62,10 +59,10 @@ class _Recorder:
     dt: float
     runs: dict[int, list[tuple[float, int]]]
     """Time and candidate of each change of the choice, by episode."""
-    values: list[tuple[NDArray[np.int64], NDArray[np.float32]]]
+    values: list[tuple[Index, NDArray[np.float32]]]
     """Running episodes and values of their candidates, by step."""
 
-    def __call__(self, view: SelectionInput) -> NDArray[np.int64]:
+    def __call__(self, view: SelectionInput) -> Index:
         choice = self.rule(view)
         t = self.dt * len(self.values)
         for row, place in zip(view.rows.tolist(), choice.tolist(), strict=True):
@@ -96,87 +93,80 @@ class CaseEpisodes:
 
 def run_cases(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
     """Evaluate the four case studies from jittered starts."""
-    bench, n = CaseBench(checkpoint, request.seed), request.episodes or DEFAULT_EPISODES
+    bench = PickBench(checkpoint, request, default=DEFAULT_EPISODES)
     cases, curves = cases_of(bench.cell), {}
     rows = request.rows(len(cases))
     for case in cases:
         rng = np.random.default_rng([request.seed, len(case.id), ord(case.id[-1])])
-        (found,), choices = bench.run([(case, rng)], n)
+        (found,), choices = run_together(bench, [(case, rng)])
         rows.append(_row(found))
-        curves[case.id] = _curves(case, choices, n)
+        curves[case.id] = _curves(case, choices, bench.n)
     return {"settings": SETTINGS, "results": rows, "curves": curves}
 
 
-class CaseBench:
-    """Runs case studies from jittered starts with the policy of a checkpoint."""
+def run_together(
+    bench: PickBench, cases: Sequence[tuple[Case, np.random.Generator]]
+) -> tuple[list[CaseEpisodes], _Recorder]:
+    """Run cases together, each from the bench's number of starts, jittered by its generator.
 
-    def __init__(self, checkpoint: Checkpoint, seed: int) -> None:
-        self.cell = cell_of(checkpoint.manifest)
-        self._networks, self._seed = ValueNetworks(checkpoint), seed
-        self._preset = pick_preset_of(checkpoint)
-
-    def run(
-        self, cases: Sequence[tuple[Case, np.random.Generator]], n: int
-    ) -> tuple[list[CaseEpisodes], _Recorder]:
-        """Run cases together, from ``n`` starts each, whose jitter their generators draw.
-
-        Returns:
-            The runs of each case, and choices and values of the critic in all of them.
-        """
-        evaluator, start = self._evaluator(cases, n)
-        dt = evaluator.batch.arm.dt
-        critic = _Recorder(selection_rules.critic(HYSTERESIS), dt, {}, [])
-        nearest = _Recorder(selection_rules.nearest, dt, {}, [])
-        run, near, *alone = (
-            evaluator.run(rule, start=start)
-            for rule in (critic, nearest, selection_rules.fixed(0), selection_rules.fixed(1))
-        )
-        found = []
-        for k, (case, _) in enumerate(cases):
-            rows = range(n * k, n * (k + 1))
-            pairs = zip(case.goals, alone, strict=True)
-            found.append(
-                CaseEpisodes(
-                    case=case,
-                    run=run.part(rows),
-                    clauses=_clauses(case, run, critic, rows),
-                    nearest=near.part(rows),
-                    nearest_clauses=_clauses(case, near, nearest, rows),
-                    alone={goal: one.succeeded[rows] for goal, one in pairs},
-                )
+    Returns:
+        The runs of each case, and choices and values of the critic in all of them.
+    """
+    evaluator, start = _evaluator(bench, cases)
+    dt = evaluator.batch.arm.dt
+    critic = _Recorder(selection_rules.critic(HYSTERESIS), dt, {}, [])
+    nearest = _Recorder(selection_rules.nearest, dt, {}, [])
+    run, near, *alone = (
+        evaluator.run(rule, start=start)
+        for rule in (critic, nearest, selection_rules.fixed(0), selection_rules.fixed(1))
+    )
+    found = []
+    for k, (case, _) in enumerate(cases):
+        rows = range(bench.n * k, bench.n * (k + 1))
+        pairs = zip(case.goals, alone, strict=True)
+        found.append(
+            CaseEpisodes(
+                case=case,
+                run=run.part(rows),
+                clauses=_clauses(case, run, critic, rows),
+                nearest=near.part(rows),
+                nearest_clauses=_clauses(case, near, nearest, rows),
+                alone={goal: one.succeeded[rows] for goal, one in pairs},
             )
-        return found, critic
+        )
+    return found, critic
 
-    def _evaluator(
-        self, cases: Sequence[tuple[Case, np.random.Generator]], n: int
-    ) -> tuple[Evaluator, Callable[[PickBatch], None]]:
-        """Return the episodes of cases, and what puts people, robots and candidates in place.
 
-        Each person has one of the motions of its case.
-        """
-        motions: list[Motion] = []
-        jitter = []
-        for case, rng in cases:
-            motions += [_motion(self.cell, case, rng, number) for number in range(n)]
-            jitter.append(JITTER_Q * rng.uniform(-1.0, 1.0, (n, 6)) * (1, 1, 1, 1, 1, 0))
-        work = HumanMotionConfig(motion="recorded", recorded=tuple(motions), loop=False)
-        settings = replace(settings_for((2, 2), self._preset), work=work, start="uniform")
-        evaluator = Evaluator(self._networks, self.cell, len(motions), self._seed, settings)
-        world = evaluator.batch.world
-        names = [station.id for station in self.cell.pick_stations]
-        over = [world.station_q[names.index(case.robot_start)] for case, _ in cases]
-        starts = np.concatenate([q + change for q, change in zip(over, jitter, strict=True)])
-        goals = [[names.index(goal) for goal in case.goals] for case, _ in cases]
-        first = np.repeat(np.arange(0, len(motions), n), n)
+def _evaluator(
+    bench: PickBench, cases: Sequence[tuple[Case, np.random.Generator]]
+) -> tuple[Evaluator, Callable[[PickBatch], None]]:
+    """Return the episodes of cases, and what puts people, robots and candidates in place.
 
-        def start(batch: PickBatch) -> None:
-            people, tracks = batch.state.people, world.people.tracks
-            people.track[:, 0] = people.body[:, 0] = first + people.track[:, 0] % n
-            people.q[:, 0] = tracks.rows[tracks.spans[people.track[:, 0], 0], :18]
-            batch.state.candidates[:, :2] = np.repeat(goals, n, axis=0)
-            batch.set_starts(starts)
+    Each person has one of the motions of its case.
+    """
+    motions: list[Motion] = []
+    jitter, n, cell = [], bench.n, bench.cell
+    for case, rng in cases:
+        motions += [_motion(cell, case, rng, number) for number in range(n)]
+        jitter.append(JITTER_Q * rng.uniform(-1.0, 1.0, (n, 6)) * (1, 1, 1, 1, 1, 0))
+    work = HumanMotionConfig(motion="recorded", recorded=tuple(motions), loop=False)
+    settings = replace(bench.usual, n_candidates=(2, 2), work=work, start="uniform")
+    batch = PickBatch(cell, len(motions), bench.request.seed, settings)
+    world = batch.world
+    names = [station.id for station in cell.pick_stations]
+    over = [world.station_q[names.index(case.robot_start)] for case, _ in cases]
+    starts = np.concatenate([q + change for q, change in zip(over, jitter, strict=True)])
+    goals = [[names.index(goal) for goal in case.goals] for case, _ in cases]
+    first = np.repeat(np.arange(0, len(motions), n), n)
 
-        return evaluator, start
+    def start(batch: PickBatch) -> None:
+        people, tracks = batch.state.people, world.people.tracks
+        people.track[:, 0] = people.body[:, 0] = first + people.track[:, 0] % n
+        people.q[:, 0] = tracks.rows[tracks.spans[people.track[:, 0], 0], :18]
+        batch.state.candidates[:, :2] = np.repeat(goals, n, axis=0)
+        batch.set_starts(starts)
+
+    return Evaluator(bench.networks, batch), start
 
 
 def _motion(cell: Cell, case: Case, rng: np.random.Generator, number: int) -> Motion:
@@ -184,56 +174,39 @@ def _motion(cell: Cell, case: Case, rng: np.random.Generator, number: int) -> Mo
     x, y, z = case.palm_offset + JITTER_PALM * rng.uniform(-1.0, 1.0, 3)
     delay = max(0.0, case.delay_s + JITTER_DELAY * rng.uniform(-1.0, 1.0))
     script = script_of(cell, replace(case, palm_offset=(x, y, z), delay_s=delay))
-    times = np.arange(0.0, TRACK_S, TRACK_DT)
-    q: Vec = np.array([script.at(float(t))[0] for t in times])
-    return Motion(
-        name=f"{case.id}-{number}",
-        source="script",
-        times=times,
-        q=q,
-        pelvis_z=np.zeros(len(times)),
-        size=cell.human.size,
-        first_frame=0,
-    )
+    return played(script, TRACK_S, cell, f"{case.id}-{number}", "script")
 
 
 def _clauses(
     case: Case, run: Episodes, recorder: _Recorder, rows: Sequence[int]
 ) -> dict[str, Flags]:
     """Return whether each clause of a case, and all of them, hold in runs, shape (n,) each."""
-    names = ("first", "switches", "end", "as_expected")
-    found = {name: np.zeros(len(rows), dtype=np.bool_) for name in names}
-    least, most = case.switches
-    for k, e in enumerate(rows):
-        choices = [(t, case.goals[place]) for t, place in recorder.runs[e]]
+    found = []
+    for e in rows:
         story = CaseRun()
-        for t, goal in choices:
-            story = story.choose(t, goal)
+        for t, place in recorder.runs[e]:
+            story = story.choose(t, case.goals[place])
         story = story.finish(ENDS[OUTCOMES[run.outcome[e]]], float(run.duration_s[e]))
-        switches = len(choices) - 1
-        found["first"][k] = case.first in (None, choices[0][1])
-        found["switches"][k] = least <= switches and (most is None or switches <= most)
-        found["end"][k] = choices[-1][1] == case.expected
-        found["as_expected"][k] = bool(is_as_expected(case, story))
-    return found
+        verdict = {"as_expected": bool(is_as_expected(case, story))}
+        found.append(clauses_of(case, story) | verdict)
+    return {name: np.array([one[name] for one in found]) for name in found[0]}
 
 
-def _row(found: CaseEpisodes) -> dict[str, Any]:
+def _row(found: CaseEpisodes) -> Json:
     """Return the row of a case: each clause and the verdict, with 95 % intervals."""
-    case, n = found.case, len(found.run.outcome)
-    rates = {name: wilson(int(held.sum()), n) for name, held in found.clauses.items()}
+    case = found.case
     beside = {"nearest": found.nearest.succeeded}
     beside |= {f"{goal} alone": won for goal, won in found.alone.items()}
     expected = {"first": case.first, "switches": list(case.switches), "end": case.expected}
     return {
         **found.run.row(case.id),
-        **rates,
+        **{name: rate_of(held) for name, held in found.clauses.items()},
         "expected": expected,
-        "beside": {name: wilson(int(won.sum()), n) for name, won in beside.items()},
+        "beside": {name: rate_of(won) for name, won in beside.items()},
     }
 
 
-def _curves(case: Case, recorder: _Recorder, n: int) -> dict[str, Any]:
+def _curves(case: Case, recorder: _Recorder, n: int) -> Json:
     """Return median and quartiles of each goal's value over time, of the running episodes."""
     every = max(1, round(CURVE_DT / recorder.dt))
     goals: dict[str, list[list[float]]] = {goal: [] for goal in case.goals}

@@ -6,17 +6,21 @@ the same start under every rule, so that rules are compared on the same episodes
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
+from app.policies.checkpoints.checkpoint import Checkpoint
+from app.policies.checkpoints.trained_cell import cell_of
 from app.policies.configs.pick import PickPreset
 from app.policies.evaluation.contact_recheck import Trace
-from app.policies.evaluation.statistics import outcome_intervals
-from app.policies.inference.value_networks import ValueNetworks
-from app.sim.cells.cell import Cell
+from app.policies.evaluation.rows import EvaluationRequest, Json
+from app.policies.evaluation.statistics import Flags, Index, outcome_intervals
+from app.policies.inference.value_networks import ValueNetworks, pick_preset_of
 from app.sim.collision.checker import Shapes
 from app.sim.collision.fcl_recheck import Trajectory
+from app.sim.core.arrays import Vec
 from app.sim.core.observation_layout import slices_of
 from app.sim.people.human_motion_config import HumanMotionConfig
 from app.sim.people.kernels.people import new_people_geometry, observe_people_of_envs
@@ -34,7 +38,6 @@ from app.sim.pick.resting_people import PickTarget, RestingPeoplePlanner
 from app.sim.scenario.kernels import episode as kernel
 from app.sim.scene.scene import NO_CYLINDERS, people_geometry_of
 
-Index = NDArray[np.int64]
 SECOND_GOAL = slices_of(PICK_SIZES)["second_goal_clearance"].start
 """Index of the clearance of the second person at the object."""
 CANDIDATES = (2, 3)
@@ -49,16 +52,16 @@ class SelectionInput:
 
     values: NDArray[np.float32]
     """Critic's value of each candidate, -inf where there are fewer, shape (n, k)."""
-    distances: NDArray[np.float64]
+    distances: Vec
     """Distance from tcp to each candidate [m], inf where there are fewer, shape (n, k)."""
-    clearances: NDArray[np.float64]
+    clearances: Vec
     """Clearance to people of the configuration at each candidate's object [m], -inf where there
     are fewer, shape (n, k)."""
     chosen: Index
     """Candidate pursued so far, shape (n,); undefined at the first step."""
     first: bool
     """Whether this is the first step."""
-    outcomes: NDArray[np.float64] | None
+    outcomes: Vec | None
     """Probabilities of success and contact and the half widths of their intervals, 0 where
     there are fewer candidates, shape (n, k, 4); None where the checkpoint predicts none."""
     rows: Index
@@ -68,16 +71,19 @@ class SelectionInput:
 Rule = Callable[[SelectionInput], Index]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ObservedPeople:
-    """Observed people of each running environment, the nearest to the robot first."""
+class ObservedPeople(NamedTuple):
+    """Observed people of each of n environments, the nearest to the robot first."""
 
-    q: NDArray[np.float64]
+    q: Vec
     """Joint positions [m, rad], shape (n, P, 18)."""
-    qd: NDArray[np.float64]
+    qd: Vec
     """Joint speeds [m/s, rad/s], shape (n, P, 18)."""
-    size: NDArray[np.float64]
+    size: Vec
     """Body dimensions [m], shape (n, P, 12)."""
+
+    def of(self, rows: Index) -> Self:
+        """Return the people that some of the environments observe."""
+        return type(self)(*(part[rows] for part in self))
 
 
 PeopleObserver = Callable[[PickBatch, Index], ObservedPeople]
@@ -107,7 +113,7 @@ class Episodes:
 
     outcome: Index
     """Index into OUTCOMES, shape (n,)."""
-    duration_s: NDArray[np.float64]
+    duration_s: Vec
     """Time to the end [s], shape (n,)."""
     switches: Index
     """Number of changes of the target, shape (n,)."""
@@ -115,9 +121,9 @@ class Episodes:
     """Robot and each worker of the recorded episodes."""
 
     @property
-    def succeeded(self) -> NDArray[np.bool_]:
+    def succeeded(self) -> Flags:
         """Whether each episode succeeded, shape (n,)."""
-        success: NDArray[np.bool_] = self.outcome == kernel.SUCCESS
+        success: Flags = self.outcome == kernel.SUCCESS
         return success
 
     def part(self, rows: Sequence[int]) -> "Episodes":
@@ -129,15 +135,13 @@ class Episodes:
             trajectories=(),
         )
 
-    def row(self, name: str) -> dict[str, object]:
+    def row(self, name: str) -> Json:
         """Return the result row of these episodes, rates with 95 % intervals."""
-        succeeded = self.succeeded
+        times = self.duration_s[self.succeeded]
         return {
             "name": name,
             **outcome_intervals(self.outcome),
-            "time_to_success_s": float(self.duration_s[succeeded].mean())
-            if succeeded.any()
-            else None,
+            "time_to_success_s": float(times.mean()) if len(times) else None,
             "switches_per_episode": float(self.switches.mean()),
         }
 
@@ -152,12 +156,10 @@ def time_limits(preset: PickPreset) -> tuple[float, ...]:
 
 
 def settings_for(n_candidates: tuple[int, int], preset: PickPreset) -> PickSettings:
-    """Return the settings of evaluations: start clearance 0.05 m, people of the library.
+    """Return the settings of evaluations: start clearance 0.05 m, the usual time limit.
 
-    The time limit is the usual one.
-
-    Postures and samples of these people do not occur in training. They do not yield to the
-    robot, even if the checkpoint was trained beside yielding people.
+    Postures and samples of the library's people do not occur in training. These people do not
+    yield to the robot, even if the checkpoint was trained beside yielding people.
 
     Args:
         n_candidates: Minimum and maximum number of targets offered.
@@ -175,30 +177,24 @@ def settings_for(n_candidates: tuple[int, int], preset: PickPreset) -> PickSetti
 
 
 class Evaluator:
-    """Episodes of one seed, run once per selection rule."""
+    """Episodes of a batch, run once per selection rule.
 
-    def __init__(
-        self,
-        networks: ValueNetworks,
-        cell: Cell,
-        n_episodes: int,
-        seed: int,
-        settings: PickSettings,
-        new_batch: Callable[[Cell, int, int, PickSettings], PickBatch] = PickBatch,
-    ) -> None:
-        self._networks = networks
-        self.batch = new_batch(cell, n_episodes, seed, settings)
-        self._workspace = observation_workspace_of(self.batch.cell)
-        world, grasp = self.batch.world, settings.grasp
-        found = target_configurations(self.batch.arm, grasp, world.stations)
-        self._station_q, self._grasp_q, _ = found
+    Args:
+        batch: One environment per episode.
+    """
+
+    def __init__(self, networks: ValueNetworks, batch: PickBatch) -> None:
+        self._networks, self.batch = networks, batch
+        self._workspace = observation_workspace_of(batch.cell)
+        grasp, stations = batch.settings.grasp, batch.world.stations
+        self._station_q, self._grasp_q, _ = target_configurations(batch.arm, grasp, stations)
 
     def run(
         self,
         rule: Rule,
         n_recorded: int = 0,
         observe: PeopleObserver = observe_exactly,
-        start: Callable[[PickBatch], None] = lambda _batch: None,
+        start: Callable[[PickBatch], None] | None = None,
         predicts: bool = False,
         planned: bool = False,
     ) -> Episodes:
@@ -206,7 +202,6 @@ class Evaluator:
 
         Args:
             rule: Selection rule.
-            n_recorded: Number of episodes with recorded poses.
             observe: Observation model; a stateful one serves one run only.
             start: Changes the starts of the episodes.
             predicts: Whether the rule reads the predicted outcomes.
@@ -214,7 +209,8 @@ class Evaluator:
         """
         batch, n = self.batch, self.batch.n_envs
         batch.reset()
-        start(batch)
+        if start is not None:
+            start(batch)
         chosen, switches = np.zeros(n, dtype=np.int64), np.zeros(n, dtype=np.int64)
         act = np.zeros((n, 5), dtype=np.float32)
         trace, first = Trace(batch, n_recorded), True
@@ -312,7 +308,7 @@ class Evaluator:
         states = queries(
             batch.settings.grasp,
             (state.q[env], state.qd[env]),
-            (observed.q[owner], observed.qd[owner], observed.size[owner]),
+            observed.of(owner),
             (batch.world.stations[station], self._station_q[station], self._grasp_q[station]),
             (phase, np.where(phase != APPROACH, state.closing[env], 0.0)),
         )
@@ -344,7 +340,35 @@ class Evaluator:
         return actions, view
 
 
-def goal_clearance(obs: NDArray[np.float32]) -> NDArray[np.float64]:
+class PickBench:
+    """A pick policy, and the episodes on which a request evaluates it.
+
+    Args:
+        n_candidates: Fewest and most targets offered.
+        default: Number of episodes where the request states none.
+    """
+
+    def __init__(
+        self,
+        checkpoint: Checkpoint,
+        request: EvaluationRequest,
+        n_candidates: tuple[int, int] = CANDIDATES,
+        default: int = 1000,
+    ) -> None:
+        self.networks, self.cell = ValueNetworks(checkpoint), cell_of(checkpoint.manifest)
+        self.preset, self.request = pick_preset_of(checkpoint), request
+        self.n = request.episodes or default
+        """Number of episodes."""
+        self.usual = settings_for(n_candidates, self.preset)
+        """Settings of the usual episodes."""
+
+    def evaluator(self, settings: PickSettings) -> Evaluator:
+        """Return the episodes under some settings."""
+        batch = PickBatch(self.cell, self.n, self.request.seed, settings)
+        return Evaluator(self.networks, batch)
+
+
+def goal_clearance(obs: NDArray[np.float32]) -> Vec:
     """Return the clearance at the object that observations state [m], shape (n,)."""
     least = obs[:, LAYOUT["goal_clearance"].start].astype(np.float64)
     if obs.shape[1] == N_PICK:

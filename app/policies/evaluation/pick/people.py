@@ -18,44 +18,38 @@ Source: docs/method.md 3.4 and 4 (several people; a model whose dimensions are k
 that reacts).
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
 from app.errors import InvalidInput
 from app.policies.checkpoints.checkpoint import Checkpoint
-from app.policies.checkpoints.trained_cell import cell_of
 from app.policies.evaluation.pick import selection_rules
-from app.policies.evaluation.pick.episodes import (
-    CANDIDATES,
-    Episodes,
-    Evaluator,
-    settings_for,
-)
+from app.policies.evaluation.pick.episodes import Episodes, Evaluator, PickBench, Rule
 from app.policies.evaluation.pick.tasks import settings_of
 from app.policies.evaluation.rows import EvaluationRequest, Json
-from app.policies.evaluation.statistics import wilson
+from app.policies.evaluation.statistics import rate_of, wilson
 from app.policies.inference.task_selection import HYSTERESIS
-from app.policies.inference.value_networks import ValueNetworks, pick_preset_of
 from app.sim.cells.cell import Cell
 from app.sim.collision.contact import clearance
 from app.sim.human.anthropometry import percentile_body
 from app.sim.mocap.importer import Motion
 from app.sim.people.human_motion_config import HumanMotionConfig, at_the_table
+from app.sim.people.reach_script import ReachScript
 from app.sim.pick.batch import DEFAULT_ACTION, PickBatch, PickSettings
 from app.sim.robot.kernels.arm import CONTROLLED
 from app.sim.scenario.kernels.episode import COLLISION, RUNNING, TIMEOUT
 from app.sim.scene.scene import HumanKind
 
-DEFAULT_EPISODES = 1000
 YIELDING_LEVELS = (0.0, 0.5, 1.0)
 """Strengths of yielding."""
 MAX_RECORDED_S = 36_000
 """Maximum duration of recorded motion in one evaluation [s]; its tracks take 274 MB."""
 DRAWN_S = 0.1
 """Duration of recorded motion for which a run is listed once more [s]."""
+SAMPLE_S = 0.02
+"""Sampling step of motion made from scripts [s]."""
 STILL_PACE = 1e-6
 """Pace of people who stand still."""
 ALONE_M = 0.5
@@ -64,34 +58,32 @@ SMALL, LARGE = 5.0, 95.0
 """Percentiles of stature; arms and shoulders scale with it."""
 
 
-class ChoiceBench:
-    """Evaluate one checkpoint under several settings on episodes of one seed."""
+def beside_each(
+    bench: PickBench, rows: Mapping[str, PickSettings], planners: Sequence[bool] = (False,)
+) -> Json:
+    """Return the result with one row per settings, under the critic's choice.
 
-    def __init__(self, checkpoint: Checkpoint, request: EvaluationRequest) -> None:
-        self._networks = ValueNetworks(checkpoint)
-        self.cell = cell_of(checkpoint.manifest)
-        self.usual = settings_for(CANDIDATES, pick_preset_of(checkpoint))
-        self._request, self._n = request, request.episodes or DEFAULT_EPISODES
+    Args:
+        planners: Whether a planner acts beside people at rest, for the rows of one setting.
+    """
+    stated, rule = Json(hysteresis=HYSTERESIS), selection_rules.critic(HYSTERESIS)
+    results = bench.request.rows(len(rows) * len(planners))
+    for name, settings in rows.items():
+        evaluator = bench.evaluator(settings)
+        touched = _touched_at_rest(evaluator.batch)
+        for _, row in _runs(evaluator, rule, name, planners):
+            results.append(row | {"touched_at_rest": touched})
+        stated[name] = settings_of(evaluator.batch)
+    return {"settings": stated, "results": results}
 
-    def all(
-        self, rows: Mapping[str, PickSettings], planners: Sequence[bool] = (False,)
-    ) -> dict[str, Any]:
-        """Return the result with one row per settings.
 
-        Args:
-            planners: Whether a planner acts beside people at rest, for the rows of one setting.
-        """
-        stated: Json = {"hysteresis": HYSTERESIS}
-        results, seed = self._request.rows(len(rows) * len(planners)), self._request.seed
-        for name, settings in rows.items():
-            evaluator = Evaluator(self._networks, self.cell, self._n, seed, settings)
-            touched = _touched_at_rest(evaluator.batch)
-            for planned in planners:
-                run = evaluator.run(selection_rules.critic(HYSTERESIS), planned=planned)
-                row = run.row(_with_planner(name) if planned else name)
-                results.append(row | {"touched_at_rest": touched})
-            stated[name] = settings_of(evaluator)
-        return {"settings": stated, "results": results}
+def _runs(
+    evaluator: Evaluator, rule: Rule, name: str, planners: Sequence[bool]
+) -> Iterator[tuple[Episodes, Json]]:
+    """Yield the same episodes without and with a planner beside people at rest, and rows."""
+    for planned in planners:
+        run = evaluator.run(rule, planned=planned)
+        yield run, run.row(f"{name}, planner" if planned else name)
 
 
 def _planners(settings: PickSettings) -> tuple[bool, ...]:
@@ -103,42 +95,38 @@ def _planners(settings: PickSettings) -> tuple[bool, ...]:
     return (False, True) if whole else (False,)
 
 
-def _with_planner(name: str) -> str:
-    """Return the name of a row in which a planner acts beside people at rest."""
-    return f"{name}, planner"
-
-
 def _touched_at_rest(batch: PickBatch) -> dict[str, float]:
     """Return the rate of episodes in which people touch a robot that stays at its start."""
     batch.reset()
     rest = np.zeros((batch.n_envs, CONTROLLED), dtype=np.float32)
     while (batch.state.outcome == RUNNING).any():
         batch.step(rest, auto_reset=False, features=False)
-    return wilson(int((batch.state.outcome == COLLISION).sum()), batch.n_envs)
-
-
-def _sized(work: HumanMotionConfig, percentile: float, pelvis: float) -> HumanMotionConfig:
-    return replace(work, bodies=(percentile_body(percentile, pelvis=pelvis),))
+    return rate_of(batch.state.outcome == COLLISION)
 
 
 def run_people(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
     """Evaluate beside 0 to 4 people and people of several sizes."""
-    bench = ChoiceBench(checkpoint, request)
+    bench = PickBench(checkpoint, request)
     usual, pelvis = bench.usual, bench.cell.human.pelvis_height
-    small, large = (_sized(usual.work, share, pelvis) for share in (SMALL, LARGE))
+    small, large = (
+        replace(usual.work, bodies=(percentile_body(share, pelvis=pelvis),))
+        for share in (SMALL, LARGE)
+    )
 
     def beside(*people: HumanKind, work: HumanMotionConfig = usual.work) -> PickSettings:
         return replace(usual, people=people, work=work)
 
     worker: HumanKind = "worker"
-    rows = {f"{n}-people": beside(*(worker,) * n) for n in range(5)}
-    rows |= {"1-person-p5": beside(worker, work=small)}
-    rows |= {"1-person-p95": beside(worker, work=large)}
-    rows |= {"3-people-p5": beside(*(worker,) * 3, work=small)}
-    rows |= {"3-people-p95": beside(*(worker,) * 3, work=large)}
-    rows |= {"worker-and-walker": beside(worker, "walker")}
-    rows |= {"first-reaches": replace(usual, work=replace(usual.work, motion="reaches"))}
-    return bench.all(rows)
+    rows = {
+        **{f"{n}-people": beside(*(worker,) * n) for n in range(5)},
+        "1-person-p5": beside(worker, work=small),
+        "1-person-p95": beside(worker, work=large),
+        "3-people-p5": beside(*(worker,) * 3, work=small),
+        "3-people-p95": beside(*(worker,) * 3, work=large),
+        "worker-and-walker": beside(worker, "walker"),
+        "first-reaches": replace(usual, work=replace(usual.work, motion="reaches")),
+    }
+    return beside_each(bench, rows)
 
 
 def run_rest(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
@@ -150,8 +138,8 @@ def run_rest(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
     A timeout is *blocked* where the configuration at the object, or over it, is closer to the
     person than a grasp permits, and *alone* where nobody is within ALONE_M of the robot.
     """
-    usual = settings_for((1, 1), pick_preset_of(checkpoint))
-    networks, cell = ValueNetworks(checkpoint), cell_of(checkpoint.manifest)
+    bench = PickBench(checkpoint, request, (1, 1))
+    usual, planners = bench.usual, _planners(bench.usual)
     still = replace(usual.work, pace=STILL_PACE)
     rows = {
         "library": still,
@@ -160,16 +148,12 @@ def run_rest(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
         "stops": replace(usual.work, at_rest=1.0, off_task=0.5),
         "works": usual.work,
     }
-    planners, n = _planners(usual), request.episodes or DEFAULT_EPISODES
     results = request.rows(len(rows) * len(planners))
     for name, work in rows.items():
-        settings = replace(usual, work=work)
-        evaluator = Evaluator(networks, cell, n, request.seed, settings)
-        for planned in planners:
-            run = evaluator.run(selection_rules.fixed(0), planned=planned)
-            row = run.row(_with_planner(name) if planned else name)
+        evaluator = bench.evaluator(replace(usual, work=work))
+        for run, row in _runs(evaluator, selection_rules.fixed(0), name, planners):
             results.append(row | _timeouts(evaluator.batch, run))
-    return {"settings": settings_of(evaluator), "results": results}
+    return {"settings": settings_of(evaluator.batch), "results": results}
 
 
 def _timeouts(batch: PickBatch, run: Episodes) -> dict[str, dict[str, float]]:
@@ -194,16 +178,13 @@ def run_yielding(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
 
     Each with the policy alone, and with a planner beside people at rest.
     """
-    bench = ChoiceBench(checkpoint, request)
+    bench = PickBench(checkpoint, request)
     usual = bench.usual
-
-    def beside(strength: float) -> PickSettings:
-        return replace(usual, work=replace(usual.work, yielding=strength))
-
-    return bench.all(
-        {f"yielding-{strength:g}": beside(strength) for strength in YIELDING_LEVELS},
-        planners=_planners(usual),
-    )
+    rows = {
+        f"yielding-{strength:g}": replace(usual, work=replace(usual.work, yielding=strength))
+        for strength in YIELDING_LEVELS
+    }
+    return beside_each(bench, rows, _planners(usual))
 
 
 def beside_recordings(
@@ -228,15 +209,27 @@ def beside_recordings(
     return replace(settings, work=work)
 
 
+def played(script: ReachScript, end_s: float, cell: Cell, name: str, source: str) -> Motion:
+    """Return a script as a motion of the cell's person, from 0 to ``end_s`` [s]."""
+    times = np.arange(0.0, end_s, SAMPLE_S)
+    return Motion(
+        name=name,
+        source=source,
+        times=times,
+        q=np.array([script.at(float(t))[0] for t in times]),
+        pelvis_z=np.zeros(len(times)),
+        size=cell.human.size,
+        first_frame=0,
+    )
+
+
 def run_mocap(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
     """Evaluate beside recorded people, with the library's people as the first row.
 
     Raises:
-        InvalidInput: There is no recorded motion, or more than ``MAX_RECORDED_S``.
+        InvalidInput: There is more than ``MAX_RECORDED_S`` of recorded motion.
     """
-    if not request.motions:
-        raise InvalidInput("motions", 0, "must hold at least one recording")
-    bench = ChoiceBench(checkpoint, request)
+    bench = PickBench(checkpoint, request)
     usual, cell = bench.usual, bench.cell
     files = sorted({motion.name for motion in request.motions})
     rows = {"library": usual, "recorded": beside_recordings(usual, request.motions, cell)}
@@ -247,7 +240,7 @@ def run_mocap(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
             )
             for name in files
         }
-    result = bench.all(rows)
+    result = beside_each(bench, rows)
     result["settings"]["motions"] = [
         {"source": motion.source, "seconds": round(float(motion.times[-1]), 2)}
         for motion in request.motions

@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from app.policies.evaluation.pick.episodes import Index, Rule, SelectionInput
+from app.policies.evaluation.pick.episodes import Rule, SelectionInput
+from app.policies.evaluation.statistics import Index
 from app.policies.inference.task_selection import select
 
 

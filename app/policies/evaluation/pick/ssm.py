@@ -32,16 +32,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from app.policies.checkpoints.checkpoint import Checkpoint
-from app.policies.checkpoints.trained_cell import cell_of
 from app.policies.evaluation.pick import selection_rules
-from app.policies.evaluation.pick.episodes import CANDIDATES, Evaluator, settings_for
+from app.policies.evaluation.pick.episodes import CANDIDATES, Evaluator, PickBench
 from app.policies.evaluation.pick.tasks import settings_of
 from app.policies.evaluation.rows import EvaluationRequest, Json
-from app.policies.evaluation.statistics import mean_of, wilson
+from app.policies.evaluation.statistics import mean_of, rate_of
 from app.policies.inference.task_selection import HYSTERESIS
-from app.policies.inference.value_networks import ValueNetworks, pick_preset_of
-from app.sim.cells.cell import Cell
-from app.sim.pick.batch import PickBatch, PickSettings
 from app.sim.pick.monitored_batch import AMONG_HANDS, MonitoredPickBatch
 from app.sim.safety.layer import SafetySettings
 from app.sim.scenario.monitoring import MonitoredEpisodes, MonitoringSettings, joined
@@ -67,76 +63,49 @@ class Condition:
     """Whether the safety layer acts."""
     choice: bool = False
     """Whether the critic chooses among 2 or 3 targets."""
-    against: str | None = None
-    """Row of the same episodes without the layer; None for those themselves."""
 
 
 CONDITIONS: Mapping[str, Condition] = {
     "no-ssm": Condition(active=False),
-    "ssm": Condition(against="no-ssm"),
-    "ssm-short-reaction": Condition(safety=SHORT_REACTION, against="no-ssm"),
-    "ssm-distance": Condition(safety=SafetySettings(), against="no-ssm"),
-    "pfl": Condition(safety=replace(AMONG_HANDS, pfl=True), against="no-ssm"),
+    "ssm": Condition(),
+    "ssm-short-reaction": Condition(safety=SHORT_REACTION),
+    "ssm-distance": Condition(safety=SafetySettings()),
+    "pfl": Condition(safety=replace(AMONG_HANDS, pfl=True)),
     "choice-no-ssm": Condition(active=False, choice=True),
-    "choice-ssm": Condition(choice=True, against="choice-no-ssm"),
-    "choice-ssm-short-reaction": Condition(
-        safety=SHORT_REACTION, choice=True, against="choice-no-ssm"
-    ),
-    "choice-ssm-fast-hands": Condition(safety=FAST_HANDS, choice=True, against="choice-no-ssm"),
+    "choice-ssm": Condition(choice=True),
+    "choice-ssm-short-reaction": Condition(safety=SHORT_REACTION, choice=True),
+    "choice-ssm-fast-hands": Condition(safety=FAST_HANDS, choice=True),
 }
-"""Conditions by row."""
+"""Conditions by row; ``no-ssm`` and ``choice-no-ssm`` come before those compared with them."""
 
 
-def conditions_in(cell: Cell) -> dict[str, Condition]:
-    """Return the conditions of a cell; a choice needs as many stations as it offers."""
-    can_choose = len(cell.pick_stations) >= CANDIDATES[1]
-    return {name: one for name, one in CONDITIONS.items() if can_choose or not one.choice}
+def batch_of(bench: PickBench, condition: Condition, first: int) -> MonitoredPickBatch:
+    """Return up to CHUNK episodes from number ``first`` on."""
+    monitoring = MonitoringSettings(active=condition.active, rest_ends=False)
+    candidates = CANDIDATES if condition.choice else (1, 1)
+    settings = replace(bench.usual, n_candidates=candidates, time_limit_s=TIME_LIMIT_S)
+    shared = bench.request.seed, settings, condition.safety, monitoring, first
+    return MonitoredPickBatch(bench.cell, min(CHUNK, bench.n - first), *shared)
 
 
-class MonitoredPicks:
-    """Episodes of a policy under the safety layer."""
-
-    def __init__(self, checkpoint: Checkpoint, n_episodes: int, seed: int) -> None:
-        self._networks, self.cell = ValueNetworks(checkpoint), cell_of(checkpoint.manifest)
-        self._preset = pick_preset_of(checkpoint)
-        self._n, self._seed = n_episodes, seed
-
-    def evaluator(self, condition: Condition, first: int) -> Evaluator:
-        """Return the evaluator of up to CHUNK episodes from number ``first`` on."""
-        monitoring = MonitoringSettings(active=condition.active, rest_ends=False)
-
-        def new_batch(cell: Cell, n: int, seed: int, settings: PickSettings) -> PickBatch:
-            return MonitoredPickBatch(
-                cell, n, seed, settings, condition.safety, monitoring, first
-            )
-
-        settings = settings_for(CANDIDATES if condition.choice else (1, 1), self._preset)
-        settings = replace(settings, time_limit_s=TIME_LIMIT_S)
-        n = min(CHUNK, self._n - first)
-        return Evaluator(self._networks, self.cell, n, self._seed, settings, new_batch)
-
-    def run(self, condition: Condition) -> MonitoredEpisodes:
-        """Run all episodes under a condition."""
-        rule = (
-            selection_rules.critic(HYSTERESIS) if condition.choice else selection_rules.fixed(0)
-        )
-        parts = []
-        for first in range(0, self._n, CHUNK):
-            evaluator = self.evaluator(condition, first)
-            evaluator.run(rule)
-            assert isinstance(evaluator.batch, MonitoredPickBatch)
-            parts.append(evaluator.batch.runs())
-        return joined(parts)
+def run_condition(bench: PickBench, condition: Condition) -> MonitoredEpisodes:
+    """Run all episodes under a condition."""
+    rule = selection_rules.critic(HYSTERESIS) if condition.choice else selection_rules.fixed(0)
+    parts = []
+    for first in range(0, bench.n, CHUNK):
+        batch = batch_of(bench, condition, first)
+        Evaluator(bench.networks, batch).run(rule)
+        parts.append(batch.runs())
+    return joined(parts)
 
 
 def row_of(name: str, runs: MonitoredEpisodes, without: MonitoredEpisodes | None) -> Json:
     """Return the result row of a condition.
 
     Args:
-        runs: Episodes of the condition.
         without: The same episodes without the layer; None for those themselves.
     """
-    n, won = len(runs.arrived), runs.arrived
+    won = runs.arrived
     admissible = runs.touched_moving & (runs.link_speed <= runs.allowed_speed)
     moving = runs.touched_moving & ~admissible
     ended = won | runs.touched_moving | runs.touched_cell
@@ -153,8 +122,8 @@ def row_of(name: str, runs: MonitoredEpisodes, without: MonitoredEpisodes | None
     periods = float(runs.seconds.sum())
     return {
         "name": name,
-        "n": n,
-        **{key: wilson(int(which.sum()), n) for key, which in rates.items()},
+        "n": len(won),
+        **{key: rate_of(which) for key, which in rates.items()},
         "contacts_moving": int(moving.sum()),
         "time_to_success_s": mean_of(runs.seconds[won]),
         "time_lost_s": lost,
@@ -167,22 +136,19 @@ def row_of(name: str, runs: MonitoredEpisodes, without: MonitoredEpisodes | None
 
 def run_ssm(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
     """Evaluate picks under the safety layer, and the same episodes without it."""
-    picks = MonitoredPicks(checkpoint, request.episodes or DEFAULT_EPISODES, request.seed)
+    bench = PickBench(checkpoint, request, default=DEFAULT_EPISODES)
     runs: dict[str, MonitoredEpisodes] = {}
-    conditions = conditions_in(picks.cell)
+    can_choose = len(bench.cell.pick_stations) >= CANDIDATES[1]
+    conditions = {name: c for name, c in CONDITIONS.items() if can_choose or not c.choice}
     rows = request.rows(len(conditions))
     for name, condition in conditions.items():
-        runs[name] = picks.run(condition)
-        without = None if condition.against is None else runs[condition.against]
-        rows.append(row_of(name, runs[name], without))
+        runs[name] = run_condition(bench, condition)
+        without = runs["choice-no-ssm" if condition.choice else "no-ssm"]
+        rows.append(row_of(name, runs[name], without if condition.active else None))
     stated = {name: one.safety.describe() for name, one in conditions.items() if one.active}
-    started = picks.evaluator(CONDITIONS["ssm"], 0)
-    started.batch.reset()  # the first states of at most CHUNK episodes are stated
+    started = batch_of(bench, CONDITIONS["ssm"], 0)
+    started.reset()  # the first states of at most CHUNK episodes are stated
     return {
-        "settings": {
-            **settings_of(started),
-            "hysteresis": HYSTERESIS,
-            "safety": stated,
-        },
+        "settings": {**settings_of(started), "hysteresis": HYSTERESIS, "safety": stated},
         "results": rows,
     }

@@ -6,34 +6,30 @@ and the person has postures that do not occur in training. The result states the
 FCL checks the poses of the first 200 episodes on the raw meshes for missed contacts.
 """
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, replace
 
 import numpy as np
 
 from app.policies.checkpoints.checkpoint import Checkpoint
-from app.policies.checkpoints.trained_cell import cell_of
 from app.policies.evaluation.contact_recheck import recheck
 from app.policies.evaluation.pick import selection_rules
 from app.policies.evaluation.pick.episodes import (
-    CANDIDATES,
     Episodes,
     Evaluator,
+    PickBench,
     Rule,
-    settings_for,
     time_limits,
 )
 from app.policies.evaluation.rows import EvaluationRequest, Json
 from app.policies.evaluation.statistics import mcnemar
 from app.policies.inference.task_selection import HYSTERESIS
-from app.policies.inference.value_networks import ValueNetworks, pick_preset_of
 from app.sim.collision.fcl_recheck import Trajectory
-from app.sim.pick.batch import OUTCOMES
+from app.sim.pick.batch import OUTCOMES, PickBatch
 from app.sim.pick.hand_speeds import hand_speeds
 from app.sim.scenario.kernels import episode as kernel
 from app.sim.scene.scene import HumanKind, kinds_of
 
-DEFAULT_EPISODES = 1000
 N_RECHECKED = 200
 """Number of episodes checked again with FCL."""
 CRITIC = "critic"
@@ -53,122 +49,104 @@ MANY_TARGETS = (4, 6)
 """Fewest and most targets of a table with more objects."""
 
 
-def evaluators_of(
-    checkpoint: Checkpoint, n_candidates: tuple[int, int], episodes: int | None, seed: int
-) -> dict[str, Evaluator]:
-    """Return the evaluators of a checkpoint, by the first word of their rows, the usual first.
+def evaluators_of(bench: PickBench) -> dict[str, Evaluator]:
+    """Return the episodes of a bench under each time limit, the usual one first.
 
-    By default they have 1000 episodes each.
+    The keys are the first words of the names of their rows.
     """
-    preset, n = pick_preset_of(checkpoint), episodes or DEFAULT_EPISODES
-    settings, limits = settings_for(n_candidates, preset), time_limits(preset)
-    networks, cell = ValueNetworks(checkpoint), cell_of(checkpoint.manifest)
+    limits = time_limits(bench.preset)
     return {
-        "" if limit == limits[0] else f"{limit:.0f} s": Evaluator(
-            networks, cell, n, seed, replace(settings, time_limit_s=limit)
+        "" if limit == limits[0] else f"{limit:.0f} s": bench.evaluator(
+            replace(bench.usual, time_limit_s=limit)
         )
         for limit in limits
     }
 
 
-def settings_of(evaluator: Evaluator) -> dict[str, object]:
+def settings_of(batch: PickBatch) -> Json:
     """Return the settings stated with a result."""
-    settings, state = evaluator.batch.settings, evaluator.batch.state
+    settings = batch.settings
     return {
         "time_limit_s": settings.time_limit_s,
-        "people": list(kinds_of(evaluator.batch.cell)),
+        "people": list(kinds_of(batch.cell)),
         "start": settings.start,
         "start_clearance_m": settings.start_clearance_m,
         "action": asdict(settings.action),
         "grasp": settings.grasp._asdict() if settings.grasp.depth else "reach only",
-        "starts_redrawn_share": float((state.n_redrawn > 0).mean()),
+        "starts_redrawn_share": float((batch.state.n_redrawn > 0).mean()),
         "candidates": list(settings.n_candidates),
-        **hand_speeds(evaluator.batch),
+        **hand_speeds(batch),
     }
 
 
 def run_single(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
     """Evaluate one random target per episode."""
-    evaluators = evaluators_of(checkpoint, (1, 1), request.episodes, request.seed)
-    rows = request.rows(len(evaluators))
-    trajectories: tuple[Trajectory, ...] = ()
+    evaluators = evaluators_of(PickBench(checkpoint, request, (1, 1)))
+    rows, trajectories = request.rows(len(evaluators)), list[Trajectory]()
     for name, evaluator in evaluators.items():
-        n_recorded = 0 if trajectories else min(N_RECHECKED, evaluator.batch.n_envs)
-        outcome = evaluator.run(selection_rules.fixed(0), n_recorded)
-        trajectories = trajectories or outcome.trajectories
-        rows.append(outcome.row(f"{name} policy".lstrip()))
-    usual = evaluators[""]
+        run = evaluator.run(selection_rules.fixed(0), 0 if name else N_RECHECKED)
+        trajectories += run.trajectories
+        rows.append(run.row(f"{name} policy".lstrip()))
+    usual = evaluators[""].batch
     return {
         "settings": settings_of(usual),
         "results": rows,
-        "fcl_recheck": recheck(usual.batch.cell, trajectories),
+        "fcl_recheck": recheck(usual.cell, trajectories),
     }
 
 
-class ChoiceRun:
-    """Episodes of one setting under all selection rules.
+def compare_rules(
+    evaluator: Evaluator, seed: int, rows: list[Json], name: str = "", n_recorded: int = 0
+) -> tuple[Episodes, list[Json]]:
+    """Run the same episodes under all selection rules; add their rows, the oracle's last.
 
     Args:
         evaluator: Episodes with several candidates.
+        seed: Seed of random choices.
         name: Name of the setting, first in the names of the rows; may be empty.
+        n_recorded: Number of the critic's episodes with recorded poses.
+
+    Returns:
+        The episodes under the critic's choice, and this choice against each other rule.
     """
-
-    def __init__(self, evaluator: Evaluator, seed: int, name: str = "") -> None:
-        self._evaluator, self._seed = evaluator, seed
-        self._prefix = f"{name} " if name else ""
-        self._runs: dict[str, Episodes] = {}
-
-    def rows(self, n_recorded: int = 0) -> Iterator[dict[str, object]]:
-        """Run the rules and yield their rows, the oracle's last."""
-        n = self._evaluator.batch.n_envs
-        rules = {CRITIC: selection_rules.critic(HYSTERESIS)}
-        rules |= {name: rule(self._seed, n) for name, rule in OTHER_RULES.items()}
-        for name, rule in rules.items():
-            recorded = n_recorded if name == CRITIC else 0
-            self._runs[name] = self._evaluator.run(rule, recorded)
-            yield self._runs[name].row(self._prefix + name)
-        most = self._evaluator.batch.settings.n_candidates[1]
-        runs = [self._evaluator.run(selection_rules.fixed(k)) for k in range(most)]
-        self._runs[ORACLE] = _oracle(runs)
-        yield self._runs[ORACLE].row(self._prefix + ORACLE)
-
-    @property
-    def critic(self) -> Episodes:
-        """The episodes under the critic's choice."""
-        return self._runs[CRITIC]
-
-    def paired(self) -> list[dict[str, object]]:
-        """Return the critic's choice against each other rule on the same episodes."""
-        gain = self._runs[ORACLE].succeeded.mean() - self._runs["nearest"].succeeded.mean()
-        others = [name for name in self._runs if name != CRITIC]
-        return [
-            {
-                "name": f"{self._prefix}{CRITIC} - {name}",
-                "difference": float(
-                    self.critic.succeeded.mean() - self._runs[name].succeeded.mean()
-                ),
-                **mcnemar(self.critic.succeeded, self._runs[name].succeeded),
-            }
-            | ({"oracle_gain": float(gain)} if name == "nearest" else {})
-            for name in others
-        ]
+    batch, prefix, runs = evaluator.batch, f"{name} " if name else "", dict[str, Episodes]()
+    rules = {CRITIC: selection_rules.critic(HYSTERESIS)}
+    rules |= {rule: new(seed, batch.n_envs) for rule, new in OTHER_RULES.items()}
+    for rule, choose in rules.items():
+        runs[rule] = evaluator.run(choose, n_recorded if rule == CRITIC else 0)
+        rows.append(runs[rule].row(prefix + rule))
+    each = range(batch.settings.n_candidates[1])
+    runs[ORACLE] = _oracle([evaluator.run(selection_rules.fixed(k)) for k in each])
+    rows.append(runs[ORACLE].row(prefix + ORACLE))
+    won = {rule: run.succeeded for rule, run in runs.items()}
+    critic, gain = won.pop(CRITIC), float(won[ORACLE].mean() - won["nearest"].mean())
+    return runs[CRITIC], [
+        {
+            "name": f"{prefix}{CRITIC} - {rule}",
+            "difference": float(critic.mean() - other.mean()),
+            **mcnemar(critic, other),
+            **({"oracle_gain": gain} if rule == "nearest" else {}),
+        }
+        for rule, other in won.items()
+    ]
 
 
 def run_choice(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
     """Evaluate selection among 2 or 3 random targets, and other rules on the same episodes."""
-    evaluators = evaluators_of(checkpoint, CANDIDATES, request.episodes, request.seed)
+    evaluators = evaluators_of(PickBench(checkpoint, request))
     rows = request.rows(len(evaluators) * (len(OTHER_RULES) + 2))
-    runs = {name: ChoiceRun(one, request.seed, name) for name, one in evaluators.items()}
-    for name, run in runs.items():
-        n_recorded = 0 if name else min(N_RECHECKED, evaluators[name].batch.n_envs)
-        for row in run.rows(n_recorded):
-            rows.append(row)
-    usual = evaluators[""]
+    paired, trajectories = list[Json](), list[Trajectory]()
+    for name, evaluator in evaluators.items():
+        recorded = 0 if name else N_RECHECKED
+        critic, differences = compare_rules(evaluator, request.seed, rows, name, recorded)
+        paired += differences
+        trajectories += critic.trajectories
+    usual = evaluators[""].batch
     return {
         "settings": {**settings_of(usual), "hysteresis": HYSTERESIS},
         "results": rows,
-        "paired": [row for run in runs.values() for row in run.paired()],
-        "fcl_recheck": recheck(usual.batch.cell, runs[""].critic.trajectories),
+        "paired": paired,
+        "fcl_recheck": recheck(usual.cell, trajectories),
     }
 
 
@@ -177,28 +155,23 @@ def run_choice_hard(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
 
     The last setting is left out in a cell with fewer stations than it offers.
     """
-    usual = settings_for(CANDIDATES, pick_preset_of(checkpoint))
+    bench = PickBench(checkpoint, request)
+    usual = bench.usual
     fast = replace(usual, work=replace(usual.work, pace=FASTER))
     settings = {
         "two-people": replace(usual, people=PAIR),
         "faster": fast,
         "two-people-faster": replace(fast, people=PAIR),
     }
-    networks, cell = ValueNetworks(checkpoint), cell_of(checkpoint.manifest)
-    if len(cell.pick_stations) >= MANY_TARGETS[1]:
+    if len(bench.cell.pick_stations) >= MANY_TARGETS[1]:
         more = replace(usual, people=PAIR, n_candidates=MANY_TARGETS)
         settings["two-people-4-to-6-targets"] = more
     rows = request.rows(len(settings) * (len(OTHER_RULES) + 2))
-    paired: list[dict[str, object]] = []
-    stated: dict[str, object] = {"hysteresis": HYSTERESIS}
-    n = request.episodes or DEFAULT_EPISODES
+    paired, stated = list[Json](), Json(hysteresis=HYSTERESIS)
     for name, one in settings.items():
-        evaluator = Evaluator(networks, cell, n, request.seed, one)
-        run = ChoiceRun(evaluator, request.seed, name)
-        for row in run.rows():
-            rows.append(row)
-        paired += run.paired()
-        stated[name] = {**settings_of(evaluator), "pace": one.work.pace}
+        evaluator = bench.evaluator(one)
+        paired += compare_rules(evaluator, request.seed, rows, name)[1]
+        stated[name] = {**settings_of(evaluator.batch), "pace": one.work.pace}
     return {"settings": stated, "results": rows, "paired": paired}
 
 

@@ -25,14 +25,14 @@ import numpy as np
 from app.policies.checkpoints.checkpoint import Checkpoint
 from app.policies.evaluation.pick import selection_rules
 from app.policies.evaluation.pick.episodes import (
-    CANDIDATES,
-    Index,
     ObservedPeople,
     PeopleObserver,
+    PickBench,
     observe_exactly,
 )
-from app.policies.evaluation.pick.tasks import evaluators_of, settings_of
+from app.policies.evaluation.pick.tasks import settings_of
 from app.policies.evaluation.rows import EvaluationRequest, Json
+from app.policies.evaluation.statistics import Index
 from app.policies.inference.task_selection import HYSTERESIS
 from app.sim.core.arrays import Vec
 from app.sim.human import model as human
@@ -113,10 +113,10 @@ class KeypointObserver:
     def __call__(self, batch: PickBatch, rows: Index) -> ObservedPeople:
         """Update the estimators with the frames available now and return their estimates."""
         people, t = batch.state.people, batch.state.elapsed
+        now = t.copy(), people.q[:, 0].copy(), people.qd[:, 0].copy()
         if self._before is None:
             self._start(batch, rows)
-            self._before = t.copy(), people.q[:, 0].copy(), people.qd[:, 0].copy()
-        t0, q0, qd0 = self._before
+        t0, q0, qd0 = self._before or now
         observed = ObservedPeople(
             q=np.empty((len(rows), 1, 18)),
             qd=np.empty((len(rows), 1, 18)),
@@ -126,7 +126,7 @@ class KeypointObserver:
             motion = between(t0[e], q0[e], qd0[e], float(t[e]), people.q[e, 0], people.qd[e, 0])
             observed.q[k, 0], observed.qd[k, 0] = self._estimate(batch, e, float(t[e]), motion)
             self._measure(observed.q[k, 0], people.q[e, 0], observed.size[k, 0])
-        self._before = t.copy(), people.q[:, 0].copy(), people.qd[:, 0].copy()
+        self._before = now
         return observed
 
     def _start(self, batch: PickBatch, rows: Index) -> None:
@@ -166,23 +166,21 @@ class KeypointObserver:
 
 def run_tracker(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
     """Evaluate task selection among 2 or 3 random targets with people observed by a tracker."""
-    n = request.episodes or DEFAULT_EPISODES
-    evaluator = evaluators_of(checkpoint, CANDIDATES, n, request.seed)[""]
+    bench = PickBench(checkpoint, request, default=DEFAULT_EPISODES)
+    evaluator = bench.evaluator(bench.usual)
     rule = selection_rules.critic(HYSTERESIS)
     observers: dict[str, PeopleObserver] = {"exact": observe_exactly}
     observers |= {name: KeypointObserver(row, request.seed) for name, row in ROWS.items()}
     results = request.rows(len(observers))
     for name, observe in observers.items():
         row = evaluator.run(rule, observe=observe).row(name)
-        errors = np.array(
-            observe.wrist_errors if isinstance(observe, KeypointObserver) else [0.0]
-        )
+        errors = observe.wrist_errors if isinstance(observe, KeypointObserver) else [0.0]
         row["wrist_error_median_mm"] = 1e3 * float(np.median(errors))
         row["wrist_error_p95_mm"] = 1e3 * float(np.percentile(errors, 95))
         results.append(row)
     return {
         "settings": {
-            **settings_of(evaluator),
+            **settings_of(evaluator.batch),
             "hysteresis": HYSTERESIS,
             "trackers": {name: asdict(row) for name, row in ROWS.items()},
         },

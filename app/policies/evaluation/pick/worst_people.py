@@ -12,9 +12,11 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from pydantic import TypeAdapter
 
 from app.policies.checkpoints.checkpoint import Checkpoint
-from app.policies.evaluation.pick.people import ChoiceBench
+from app.policies.evaluation.pick.episodes import PickBench
+from app.policies.evaluation.pick.people import SAMPLE_S, beside_each, played
 from app.policies.evaluation.rows import EvaluationRequest, Json
 from app.sim.cells.cell import Cell
 from app.sim.human.model import Hand
@@ -24,8 +26,6 @@ from app.sim.people.reach_script import ReachScript, standing_reach
 from app.sim.pick.batch import PickSettings
 
 FILE = Path(__file__).with_suffix(".json")
-SAMPLE_S = 0.02
-"""Sampling step of a motion [s]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -50,16 +50,7 @@ def motion_of(cell: Cell, motion: HandMotion, name: str) -> Motion:
     duration = np.maximum(duration, SAMPLE_S)
     start = np.cumsum(motion.pauses) + np.concatenate([[0.0], np.cumsum(duration)[:-1]])
     script = ReachScript(start, duration, np.array(postures))
-    times = np.arange(0.0, start[-1] + duration[-1] + SAMPLE_S, SAMPLE_S)
-    return Motion(
-        name=name,
-        source="search",
-        times=times,
-        q=np.array([script.at(float(t))[0] for t in times]),
-        pelvis_z=np.zeros(len(times)),
-        size=cell.human.size,
-        first_frame=0,
-    )
+    return played(script, script.end_s + SAMPLE_S, cell, name, "search")
 
 
 def beside(settings: PickSettings, cell: Cell, motions: Sequence[HandMotion]) -> PickSettings:
@@ -70,21 +61,14 @@ def beside(settings: PickSettings, cell: Cell, motions: Sequence[HandMotion]) ->
 
 def stored_motions() -> tuple[HandMotion, ...]:
     """Return the motions that were found, the worst first."""
-    return tuple(
-        HandMotion(
-            hand=one["hand"],
-            palms=tuple(tuple(palm) for palm in one["palms"]),
-            speeds=tuple(one["speeds"]),
-            pauses=tuple(one["pauses"]),
-        )
-        for one in json.loads(FILE.read_text())["motions"]
-    )
+    found = json.loads(FILE.read_text())["motions"]
+    return TypeAdapter(tuple[HandMotion, ...]).validate_python(found)
 
 
 def run_worst(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
     """Evaluate beside the people who were found, together and one by one."""
-    bench, found = ChoiceBench(checkpoint, request), stored_motions()
+    bench, found = PickBench(checkpoint, request), stored_motions()
     rows = {"library": bench.usual, "found": beside(bench.usual, bench.cell, found)}
     for number, one in enumerate(found, start=1):
         rows[f"found-{number}"] = beside(bench.usual, bench.cell, [one])
-    return bench.all(rows)
+    return beside_each(bench, rows)

@@ -16,11 +16,15 @@ def drawn(n: int = 20_000):
     return probability, rng.random(n) < probability
 
 
+def measured(probability, happened, spread: float = 0.0):
+    """Return the measures of predictions of an episode each."""
+    n = len(probability)
+    return calibration(probability, np.full(n, spread), happened, np.arange(n), 1)
+
+
 def test_calibrated_probabilities_have_an_error_at_the_level_of_chance():
     probability, happened = drawn()
-    found = calibration(
-        probability, np.full(len(probability), 0.02), happened, np.arange(len(happened)), 1
-    )
+    found = measured(probability, happened, 0.02)
     assert found["ece"] < 2.0 * found["ece_floor"] < 0.02
     assert found["brier"] < found["brier_constant"] - 0.05
     assert found["auc"] == pytest.approx(0.8, abs=0.03)
@@ -28,8 +32,7 @@ def test_calibrated_probabilities_have_an_error_at_the_level_of_chance():
 
 def test_predictions_with_one_outcome_err_more_by_chance():
     probability, happened = drawn(1000)
-    spread = np.zeros(1000)
-    apart = calibration(probability, spread, happened, np.arange(1000), 1)["ece_floor"]
+    apart = measured(probability, happened)["ece_floor"]
     pairs = np.repeat(probability, 2), np.zeros(2000), np.repeat(happened, 2)
     both = calibration(*pairs, np.repeat(np.arange(1000), 2), 1)["ece_floor"]
     assert both == pytest.approx(apart, rel=0.05)  # twice the predictions tell no more
@@ -39,25 +42,15 @@ def test_predictions_with_one_outcome_err_more_by_chance():
 
 def test_shifted_probabilities_have_that_error():
     probability, happened = drawn()
-    found = calibration(
-        np.clip(probability + 0.1, 0, 1),
-        np.zeros(20_000),
-        happened,
-        np.arange(len(happened)),
-        1,
-    )
+    found = measured(np.clip(probability + 0.1, 0, 1), happened)
     assert found["ece"] == pytest.approx(0.1, abs=0.02)
 
 
 def test_ranks_of_a_perfect_and_of_a_useless_prediction():
     happened = np.arange(100) >= 40
-    perfect = calibration(
-        happened.astype(float), np.zeros(100), happened, np.arange(len(happened)), 1
-    )
+    perfect = measured(happened.astype(float), happened)
     assert (perfect["auc"], perfect["brier"], perfect["ece"]) == (1.0, 0.0, 0.0)
-    useless = calibration(
-        np.full(100, 0.6), np.zeros(100), happened, np.arange(len(happened)), 1
-    )
+    useless = measured(np.full(100, 0.6), happened)
     assert useless["auc"] == 0.5
     assert useless["brier"] == pytest.approx(useless["brier_constant"])
 
@@ -66,7 +59,7 @@ def test_ranks_of_a_perfect_and_of_a_useless_prediction():
 def test_fewer_predictions_than_bins_have_a_bin_each(n: int) -> None:
     probability = np.linspace(0.1, 0.9, n)
     happened = np.arange(n) % 2 == 0
-    found = calibration(probability, np.zeros(n), happened, np.arange(n), 1)
+    found = measured(probability, happened)
     assert [one["n"] for one in found["bins"]] == [1] * n
     assert found["ece"] == pytest.approx(np.abs(probability - happened).mean())
     assert np.isfinite(found["ece_floor"])

@@ -5,15 +5,22 @@ import pytest
 
 from app.policies.checkpoints import pretrained
 from app.policies.evaluation.pick.case_variants import row_of, shares_of
-from app.policies.evaluation.pick.cases import CaseBench
+from app.policies.evaluation.pick.cases import run_together
+from app.policies.evaluation.pick.episodes import PickBench
+from app.policies.evaluation.rows import EvaluationRequest
 from app.sim.pick.case_variants import variants_of
 from app.sim.pick.cases import find_case
 
 
+def bench_of(n: int) -> PickBench:
+    return PickBench(pretrained.load("pick"), EvaluationRequest(episodes=n, seed=5))
+
+
 def test_rows_are_means_over_variants_and_no_clause_is_below_the_verdict():
-    bench, case = CaseBench(pretrained.load("pick"), 5), find_case("case-3")
+    bench, case = bench_of(4), find_case("case-3")
     some = variants_of(bench.cell, case)[::60]
-    found, _ = bench.run([(one, np.random.default_rng(k)) for k, one in enumerate(some)], 4)
+    rngs = [np.random.default_rng(k) for k in range(len(some))]
+    found, _ = run_together(bench, list(zip(some, rngs, strict=True)))
     shares = [shares_of(one) for one in found]
     row = row_of("some", 4, shares)
     assert (row["n"], row["variants"], row["runs"]) == (4, len(some), 4 * len(some))
@@ -29,9 +36,9 @@ def test_rows_are_means_over_variants_and_no_clause_is_below_the_verdict():
 
 def test_cases_run_together_are_the_same_layouts_as_alone():
     """The robot that takes the goal under a resting hand fails, in each place of the batch."""
-    bench = CaseBench(pretrained.load("pick"), 5)
     order = ("case-2", "case-1", "case-2")
-    found, _ = bench.run([(find_case(name), np.random.default_rng(7)) for name in order], 5)
+    cases = [(find_case(name), np.random.default_rng(7)) for name in order]
+    found, _ = run_together(bench_of(5), cases)
     assert [one.case.id for one in found] == list(order)
     for one in (found[0], found[2]):
         assert not one.alone["cube2"].any() and one.alone["cube0"].all()

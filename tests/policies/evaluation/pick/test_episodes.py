@@ -66,7 +66,7 @@ def test_batch_evaluation_and_service_value_people_alike(workers):
     checkpoint, cell, n = pretrained.load("pick"), load_cell(), 4
     networks, chooser = ValueNetworks(checkpoint), TaskChooser(checkpoint)
     settings = replace(WHOLE_PICK, people=("worker",) * workers, n_candidates=(2, 2))
-    evaluator, views = Evaluator(networks, cell, n, 7, settings), []
+    evaluator, views = Evaluator(networks, PickBatch(cell, n, 7, settings)), []
 
     def move_away(batch):
         batch.state.people.q[:, 1:] = human.rest_posture(2.4, 3.3, -2.0)
@@ -123,7 +123,7 @@ def two_sizes():
         work=HumanMotionConfig(bodies=bodies),
     )
     networks = ValueNetworks(pretrained.load("pick"))
-    evaluator = Evaluator(networks, load_cell(), 8, 3, settings)
+    evaluator = Evaluator(networks, PickBatch(load_cell(), 8, 3, settings))
     return evaluator, evaluator.run(selection_rules.fixed(0), n_recorded=6)
 
 

@@ -4,8 +4,10 @@ import pytest
 
 from app.policies.checkpoints import pretrained
 from app.policies.evaluation.pick import ssm
-from app.policies.evaluation.pick.ssm import CONDITIONS, MonitoredPicks
+from app.policies.evaluation.pick.episodes import PickBench
+from app.policies.evaluation.pick.ssm import CONDITIONS, run_condition
 from app.policies.evaluation.registry import evaluate
+from app.policies.evaluation.rows import EvaluationRequest
 from tests.policies.untrained import shipped_pick_of
 
 N = 80
@@ -53,10 +55,10 @@ def test_every_episode_has_one_end(found):
 
 
 def test_chunks_equal_one_batch(monkeypatch):
-    picks = MonitoredPicks(pretrained.load("pick"), 12, seed=5)
-    whole = picks.run(CONDITIONS["ssm"])
+    bench = PickBench(pretrained.load("pick"), EvaluationRequest(episodes=12, seed=5))
+    whole = run_condition(bench, CONDITIONS["ssm"])
     monkeypatch.setattr(ssm, "CHUNK", 5)
-    parts = picks.run(CONDITIONS["ssm"])
+    parts = run_condition(bench, CONDITIONS["ssm"])
     assert whole.seconds.tolist() == parts.seconds.tolist()
     assert whole.override.tolist() == parts.override.tolist()
 

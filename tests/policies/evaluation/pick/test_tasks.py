@@ -1,22 +1,15 @@
 """Tests of the pick protocols: equal episodes for all rules, complete rows, stated people."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 from app.errors import InvalidInput, NotFound
 from app.policies.checkpoints import pretrained
-from app.policies.configs.pick import THESIS, PickPreset
+from app.policies.configs.pick import THESIS
 from app.policies.evaluation.pick import selection_rules
-from app.policies.evaluation.pick.episodes import (
-    Evaluator,
-    SelectionInput,
-    observe_exactly,
-    settings_for,
-)
+from app.policies.evaluation.pick.episodes import PickBench, SelectionInput, observe_exactly
 from app.policies.evaluation.registry import evaluate
-from app.policies.inference.value_networks import ValueNetworks
+from app.policies.evaluation.rows import EvaluationRequest
 from app.policies.training.pick import start
 from app.sim.cells.cell import load_cell
 from tests.policies.untrained import shipped_pick_of
@@ -24,10 +17,9 @@ from tests.policies.untrained import shipped_pick_of
 
 @pytest.fixture(scope="module")
 def evaluator():
-    networks = ValueNetworks(pretrained.load("pick"))
-    return Evaluator(
-        networks, load_cell("pick-and-place"), 24, 99, settings_for((2, 3), PickPreset())
-    )
+    request = EvaluationRequest(episodes=24, seed=99)
+    bench = PickBench(pretrained.load("pick"), request)
+    return bench.evaluator(bench.usual)
 
 
 def view(values, chosen, first=False):
@@ -100,7 +92,7 @@ def test_the_observation_model_sees_running_rows_only_and_changes_episodes(evalu
         observed = observe_exactly(batch, rows)
         q = observed.q.copy()
         q[:, :2] = 100.0
-        return replace(observed, q=q, qd=np.zeros_like(q))
+        return observed._replace(q=q, qd=np.zeros_like(q))
 
     blind = evaluator.run(selection_rules.critic(0.2), observe=no_person)
     assert not np.concatenate(running).any()

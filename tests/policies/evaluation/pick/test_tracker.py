@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from app.policies.checkpoints import pretrained
-from app.policies.configs.pick import PickPreset
 from app.policies.evaluation.pick import selection_rules
-from app.policies.evaluation.pick.episodes import Evaluator, observe_exactly, settings_for
+from app.policies.evaluation.pick.episodes import PickBench, observe_exactly
 from app.policies.evaluation.pick.tracker import (
     ROWS,
     KeypointObserver,
@@ -16,8 +15,7 @@ from app.policies.evaluation.pick.tracker import (
     between,
 )
 from app.policies.evaluation.registry import evaluate
-from app.policies.inference.value_networks import ValueNetworks
-from app.sim.cells.cell import load_cell
+from app.policies.evaluation.rows import EvaluationRequest
 from app.sim.human import model as human
 from app.sim.perception.keypoint_sensor_model import KeypointSensorSettings
 
@@ -26,10 +24,9 @@ N = 6
 
 @pytest.fixture(scope="module")
 def evaluator():
-    networks = ValueNetworks(pretrained.load("pick"))
-    return Evaluator(
-        networks, load_cell("pick-and-place"), N, 99, settings_for((2, 3), PickPreset())
-    )
+    request = EvaluationRequest(episodes=N, seed=99)
+    bench = PickBench(pretrained.load("pick"), request)
+    return bench.evaluator(bench.usual)
 
 
 def misses(evaluator, row, seed=1):
