@@ -29,9 +29,10 @@ from app.policies.evaluation.reach.targets import run_targets
 from app.policies.evaluation.reach.tracker import run_tracker
 from app.policies.evaluation.rows import EvaluationRequest, Json, OnRow, ignore_row
 from app.policies.evaluation.safety.ssm import run_safety
+from app.policies.evaluation.sorting.benchmark_tasks import run_tests
 from app.policies.evaluation.sorting.cycle_time import run_cycle_time
+from app.policies.evaluation.sorting.grid import run_grid
 from app.policies.evaluation.sorting.people import run_sorting_people
-from app.policies.evaluation.sorting.runs import run_grid, run_tests
 from app.sim.cells.cell import Cell
 from app.sim.mocap.importer import Motion
 from app.sim.pick.cases import CASES_CELL

@@ -17,7 +17,7 @@ from typing import Any
 from app.policies.checkpoints.trained_cell import cell_of
 from app.policies.configs import presets
 from app.policies.evaluation.sorting.episodes import Values, greedy, joined, run_episodes
-from app.policies.evaluation.sorting.pairs import SMALL, grid_batches
+from app.policies.evaluation.sorting.grid import SMALL, grid_batches
 from app.policies.inference.sorting_policy import SortingPolicy
 from app.sim.core.arrays import Vec
 from app.sim.sorting.batch import fail_of

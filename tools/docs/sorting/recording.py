@@ -18,8 +18,14 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Polygon, Rectangle
 
 from app.policies.checkpoints import pretrained
-from app.policies.evaluation.sorting.benchmark_tasks import ScriptedInterferences, start_test
-from app.policies.evaluation.sorting.episodes import ENDLESS, Index, greedy, run_episodes
+from app.policies.evaluation.sorting.benchmark_tasks import start_test
+from app.policies.evaluation.sorting.episodes import (
+    ENDLESS,
+    ScriptedInterferences,
+    greedy,
+    run_episodes,
+)
+from app.policies.evaluation.statistics import Index
 from app.policies.inference.sorting_policy import SortingPolicy
 from app.sim.cells.cell import Cell, load_cell
 from app.sim.cells.parts import Station

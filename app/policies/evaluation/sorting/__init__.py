@@ -9,11 +9,8 @@ grid              Protocol ``sorting-grid``: every pair of object and goal numbe
 optimal_baseline  Optimal baseline of sorting episodes: the exact planner's moves and expected
                   attempts
 order_rules       Order rules: selection among near-optimal sorting moves (docs/method.md 3.1)
-pairs             Episodes of every pair (K_E, K_G): numbers of objects, and of objects in the
-                  goal
 people            Protocol ``sorting-people``: full sorting tasks beside a working person
 planner_fallback  Progress monitor (``app/sim/sorting/progress_monitor.py``) of many sorting
                   tasks at once
-runs              Protocols ``sorting-grid`` and ``sorting-tests`` of a checkpoint
 task_states       Symbolic states of many sorting tasks that are executed side by side
 """

@@ -24,7 +24,6 @@ Source: the outlook of thesis 4.5, robot execution time in shared workspaces. Ou
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
-from typing import Any
 
 from app.policies.checkpoints.checkpoint import Checkpoint
 from app.policies.evaluation.rows import EvaluationRequest, Json
@@ -39,7 +38,6 @@ from app.policies.evaluation.sorting.people import (
     stated,
 )
 from app.policies.evaluation.statistics import mean_of
-from app.sim.core.arrays import Vec
 from app.sim.pick.monitored_batch import AMONG_HANDS
 from app.sim.safety.layer import SafetySettings
 
@@ -82,24 +80,20 @@ PAIRS = (
 """Rows whose difference on the same tasks is given."""
 
 
-def _per_hour(values: Vec) -> dict[str, Any]:
-    """Return parts per hour, or a difference of them, with its 95 % interval."""
-    return {"parts_per_hour": mean_of(values)}
-
-
 def run_cycle_time(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
     """Evaluate the throughput of a sorting cell."""
     networks, cell, settings = parts_of(checkpoint)
     n = request.episodes or DEFAULT_TASKS
     runs: dict[str, FullTasks] = {}
     rows = request.rows(len(ROWS))
-    shown: dict[str, Any] = {}
+    shown: Json = {}
     for name, row in ROWS.items():
         picks = replace(settings, people=()) if row.alone else settings
         bench = SortingBesidePeople(networks, cell, picks, n, request.seed, row.condition)
         shown = shown or stated(bench.batch)
         runs[name] = bench.run(row.rule)
-        rows.append(runs[name].row(name) | _per_hour(runs[name].throughput()))
+        per_hour = {"parts_per_hour": mean_of(runs[name].throughput())}
+        rows.append(runs[name].row(name) | per_hour)
     safety = AMONG_HANDS.describe() | {
         "protective_distance [m]": [one.protective_distance for one in (AMONG_HANDS, DISTANCE)]
     }
@@ -107,8 +101,11 @@ def run_cycle_time(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
         "settings": {**shown, "safety": safety},
         "results": rows,
         "paired": [
-            {"name": f"{first} - {other}", "n": n}
-            | _per_hour(runs[first].throughput() - runs[other].throughput())
+            {
+                "name": f"{first} - {other}",
+                "n": n,
+                "parts_per_hour": mean_of(runs[first].throughput() - runs[other].throughput()),
+            }
             for first, other in PAIRS
         ],
     }

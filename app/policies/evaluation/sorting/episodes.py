@@ -12,19 +12,19 @@ Source: docs/method.md 1.2, 1.5.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields, replace
-from typing import Any, Protocol, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from app.policies.evaluation.sorting.optimal_baseline import choose_by_planner, measure
 from app.policies.evaluation.sorting.planner_fallback import BatchProgressMonitor, state_keys
+from app.policies.evaluation.statistics import Flags, Index
+from app.sim.core.arrays import Vec
 from app.sim.sorting.batch import SortingBatch, SortingSettings
+from app.sim.sorting.benchmark_tasks import TESTS, SortingTest
 from app.sim.sorting.kernels.task import RUNNING, SUCCESS, TIMEOUT
 
-Index = NDArray[np.int64]
-Flags = NDArray[np.bool_]
 Values = Callable[[NDArray[np.uint8]], NDArray[np.float32]]
 """Q of every move from observations (n, obs_size), shape (n, n_actions)."""
 Chooser = Callable[[SortingBatch, Index], Index]
@@ -36,41 +36,46 @@ ENDLESS = 1e6
 """Horizon factor of the batch itself; this module ends the episodes."""
 
 
-class Script(Protocol):
-    """Interferences of people during the episodes of a batch."""
+class ScriptedInterferences:
+    """Interferences of a test's person in all environments of one run.
+
+    Args:
+        n: Number of environments.
+        seed: Seed; the interferences of environment ``e`` are fixed by (seed, test, e).
+    """
+
+    def __init__(self, test: SortingTest, n: int, seed: int) -> None:
+        self._test, self._seed = test, seed
+        self._next = np.zeros(n, dtype=np.int64)
+        after = [one.after_moves for one in test.interferences]
+        self._after = np.array([*(np.inf if one is None else one for one in after), np.nan])
 
     def due(self, which: Index, moves: Index, solved: Flags) -> Flags:
-        """Return the environments with an interference now.
+        """Return the environments with an interference now; at a goal there always is one.
 
         Args:
             which: Environments that just made an attempt, shape (k,).
             moves: Moves of each since the start or the last interference, shape (k,).
             solved: Whether each is at its goal, shape (k,).
         """
+        after = self._after[self._next[which]]
+        return np.asarray(~np.isnan(after) & (solved | (moves >= after)))
 
     def interfere(self, batch: SortingBatch, e: int) -> None:
-        """Change environment ``e``, whose episode continues."""
+        """Apply the next interference to environment ``e``, whose episode continues."""
+        k = int(self._next[e])
+        rng = np.random.default_rng((self._seed, TESTS.index(self._test), e, 1 + k))
+        change = self._test.interferences[k].change
+        batch.change(e, change(batch.state_of(e), batch.shape, rng))
+        self._next[e] += 1
 
 
-class NoInterferences:
-    """Script without interferences."""
-
-    def due(self, which: Index, moves: Index, solved: Flags) -> Flags:
-        """Return False for all environments."""
-        del moves, solved
-        return np.zeros(len(which), dtype=np.bool_)
-
-    def interfere(self, batch: SortingBatch, e: int) -> None:
-        """Do nothing."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SortingEpisodes:
+class SortingEpisodes(NamedTuple):
     """Results of a set of episodes; every array has the shape (n,)."""
 
     success: Flags
     """Whether the goal was reached, the last one if it changed."""
-    rewards: NDArray[np.float64]
+    rewards: Vec
     """Sum of rewards, not discounted."""
     moves: Index
     """Attempts that moved an object."""
@@ -78,7 +83,7 @@ class SortingEpisodes:
     """Moves of the exact planner, over all parts of the episode."""
     attempts: Index
     """All attempts."""
-    expected: NDArray[np.float64]
+    expected: Vec
     """Expected attempts of the exact planner, over all parts of the episode."""
     picks: Index
     """Attempts to pick from the clutter."""
@@ -95,25 +100,17 @@ class SortingEpisodes:
 
     def replaced(self, other: Self, where: Flags) -> Self:
         """Return these episodes with those of another run where ``where`` is true."""
-        taken = {
-            one.name: np.where(where, getattr(other, one.name), getattr(self, one.name))
-            for one in fields(self)
-        }
-        return replace(self, **taken)
+        pairs = zip(other, self, strict=True)
+        return type(self)(*(np.where(where, theirs, ours) for theirs, ours in pairs))
 
     def part(self, where: Any) -> Self:
         """Return selected episodes."""
-        return replace(
-            self, **{one.name: getattr(self, one.name)[where] for one in fields(self)}
-        )
+        return type(self)(*(values[where] for values in self))
 
 
 def joined(parts: list[SortingEpisodes]) -> SortingEpisodes:
     """Return episodes of several batches as one set."""
-    names = [one.name for one in fields(SortingEpisodes)]
-    return SortingEpisodes(
-        **{name: np.concatenate([getattr(part, name) for part in parts]) for name in names}
-    )
+    return SortingEpisodes(*map(np.concatenate, zip(*parts, strict=True)))
 
 
 def greedy(values: Values) -> Chooser:
@@ -127,17 +124,14 @@ def greedy(values: Values) -> Chooser:
 
 
 class _Run:
-    """One run of all environments of a batch.
-
-    Args:
-        batch: Environments at their starts, with the horizon factor ENDLESS.
-        choose: Policy.
-        script: Interferences.
-        fallback: Whether the exact planner replaces the policy after a planner fallback.
-    """
+    """One run of all environments of a batch; arguments as :func:`run_episodes`."""
 
     def __init__(
-        self, batch: SortingBatch, choose: Chooser, script: Script, fallback: bool
+        self,
+        batch: SortingBatch,
+        choose: Chooser,
+        script: ScriptedInterferences | None,
+        fallback: bool,
     ) -> None:
         n = batch.n_envs
         self._batch, self._choose, self._script = batch, choose, script
@@ -221,6 +215,8 @@ class _Run:
 
     def _disturb(self, which: Index) -> None:
         """Apply interferences; the rest of the previous part is removed from the minimum."""
+        if self._script is None:
+            return
         rows = self._batch.rows
         moves = rows.moves[which] - self._moves_before[which]
         due = which[self._script.due(which, moves, rows.outcome[which] == SUCCESS)]
@@ -251,7 +247,7 @@ def run_episodes(
     batch: SortingBatch,
     choose: Chooser,
     *,
-    script: Script | None = None,
+    script: ScriptedInterferences | None = None,
     fallback: bool = False,
     only: Flags | None = None,
 ) -> SortingEpisodes:
@@ -266,24 +262,28 @@ def run_episodes(
     """
     if only is not None:
         batch.rows.outcome[~only] = TIMEOUT
-    return _Run(batch, choose, script or NoInterferences(), fallback).run()
+    return _Run(batch, choose, script, fallback).run()
 
 
 def run_with_fallback(
-    started: Callable[[], SortingBatch],
+    batch: SortingBatch,
+    start: Callable[[], object],
     choose: Chooser,
-    script: Callable[[], Script] = NoInterferences,
+    script: Callable[[], ScriptedInterferences | None] = lambda: None,
 ) -> tuple[SortingEpisodes, SortingEpisodes]:
     """Return the same episodes without and with planner fallback.
 
     Args:
-        started: Returns the batch with all environments at their starts.
+        batch: Environments, with the horizon factor ENDLESS.
+        start: Puts all environments at their starts.
         choose: Policy.
         script: Returns the interferences of one run.
     """
-    alone = run_episodes(started(), choose, script=script())
+    start()
+    alone = run_episodes(batch, choose, script=script())
     called = alone.planner_fallback
     if not called.any():
         return alone, alone
-    again = run_episodes(started(), choose, script=script(), fallback=True, only=called)
+    start()
+    again = run_episodes(batch, choose, script=script(), fallback=True, only=called)
     return alone, alone.replaced(again, called)

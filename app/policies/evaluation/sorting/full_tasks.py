@@ -3,14 +3,15 @@
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
-from app.policies.evaluation.statistics import count_of, mean_of, ratio_values, wilson
+from app.policies.evaluation.statistics import (
+    Flags,
+    Index,
+    count_of,
+    mean_of,
+    rate_of,
+    ratio_values,
+)
 from app.sim.core.arrays import Vec
-
-Index = NDArray[np.int64]
-Flags = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -19,13 +20,13 @@ class FullTasks:
 
     finished: Flags
     """Whether the goal was reached within ``LIMIT_S``."""
-    cycle_s: NDArray[np.float64]
+    cycle_s: Vec
     """Time to the goal, or ``LIMIT_S`` [s]."""
     moving: Index
     """Contacts of the moving robot."""
     resting: Index
     """Contacts of the robot at standstill."""
-    stopped: NDArray[np.float64]
+    stopped: Vec
     """Share of the control periods with override 0."""
     parts: Index
     """Objects set down in their places."""
@@ -38,13 +39,11 @@ class FullTasks:
 
     def row(self, name: str) -> dict[str, Any]:
         """Return the result row of these tasks, with 95 % intervals."""
-        n = len(self.finished)
-        free = int(((self.moving == 0) & self.finished).sum())
         return {
             "name": name,
-            "n": n,
-            "finished": wilson(int(self.finished.sum()), n),
-            "without_moving_contact": wilson(free, n),
+            "n": len(self.finished),
+            "finished": rate_of(self.finished),
+            "without_moving_contact": rate_of((self.moving == 0) & self.finished),
             "moving_contacts": count_of(self.moving),
             "contacts_at_rest": count_of(self.resting),
             "stopped": mean_of(self.stopped),

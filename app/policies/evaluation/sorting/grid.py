@@ -1,6 +1,7 @@
 """Protocol ``sorting-grid``: every pair of object and goal numbers (docs/method.md 1.5).
 
-For every pair ``1 <= K_G <= K_E <= K``, with the same episodes in all rows of one start:
+For every pair ``1 <= K_G <= K_E <= K`` (objects in the goal, all objects), with the
+same episodes in all rows of one start:
 
 ==============================  ============================================================
 ``clean``                       the policy alone, from starts with everything in the clutter
@@ -17,17 +18,18 @@ Source: thesis 3.4.2, fig. 3.2. Deviates: disturbed starts, planner fallback and
 baseline are ours.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import asdict
-from typing import Any
 
 import numpy as np
 
+from app.policies.checkpoints.checkpoint import Checkpoint
+from app.policies.checkpoints.trained_cell import cell_of
 from app.policies.evaluation.rows import EvaluationRequest, Json
 from app.policies.evaluation.sorting.episodes import (
+    ENDLESS,
     HORIZON_FACTOR,
     Chooser,
-    Index,
     SortingEpisodes,
     Values,
     greedy,
@@ -36,43 +38,53 @@ from app.policies.evaluation.sorting.episodes import (
     run_with_fallback,
 )
 from app.policies.evaluation.sorting.optimal_baseline import choose_by_planner
-from app.policies.evaluation.sorting.pairs import SMALL, grid_batches, pairs_of
-from app.policies.evaluation.statistics import mean_of, share_of, wilson
+from app.policies.evaluation.statistics import Index, mean_of, rate_of, share_of
+from app.policies.inference.sorting_policy import SortingPolicy
 from app.sim.core.arrays import Vec
-from app.sim.sorting.batch import SortingBatch, SortingSettings
+from app.sim.sorting.batch import SortingBatch, SortingSettings, fail_of
 from app.sim.sorting.state import SortingShape
 
+CHUNK = 4000
+"""Maximum number of environments of a batch."""
+SMALL = 10
+"""Maximum number of clutter slots of the smaller task."""
 STARTS: Mapping[str, float] = {"clean": 0.0, "disturbed": 1.0}
 """Share of disturbed starts by the kind of row."""
 DECIDERS = ("", "-planner-fallback", "-planner")
 """Suffixes of row names: policy, policy with planner fallback, exact planner."""
 
 
-def episodes_for(shape: SortingShape) -> int:
-    """Return the default number of episodes per pair."""
-    return 1000 if shape.n_cells <= SMALL else 300
+def pairs_of(shape: SortingShape) -> Index:
+    """Return every (K_E, K_G), shape (K (K + 1) / 2, 2)."""
+    k = shape.n_cells
+    return np.array([(n, g) for n in range(1, k + 1) for g in range(1, n + 1)])
 
 
-def least_success(shape: SortingShape) -> float:
-    """Return the required success rate of each pair."""
-    return 0.99 if shape.n_cells <= SMALL else 0.98
+def grid_batches(
+    shape: SortingShape, fail: Vec, per_pair: int, seed: int, disturbed: float
+) -> Iterator[SortingBatch]:
+    """Yield batches with ``per_pair`` episodes of every pair, in the order of the pairs."""
+    pairs = np.repeat(pairs_of(shape), per_pair, axis=0)
+    settings = SortingSettings(horizon_factor=ENDLESS, disturbed_share=disturbed)
+    for first in range(0, len(pairs), CHUNK):
+        part = pairs[first : first + CHUNK]
+        batch = SortingBatch(shape, fail, len(part), seed, settings, first_env=first)
+        batch.rows.fixed_objects[:], batch.rows.fixed_goal[:] = part.T
+        batch.reset()
+        yield batch
 
 
 def run_kind(batches: Iterable[SortingBatch], choose: Chooser) -> tuple[SortingEpisodes, ...]:
     """Return the episodes of batches for each of DECIDERS."""
     found = []
     for batch in batches:
-
-        def restarted(batch: SortingBatch = batch) -> SortingBatch:
-            batch.reset()
-            return batch
-
-        policy = run_with_fallback(restarted, choose)
-        found.append((*policy, run_episodes(restarted(), choose_by_planner)))
+        policy = run_with_fallback(batch, batch.reset, choose)
+        batch.reset()
+        found.append((*policy, run_episodes(batch, choose_by_planner)))
     return tuple(joined(list(episodes)) for episodes in zip(*found, strict=True))
 
 
-def row_of(name: str, episodes: SortingEpisodes, pairs: Index, least: float) -> dict[str, Any]:
+def row_of(name: str, episodes: SortingEpisodes, pairs: Index, least: float) -> Json:
     """Return a row of the result.
 
     Args:
@@ -91,8 +103,8 @@ def row_of(name: str, episodes: SortingEpisodes, pairs: Index, least: float) -> 
     return {
         "name": name,
         "n": n,
-        "success": wilson(int(won.sum()), n),
-        "timeout": wilson(int((~won).sum()), n),
+        "success": rate_of(won),
+        "timeout": rate_of(~won),
         "worst_pair": {
             **worst["success"],
             "n_objects": worst["n_objects"],
@@ -100,25 +112,23 @@ def row_of(name: str, episodes: SortingEpisodes, pairs: Index, least: float) -> 
         },
         "pairs_below": sum(cell["below"] for cell in cells),
         "moves_over_minimum": mean_of(good.moves / good.fewest),
-        "exactly_minimal": wilson(int((good.moves == good.fewest).sum()), n),
+        "exactly_minimal": rate_of(won & (episodes.moves == episodes.fewest)),
         "attempts_over_expected": mean_of(good.attempts / good.expected),
         "riskier_pick": share_of(episodes.riskier, episodes.picks),
         "failed_pick": share_of(episodes.failed, episodes.picks),
-        "planner_fallback": wilson(int(episodes.planner_fallback.sum()), n),
-        "repeated": wilson(int(episodes.repeated.sum()), n),
+        "planner_fallback": rate_of(episodes.planner_fallback),
+        "repeated": rate_of(episodes.repeated),
         "mean_return": float(episodes.rewards.mean()),
         "pairs": cells,
     }
 
 
-def pair_of(
-    n_objects: int, n_goal: int, episodes: SortingEpisodes, least: float
-) -> dict[str, Any]:
+def pair_of(n_objects: int, n_goal: int, episodes: SortingEpisodes, least: float) -> Json:
     """Return success and return of a pair, and whether its success rate is below ``least``.
 
     The comparison uses the upper bound of the success rate.
     """
-    success = wilson(int(episodes.success.sum()), len(episodes.success))
+    success = rate_of(episodes.success)
     return {
         "n_objects": n_objects,
         "n_goal": n_goal,
@@ -126,6 +136,21 @@ def pair_of(
         "return": float(episodes.rewards.mean()),
         "below": success["high"] < least,
     }
+
+
+def run_grid(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
+    """Evaluate a sorting policy on every pair (K_E, K_G)."""
+    return on_checkpoint(grid, checkpoint, request)
+
+
+def on_checkpoint(
+    protocol: Callable[..., Json], checkpoint: Checkpoint, request: EvaluationRequest
+) -> Json:
+    """Run a protocol with policy, task and failure probabilities of a checkpoint's cell."""
+    policy = SortingPolicy(checkpoint)
+    fail = fail_of(cell_of(checkpoint.manifest))
+    found = protocol(policy.values, policy.shape, fail, request)
+    return {**found, "settings": {"cell": policy.cell, **found["settings"]}}
 
 
 def grid(values: Values, shape: SortingShape, fail: Vec, request: EvaluationRequest) -> Json:
@@ -138,8 +163,9 @@ def grid(values: Values, shape: SortingShape, fail: Vec, request: EvaluationRequ
         request: Its episodes are those of each pair and row; by default 1000 for up to 10
             cells and 300 for more.
     """
-    per_pair = request.episodes or episodes_for(shape)
-    pairs, least, choose = pairs_of(shape), least_success(shape), greedy(values)
+    small = shape.n_cells <= SMALL
+    per_pair, least = request.episodes or (1000 if small else 300), 0.99 if small else 0.98
+    pairs, choose = pairs_of(shape), greedy(values)
     rows = request.rows(len(DECIDERS) * len(STARTS))
     for start, disturbed in STARTS.items():
         found = run_kind(grid_batches(shape, fail, per_pair, request.seed, disturbed), choose)
@@ -152,7 +178,7 @@ def grid(values: Values, shape: SortingShape, fail: Vec, request: EvaluationRequ
     }
 
 
-def settings_of(shape: SortingShape, fail: Vec) -> dict[str, Any]:
+def settings_of(shape: SortingShape, fail: Vec) -> Json:
     """Return the settings stated with a result."""
     return {
         **asdict(shape),

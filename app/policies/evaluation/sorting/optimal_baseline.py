@@ -3,16 +3,15 @@
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from app.errors import SimulationError
+from app.policies.evaluation.statistics import Index
+from app.sim.core.arrays import Vec
 from app.sim.sorting.batch import SortingBatch
 from app.sim.sorting.kernels.optimal_costs import measure_rows
 from app.sim.sorting.kernels.planner import PlannerWork, new_work
 from app.sim.sorting.kernels.planner_batch import TaskBatch, plan_rows
 from app.sim.sorting.state import SortingShape
-
-Index = NDArray[np.int64]
 
 
 @cache
@@ -20,12 +19,8 @@ def _work(shape: SortingShape) -> PlannerWork:
     return new_work(shape.n_cells, shape.n_colours, shape.n_sizes)
 
 
-def measure(batch: SortingBatch, which: Index) -> tuple[Index, NDArray[np.float64]]:
-    """Return the fewest moves to the goal and the expected attempts, shape (m,) each.
-
-    Args:
-        batch: Tasks.
-        which: Environments, shape (m,).
+def measure(batch: SortingBatch, which: Index) -> tuple[Index, Vec]:
+    """Return the fewest moves to the goal and the expected attempts of environments, (m,) each.
 
     Raises:
         SimulationError: The objects of an environment cannot form its goal.
@@ -39,12 +34,7 @@ def measure(batch: SortingBatch, which: Index) -> tuple[Index, NDArray[np.float6
 
 
 def choose_by_planner(batch: SortingBatch, which: Index) -> Index:
-    """Return the exact planner's moves in environments that are not at their goals, (m,).
-
-    Args:
-        batch: Tasks.
-        which: Environments, shape (m,).
-    """
+    """Return the exact planner's moves in environments that are not at their goals, (m,)."""
     rows, best = batch.rows, np.zeros(len(which), dtype=np.int64)
     tasks = TaskBatch(
         clutter=rows.clutter[which],

@@ -11,9 +11,9 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
+from app.policies.evaluation.statistics import Index
 from app.policies.inference.task_selection import HYSTERESIS, select
-
-Index = NDArray[np.int64]
+from app.sim.core.arrays import Vec
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -23,7 +23,7 @@ class OrderView:
     values: NDArray[np.float32]
     """Critic's value of each target, plus that of the motion to its place while nothing is
     held; -inf where there are fewer, shape (n, k)."""
-    distances: NDArray[np.float64]
+    distances: Vec
     """Distance from the tcp to each target [m], inf where there are fewer, shape (n, k)."""
     chosen: Index
     """Target pursued so far, -1 at the start of a motion, shape (n,)."""

@@ -20,7 +20,6 @@ Source: docs/method.md 3.1, 3.6 and 4 (the critic's values for the symbolic choi
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,7 +37,7 @@ from app.policies.evaluation.sorting.order_rules import (
     critic,
 )
 from app.policies.evaluation.sorting.task_states import NOTHING, TaskStates
-from app.policies.evaluation.statistics import count_difference, mean_of
+from app.policies.evaluation.statistics import Flags, Index, count_difference, mean_of
 from app.policies.inference.task_selection import HYSTERESIS
 from app.policies.inference.value_networks import ValueNetworks, pick_preset_of
 from app.sim.cells.cell import Cell, load_cell
@@ -65,11 +64,6 @@ from app.sim.scenario.kernels.monitored_state import PERIODS, STOPPED, TOUCHED_A
 from app.sim.scenario.monitoring import MonitoringSettings
 from app.sim.sorting.layout import APPROACH_M, above, reaching_cell, require_workspace
 from app.sim.sorting.near_optimal_moves import MARGIN
-
-Index = NDArray[np.int64]
-Flags = NDArray[np.bool_]
-People = tuple[Vec, Vec, Vec]
-"""Joints, joint speeds and body dimensions of the people that each of n robots observes."""
 
 CELL = "sorting-e0"
 DEFAULT_TASKS = 300
@@ -100,11 +94,6 @@ class CellCondition:
 
 USUAL = CellCondition()
 """The policy under the safety layer."""
-
-
-def _of(observed: ObservedPeople, rows: Index) -> People:
-    """Return the people that some rows observe."""
-    return observed.q[rows], observed.qd[rows], observed.size[rows]
 
 
 class SortingBesidePeople:
@@ -203,14 +192,14 @@ class SortingBesidePeople:
         phase = np.where(place == self._chosen[env], state.phase[env], APPROACH)
         progress = phase, np.where(phase != APPROACH, state.closing[env], 0.0)
         robot, left = (state.q[env], state.qd[env]), state.time_left[env]
-        obs = self._observe(robot, _of(observed, owner), point, progress, left)
+        obs = self._observe(robot, observed.of(owner), point, progress, left)
         act, value, _ = self._networks.evaluate(obs, predict=False)
         act = obs[:, LAYOUT["base"]] if self._straight else act
         later = np.flatnonzero((tasks.held[env] == NOTHING) & (counts[owner] > 1))
         if rule is critic and later.size:
             ends = np.concatenate([tasks.places[e] for e in rows])[later]
             value = value.copy()
-            value[later] += self._place_values(point[later], ends, _of(observed, owner[later]))
+            value[later] += self._place_values(point[later], ends, observed.of(owner[later]))
         shape = (len(rows), int(counts.max()))
         values, distances = np.full(shape, -np.inf, np.float32), np.full(shape, np.inf)
         actions, points = np.zeros((*shape, CONTROLLED), np.float32), np.zeros(shape, np.int64)
@@ -226,7 +215,9 @@ class SortingBesidePeople:
         self.batch.set_goals(rows, self._goals[points[mine, choice]])
         return actions[mine, choice]
 
-    def _place_values(self, picks: Index, places: Index, people: People) -> NDArray[np.float32]:
+    def _place_values(
+        self, picks: Index, places: Index, people: ObservedPeople
+    ) -> NDArray[np.float32]:
         """Return the value of the motion from over each object to its place, shape (n,)."""
         n, q = len(picks), self._q_goals[picks]
         progress, left = (np.zeros(n, np.int64), np.zeros(n)), np.full(n, PLACE_TIME_S)
@@ -236,7 +227,7 @@ class SortingBesidePeople:
     def _observe(
         self,
         robot: tuple[Vec, Vec],
-        people: People,
+        people: ObservedPeople,
         points: Index,
         progress: tuple[Index, Vec],
         left: Vec,
@@ -316,7 +307,7 @@ def parts_of(checkpoint: Checkpoint) -> tuple[ValueNetworks, Cell, PickSettings]
     return ValueNetworks(checkpoint), cell, settings
 
 
-def stated(batch: PickBatch) -> dict[str, Any]:
+def stated(batch: PickBatch) -> Json:
     """Return the settings of full tasks that a result states."""
     return {
         "cell": CELL,
@@ -358,7 +349,7 @@ def run_sorting_people(checkpoint: Checkpoint, request: EvaluationRequest) -> Js
     }
 
 
-def _paired(first: FullTasks, other: FullTasks, name: str) -> dict[str, Any]:
+def _paired(first: FullTasks, other: FullTasks, name: str) -> Json:
     """Return the differences between the critic and another rule on the same tasks."""
     both = first.finished & other.finished
     return {

@@ -8,11 +8,11 @@ state is a failed pick; interference comes at known times.
 import numpy as np
 from numpy.typing import NDArray
 
+from app.policies.evaluation.statistics import Flags, Index
+from app.sim.core.arrays import Vec
 from app.sim.sorting.kernels.task import SortingRows
 from app.sim.sorting.progress_monitor import ATTEMPT_FACTOR, MAX_SEEN
 
-Index = NDArray[np.int64]
-Flags = NDArray[np.bool_]
 Keys = NDArray[np.uint64]
 
 
@@ -40,7 +40,7 @@ class BatchProgressMonitor:
         self._attempts: Index = np.zeros(n, dtype=np.int64)
         self._budget = np.zeros(n)
 
-    def begin(self, which: Index, keys: Keys, expected_attempts: NDArray[np.float64]) -> None:
+    def begin(self, which: Index, keys: Keys, expected_attempts: Vec) -> None:
         """Restart monitors at a start or after an interference.
 
         Args:

@@ -8,15 +8,13 @@ Source: docs/method.md 1.2, 3.1.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
+from app.policies.evaluation.statistics import Index
 from app.sim.cells.cell import Cell
 from app.sim.core.arrays import Vec
 from app.sim.sorting.batch import SortingSettings, apply, batch_in
 from app.sim.sorting.near_optimal_moves import NearOptimalMoves, near_optimal_moves
 from app.sim.sorting.state import Move, SortingState
-
-Index = NDArray[np.int64]
 
 N_DRAWS = 200
 """Draws of a task; they repeat after so many attempts."""

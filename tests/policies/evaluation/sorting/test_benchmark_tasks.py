@@ -5,14 +5,13 @@ import pytest
 
 from app.errors import InvalidInput
 from app.policies.evaluation.rows import EvaluationRequest
-from app.policies.evaluation.sorting.benchmark_tasks import (
+from app.policies.evaluation.sorting.benchmark_tasks import row_of, run_test, start_test, trials
+from app.policies.evaluation.sorting.episodes import (
+    ENDLESS,
     ScriptedInterferences,
-    row_of,
-    run_test,
-    start_test,
-    trials,
+    greedy,
+    run_episodes,
 )
-from app.policies.evaluation.sorting.episodes import ENDLESS, greedy, run_episodes
 from app.policies.evaluation.sorting.optimal_baseline import choose_by_planner
 from app.sim.sorting.batch import SortingBatch, SortingSettings
 from app.sim.sorting.benchmark_tasks import TESTS, sorting_test

@@ -5,9 +5,8 @@ import pytest
 
 from app.policies.evaluation.rows import EvaluationRequest
 from app.policies.evaluation.sorting.episodes import SortingEpisodes, run_episodes
-from app.policies.evaluation.sorting.grid import grid, row_of
+from app.policies.evaluation.sorting.grid import CHUNK, grid, grid_batches, pairs_of, row_of
 from app.policies.evaluation.sorting.optimal_baseline import choose_by_planner
-from app.policies.evaluation.sorting.pairs import CHUNK, grid_batches, pairs_of
 from app.policies.evaluation.statistics import mean_of
 from app.sim.sorting.state import NULL, SortingShape
 from tests.policies.evaluation.sorting_players import exactly, in_circles, values_of
@@ -104,7 +103,7 @@ def test_every_pair_has_its_episodes_of_its_numbers(disturbed):
 
 def test_episodes_are_the_same_however_they_are_cut_into_batches(monkeypatch):
     whole = run_episodes(next(grid_batches(SHAPE, FAIL, 6, 3, 0.0)), choose_by_planner)
-    monkeypatch.setattr("app.policies.evaluation.sorting.pairs.CHUNK", 25)
+    monkeypatch.setattr("app.policies.evaluation.sorting.grid.CHUNK", 25)
     parts = [
         run_episodes(one, choose_by_planner) for one in grid_batches(SHAPE, FAIL, 6, 3, 0.0)
     ]

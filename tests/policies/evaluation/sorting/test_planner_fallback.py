@@ -3,8 +3,13 @@
 import numpy as np
 import pytest
 
-from app.policies.evaluation.sorting.benchmark_tasks import ScriptedInterferences, start_test
-from app.policies.evaluation.sorting.episodes import ENDLESS, greedy, run_episodes
+from app.policies.evaluation.sorting.benchmark_tasks import start_test
+from app.policies.evaluation.sorting.episodes import (
+    ENDLESS,
+    ScriptedInterferences,
+    greedy,
+    run_episodes,
+)
 from app.policies.evaluation.sorting.planner_fallback import state_keys
 from app.sim.sorting.batch import SortingBatch, SortingSettings, apply
 from app.sim.sorting.benchmark_tasks import sorting_test
