@@ -109,7 +109,7 @@ def evaluate(
     seed: int = 11,
     motions: Sequence[Motion] = (),
     on_row: OnRow = ignore_row,
-) -> dict[str, Any]:
+) -> Json:
     """Run a protocol and return its result, ready for JSON.
 
     Args:
@@ -195,8 +195,6 @@ def check_task(name: str, manifest: Mapping[str, Any], found: str) -> None:
     """Check that a checkpoint is of the scenario of a protocol.
 
     Args:
-        name: A protocol.
-        manifest: Manifest of the checkpoint.
         found: Name of the checkpoint in the error.
 
     Raises:
@@ -209,16 +207,16 @@ def check_task(name: str, manifest: Mapping[str, Any], found: str) -> None:
         fitting = set(PROTOCOLS) - WITHOUT_CHECKPOINT
         known = sorted(one for one in fitting if task_measured(one) == actual)
         rule = f"must be {_POLICIES[wanted]} for {name}; protocols of this one"
-        raise InvalidInput("checkpoint", found, f"{rule}: {', '.join(known)}")
-    if name in OF_CASES and manifest["cell"] != CASES_CELL:
+        rule = f"{rule}: {', '.join(known)}"
+    elif name in OF_CASES and manifest["cell"] != CASES_CELL:
         rule = f"must be of the cell {CASES_CELL!r} for {name}, not of {manifest['cell']!r}"
-        raise InvalidInput("checkpoint", found, rule)
-    if name in OF_CHOICE and (lack := lacks_for_choice(cell_of(manifest))) is not None:
+    elif name in OF_CHOICE and (lack := lacks_for_choice(cell_of(manifest))) is not None:
         rule = f"must be of another cell for {name}: its cell {lack}"
-        raise InvalidInput("checkpoint", found, rule)
-    if name == "reach-oracle" and manifest["preset"]["episode"]["collision"] == "blocks":
+    elif name == "reach-oracle" and manifest["preset"]["episode"]["collision"] == "blocks":
         rule = f"must be of a policy whose episodes end at contacts for {name}"
-        raise InvalidInput("checkpoint", found, rule)
+    else:
+        return
+    raise InvalidInput("checkpoint", found, rule)
 
 
 def lacks_for_choice(cell: Cell) -> str | None:

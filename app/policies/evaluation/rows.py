@@ -18,13 +18,9 @@ def ignore_row(_done: int, _total: int, _row: Row) -> None:
 
 
 class ReportedRows(list[Json]):
-    """Rows of a result; each is reported when it is appended.
+    """Rows of a result, ``total`` in the end; each is reported when it is appended."""
 
-    Args:
-        on_row: Callback.
-    """
-
-    def __init__(self, total: int, on_row: OnRow = ignore_row) -> None:
+    def __init__(self, total: int, on_row: OnRow) -> None:
         super().__init__()
         self._total, self._on_row = total, on_row
 

@@ -1,11 +1,9 @@
 """Commands that measure result files."""
 
-from typing import Any
-
 from app.policies.checkpoints.pretrained import SHA256
 from app.policies.evaluation.registry import default_checkpoint
+from app.policies.evaluation.rows import Json
 
-Json = dict[str, Any]
 _ALIASES = {sha256: alias for alias, sha256 in SHA256.items()}
 
 

@@ -3,11 +3,10 @@
 from typing import Any
 
 from app.policies.configs import presets
+from app.policies.evaluation.rows import Json
 from app.sim.cells.cell import load_cell
 from app.sim.people.pedestrian import PedestrianSettings
 from app.sim.scenario.kernels.episode import SUCCESS_DISTANCE
-
-Json = dict[str, Any]
 
 
 def stored_value(found: Json, row: str, key: str, unit: str = "") -> str | None:

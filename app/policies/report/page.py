@@ -17,10 +17,10 @@ import re
 from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 from app.errors import InvalidInput
 from app.policies.evaluation.registry import PROTOCOLS, default_checkpoint
+from app.policies.evaluation.rows import Json
 from app.policies.report.commands import command_of, writing_command
 from app.policies.report.numbers import curve_end, preset_value, reach_setting, stored_value
 
@@ -29,7 +29,6 @@ MEASURED = """Numbers from a *job*, as named below a table, were measured for th
 others are stored.
 
 """
-Json = dict[str, Any]
 Find = Callable[[str], Json | None]
 """Returns the result of a file, by its name without ``.json``."""
 RESULTS = Path(__file__).resolve().parents[3] / "docs/results"

@@ -63,27 +63,35 @@ def fitting(error: InvalidInput) -> set[str]:
     return set(error.rule.partition("protocols of this one: ")[2].split(", "))
 
 
-@pytest.mark.parametrize("name", sorted(OF_SORTING))
-def test_a_policy_that_picks_is_no_policy_that_sorts(name):
-    with pytest.raises(InvalidInput, match=f"must be a policy that sorts for {name}") as caught:
-        evaluate(name, pretrained.load("pick"), episodes=1)
-    assert caught.value.field == "checkpoint"
-    assert not fitting(caught.value) & OF_SORTING
+def picking() -> Checkpoint:
+    return pretrained.load("pick")
 
 
-def test_a_policy_that_sorts_is_no_policy_that_picks():
+def reaching() -> Checkpoint:
+    return untrained_reach(width=16)
+
+
+@pytest.mark.parametrize(
+    ("name", "wanted", "policy", "value"),
+    [
+        *((name, "sorts", picking, "pick-td3") for name in sorted(OF_SORTING)),
+        *((name, "reaches goals", picking, "pick-td3") for name in sorted(OF_REACHING)),
+        ("pick-single", "picks", untrained, "sorting-e0-dqn"),
+        ("sorting-people", "picks", untrained, "sorting-e0-dqn"),
+        ("pick-single", "picks", reaching, "reach-td3"),
+        ("sorting-grid", "sorts", reaching, "reach-td3"),
+    ],
+)
+def test_a_policy_of_another_scenario_is_refused(name, wanted, policy, value):
     with pytest.raises(
-        InvalidInput, match="must be a policy that picks for pick-single"
+        InvalidInput, match=f"must be a policy that {wanted} for {name}"
     ) as found:
-        evaluate("pick-single", untrained(), episodes=1)
-    assert (found.value.field, found.value.value) == ("checkpoint", "sorting-e0-dqn")
-    assert fitting(found.value) == OF_SORTING
-
-
-def test_full_sorting_tasks_are_executed_by_a_policy_that_picks():
-    assert default_checkpoint("sorting-people") == "pick"
-    with pytest.raises(InvalidInput, match="must be a policy that picks for sorting-people"):
-        evaluate("sorting-people", untrained(), episodes=1)
+        evaluate(name, policy(), episodes=1)
+    assert (found.value.field, found.value.value) == ("checkpoint", value)
+    if policy is picking:
+        assert not fitting(found.value) & (OF_SORTING | OF_REACHING)
+    else:
+        assert fitting(found.value) == (OF_SORTING if policy is untrained else OF_REACHING)
 
 
 @pytest.mark.parametrize("name", ["pick-cases", "pick-case-variants"])
@@ -111,24 +119,10 @@ def test_search_of_avoidable_contacts_is_of_policies_that_contacts_end():
     check_task("reach-smoothness", manifest, "authors")
 
 
-@pytest.mark.parametrize("name", ["pick-single", "sorting-grid"])
-def test_a_policy_that_reaches_neither_picks_nor_sorts(name):
-    with pytest.raises(InvalidInput, match=f"must be a policy that .* for {name}") as found:
-        evaluate(name, untrained_reach(width=16), episodes=1)
-    assert (found.value.field, found.value.value) == ("checkpoint", "reach-td3")
-    assert fitting(found.value) == OF_REACHING
-
-
-@pytest.mark.parametrize("name", sorted(OF_REACHING))
-def test_a_policy_that_picks_reaches_no_goals(name):
-    with pytest.raises(InvalidInput, match="must be a policy that reaches goals for") as found:
-        evaluate(name, pretrained.load("pick"), episodes=1)
-    assert not fitting(found.value) & (OF_REACHING | OF_SORTING)
-
-
 def test_every_protocol_has_a_checkpoint_and_a_most_number_of_episodes_of_its_own():
     assert default_checkpoint("sorting-grid") == "sorting-e0"
     assert default_checkpoint("pick-choice") == "pick"
+    assert default_checkpoint("sorting-people") == "pick"
     assert most_episodes("sorting-tests") == MAX_SORTING_EPISODES < most_episodes("pick-single")
     with pytest.raises(InvalidInput, match="10000"):
         evaluate("sorting-grid", untrained(), episodes=MAX_SORTING_EPISODES + 1)

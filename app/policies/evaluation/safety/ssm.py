@@ -59,7 +59,7 @@ def trials() -> dict[str, list[TrialSettings]]:
     return rows
 
 
-def _row(name: str, results: list[TrialResult]) -> dict[str, Any]:
+def _row(name: str, results: list[TrialResult]) -> Json:
     """Return one row: all its episodes together."""
     n, moving = sum(r.n for r in results), sum(r.n_moving for r in results)
     periods = np.array([r.n_steps for r in results])
