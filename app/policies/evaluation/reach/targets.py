@@ -59,15 +59,6 @@ def by_target(episodes: ReachEpisodes, targets: Vec, base_height: float) -> list
     ]
 
 
-def worst_of(cells: list[Json]) -> list[Json]:
-    """Return the targets with the fewest successes, the worst first."""
-    ranked = sorted(cells, key=lambda cell: cell["success"]["mean"])
-    return [
-        {"goal": cell["goal"], "height_m": cell["height_m"], **cell["success"]}
-        for cell in ranked[:N_WORST]
-    ]
-
-
 def ends_over_time(episodes: ReachEpisodes) -> list[Json]:
     """Return the numbers of successes and collisions in each time interval."""
     edges = np.arange(0.0, episodes.limit_s + 0.5 * END_STEP_S, END_STEP_S)
@@ -90,7 +81,10 @@ def run_targets(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
         row: Json = {
             "initial_contact": episodes.initial_contact(),
             "starts_redrawn": float(np.mean(episodes.redrawn > 0)),
-            "worst": worst_of(cells),
+            "worst": [
+                {"goal": cell["goal"], "height_m": cell["height_m"], **cell["success"]}
+                for cell in sorted(cells, key=lambda cell: cell["success"]["mean"])[:N_WORST]
+            ],
             "ends": ends_over_time(episodes),
             "targets": cells,
         }
