@@ -14,33 +14,29 @@ beside recorded people.
 """
 
 import argparse
-import json
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import torch
 
 from app.cli.recordings import clean_runs
 from app.errors import InvalidInput
-from app.policies.checkpoints.checkpoint import Checkpoint, load
+from app.policies.checkpoints.checkpoint import Checkpoint
 from app.policies.evaluation.pick import selection_rules
 from app.policies.evaluation.pick.episodes import PickBench
 from app.policies.evaluation.rows import EvaluationRequest
 from app.policies.evaluation.statistics import clustered
 from app.policies.inference.task_selection import HYSTERESIS
-from app.provenance import describe
 from app.sim.mocap.importer import Motion
 from app.sim.people.human_motion_config import at_the_table
 from app.sim.pick.batch import PickSettings
-
-ROOT = Path(__file__).resolve().parents[2]
+from tools.docs.results import RESULTS, Json, read_result, write_result
+from tools.docs.training_curves import read
 
 KINDS = ("sampled", "replayed")
 EPISODES, SEED = 1000, 11
-RESULTS = ROOT / "docs/results/augmentation.json"
-Json = dict[str, Any]
+RESULT = RESULTS / "augmentation.json"
 
 
 def trained(folder: Path, kind: str) -> dict[int, Checkpoint]:
@@ -55,16 +51,15 @@ def trained(folder: Path, kind: str) -> dict[int, Checkpoint]:
     """
     found: dict[int, Checkpoint] = {}
     for path in sorted(folder.glob(f"{kind}-*/policy.json")):
-        manifest = json.loads(path.read_text(encoding="utf-8"))
-        preset, place = manifest["preset"], path.parent.name
+        manifest, place = read_result(path), path.parent.name
+        preset = manifest["preset"]
         augmentation = preset["people"]["augmentation"]
         total_steps = preset["learning"]["total_steps"]
         if augmentation != kind:
             raise InvalidInput(place, augmentation, f"must be trained with {kind}")
         if manifest["step"] < total_steps:
             raise InvalidInput(place, manifest["step"], f"must reach {total_steps}")
-        tensors = path.with_suffix(".safetensors").read_bytes()
-        found[int(manifest["seed"])] = load(manifest, tensors)
+        found[int(manifest["seed"])] = read(path)
     if len(found) < 2:
         raise InvalidInput(str(folder), len(found), f"must hold two or more {kind}-SEED")
     return found
@@ -149,9 +144,8 @@ def main() -> None:
             for kind, found in policies.items()
         },
         "results": table_of(rates),
-        "machine": describe(),
     }
-    RESULTS.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
+    write_result(RESULT, result)
 
 
 if __name__ == "__main__":

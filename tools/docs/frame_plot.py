@@ -6,8 +6,6 @@ Writes ``docs/img/frame.png`` for ``docs/http.md``: the cell ``pick-and-place`` 
 from the side, with robot and person drawn as the capsules of the simulator.
 """
 
-from pathlib import Path
-
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -21,11 +19,10 @@ from app.sim.human.model import rest_posture
 from app.sim.robot.kernels.arm import new_robot_pose, place_robot
 from app.sim.scene.scene import arm_of, people_geometry_of, people_of
 from tools.arguments import parser_of
+from tools.docs.results import IMAGES
 from tools.docs.world.plots import BLUE, GREEN, GREY, LIGHT, ORANGE, RED, panels, save
 
-ROOT = Path(__file__).resolve().parents[2]
-
-IMAGE = ROOT / "docs/img/frame.png"
+IMAGE = IMAGES / "frame.png"
 X, Y, Z = range(3)
 NAMES, COLOURS = ("x", "y", "z"), (RED, GREEN, BLUE)
 INK = "#374151"

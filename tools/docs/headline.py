@@ -3,11 +3,9 @@
 Numbers come from ``docs/results/*.json``; baselines of the thesis are constants of this module.
 """
 
-import json
 from pathlib import Path
-from typing import Any
 
-Json = dict[str, Any]
+from tools.docs.results import Json, read_if_measured
 
 FILES = (
     "pick-single",
@@ -47,11 +45,9 @@ def lines(results: Path) -> list[list[str]] | None:
     """
     found: dict[str, dict[str, Json]] = {}
     for name in FILES:
-        path = results / f"{name}.json"
-        if not path.exists():
+        if (result := read_if_measured(results / f"{name}.json")) is None:
             return None
-        rows = json.loads(path.read_text(encoding="utf-8"))["results"]
-        found[name] = {row["name"]: row for row in rows}
+        found[name] = {row["name"]: row for row in result["results"]}
     pick, choice, hard, reach, ssm, sorting, safety = (found[name] for name in FILES)
     rollout, planner = ssm[f"policy-rollout{DIRECTED}"], ssm[f"rrtstar-once{DIRECTED}"]
     return [

@@ -8,15 +8,12 @@ import argparse
 import json
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import Any
 
 import torch
 
 from app.policies.checkpoints.checkpoint import Checkpoint
-from app.provenance import describe
+from tools.docs.results import Json, read_if_measured, write_result
 from tools.docs.training_curves import read
-
-Json = dict[str, Any]
 
 
 def lines(path: Path) -> list[Json]:
@@ -45,14 +42,8 @@ def add_curves(path: Path, command: str, seed: int, new: Sequence[Json]) -> None
         command: Command stated in the result.
         seed: Seed of the episodes.
     """
-    found = json.loads(path.read_text(encoding="utf-8"))["curves"] if path.exists() else []
-    result = {
-        "command": command,
-        "seed": seed,
-        "curves": merged(found, new),
-        "machine": describe(),
-    }
-    path.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
+    found = (read_if_measured(path) or {"curves": []})["curves"]
+    write_result(path, {"command": command, "seed": seed, "curves": merged(found, new)})
 
 
 def collect(

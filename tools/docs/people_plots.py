@@ -8,16 +8,13 @@ the markers ``task-primitives``. Seeded; takes about 15 s.
 """
 
 import argparse
-import json
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
-from app.provenance import describe
 from app.sim.cells.cell import Cell, load_cell
 from app.sim.core.arrays import Vec
 from app.sim.human import model as human
@@ -27,14 +24,13 @@ from app.sim.primitives.library_file import FILE, load_primitives, read_header
 from app.sim.primitives.primitive_library import MotionLibrary, motion_library
 from tests.sim.library_motions import SegmentMotion, random_segment, random_segments
 from tools.demonstrations import PHASES, between
+from tools.docs.results import IMAGES, RESULTS, ROOT, Json, read_result, write_result
 from tools.docs.world.plots import BLUE, GREEN, GREY, LIGHT, ORANGE, panels, save
-
-ROOT = Path(__file__).resolve().parents[2]
 
 SEED, LEGS = 11, 4000
 DRAWN = 10
 """Segments drawn per primitive and direction."""
-RESULTS, IMAGES = ROOT / "docs/results", ROOT / "docs/img/people"
+PICTURES = IMAGES / "people"
 PAGE = ROOT / "docs/people.md"
 BEGIN, END = "<!-- begin task-primitives -->\n", "<!-- end task-primitives -->"
 KINDS = {"home-cube": (1, 6), "home-dock": (1, 2), "cube-dock": (2, 6)}
@@ -44,7 +40,6 @@ BONES = (
     ("neck", "shoulder_r", "elbow_r", "wrist_r", "hand_r"),
     ("neck", "shoulder_l", "elbow_l", "wrist_l", "hand_l"),
 )
-Json = dict[str, Any]
 
 
 def measure(cell: Cell, library: MotionLibrary) -> Json:
@@ -83,7 +78,6 @@ def measure(cell: Cell, library: MotionLibrary) -> Json:
         "gain_max": float(np.abs(library.gain).max()),
         "primitives": rows,
         "header": {key: value for key, value in read_header().items() if key != "tasks"},
-        "machine": describe(),
     }
 
 
@@ -227,7 +221,7 @@ def _spread(one: Json) -> str:
 
 def page(text: str, results: Path = RESULTS) -> str:
     """Return the text of a page with the section replaced."""
-    found = json.loads((results / "task-primitives.json").read_text(encoding="utf-8"))
+    found = read_result(results / "task-primitives.json")
     before, rest = text.split(BEGIN)
     return before + BEGIN + section(found) + END + rest.split(END)[1]
 
@@ -239,11 +233,10 @@ def main() -> None:
     if not parser.parse_args().page:
         cell = load_cell()
         library = motion_library(cell, 0)
-        text = json.dumps(measure(cell, library), indent=1) + "\n"
-        (RESULTS / "task-primitives.json").write_text(text, encoding="utf-8")
+        write_result(RESULTS / "task-primitives.json", measure(cell, library))
         for kind in KINDS:
-            save(draw_kind, IMAGES / f"{kind}.png", cell, library, kind)
-        save(draw_styles, IMAGES / "styles.png", cell)
+            save(draw_kind, PICTURES / f"{kind}.png", cell, library, kind)
+        save(draw_styles, PICTURES / "styles.png", cell)
     PAGE.write_text(page(PAGE.read_text(encoding="utf-8")), encoding="utf-8")
 
 

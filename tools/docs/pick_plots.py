@@ -7,20 +7,15 @@ writes ``docs/img/pick/cases.png``, like figures 5.4 to 5.7 of the thesis, ``rel
 and ``curve-thesis.png``, like figure 5.3.
 """
 
-import json
-from pathlib import Path
-from typing import Any
-
 import numpy as np
 from matplotlib.figure import Figure
 
 from app.sim.pick.cases import find_case
 from tools.arguments import parser_of
+from tools.docs.results import IMAGES, RESULTS, Json, read_result
 from tools.docs.world.plots import BLUE, GREEN, GREY, ORANGE, RED, panels, save
 
-ROOT = Path(__file__).resolve().parents[2]
-RESULTS, IMAGES = ROOT / "docs/results", ROOT / "docs/img/pick"
-Json = dict[str, Any]
+PICTURES = IMAGES / "pick"
 
 
 def cases(result: Json) -> Figure:
@@ -93,8 +88,7 @@ def main() -> None:
         ("risk-calibration", reliability, "reliability.png"),
         ("thesis-pick", curve, "curve-thesis.png"),
     ):
-        result = json.loads((RESULTS / f"{name}.json").read_text("utf-8"))
-        save(draw, IMAGES / image, result)
+        save(draw, PICTURES / image, read_result(RESULTS / f"{name}.json"))
 
 
 if __name__ == "__main__":

@@ -1,12 +1,9 @@
 """The table of picks by training seeds, the shipped policy first."""
 
-import json
 from pathlib import Path
-from typing import Any
 
 from tools.docs.headline import percent, share
-
-Json = dict[str, Any]
+from tools.docs.results import Json, read_if_measured
 
 SUFFIXES = {"1, shipped": "", "2": "-seed2", "3": "-seed3"}
 """Training seeds, and the suffixes of their result files."""
@@ -36,12 +33,11 @@ def lines(results: Path) -> list[list[str]] | None:
 
 def _column(results: Path, suffix: str) -> dict[str, str] | None:
     """Return the cells of one training seed by their row."""
-    paths = {name: results / f"{name}{suffix}.json" for name in (SINGLE, CHOICE, HARD, CASES)}
-    if not all(path.exists() for path in paths.values()):
-        return None
-    found: dict[str, Json] = {
-        name: json.loads(path.read_text(encoding="utf-8")) for name, path in paths.items()
-    }
+    found: dict[str, Json] = {}
+    for name in (SINGLE, CHOICE, HARD, CASES):
+        if (result := read_if_measured(results / f"{name}{suffix}.json")) is None:
+            return None
+        found[name] = result
     rows = {name: {row["name"]: row for row in one["results"]} for name, one in found.items()}
     policy = rows[SINGLE]["policy"]
     cells = {

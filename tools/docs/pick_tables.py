@@ -1,11 +1,10 @@
 """Tables of the pick protocols with forms of their own: cases, calibration, SSM, pairs."""
 
 from collections.abc import Callable, Mapping
-from typing import Any
 
 from tools.docs.headline import percent, share
+from tools.docs.results import Json
 
-Json = dict[str, Any]
 CASES, VARIANTS = "pick-cases", "pick-case-variants"
 CALIBRATION, MONITORED = "risk-calibration", "pick-ssm"
 

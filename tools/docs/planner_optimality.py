@@ -10,15 +10,11 @@ executed one move at a time with replanning after each move.
 """
 
 import argparse
-import json
 import time
 from collections.abc import Sequence
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from app.provenance import describe
 from app.sim.sorting.batch import apply
 from app.sim.sorting.kernels.planner import new_work
 from app.sim.sorting.kernels.planner_batch import TaskBatch, plan_rows
@@ -31,17 +27,15 @@ from tests.sim.sorting.sorting_search import (
     moves_to_go,
     random_task,
 )
+from tools.docs.results import RESULTS, Json, write_result
 
-ROOT = Path(__file__).resolve().parents[2]
-
-RESULTS = ROOT / "docs/results/planner-optimality.json"
+RESULT = RESULTS / "planner-optimality.json"
 SAME = 1e-9
 """Tolerance for equal attempts (relative)."""
 ALL_PLANS_CELLS = 4
 """Largest number of slots for the search over all plans."""
 SIZES = ((10, 2), (20, 3), (40, 5))
 """Slots and colours of the timed tasks."""
-Json = dict[str, Any]
 
 
 def replanned(state: SortingState, shape: SortingShape) -> list[Move]:
@@ -157,9 +151,8 @@ def main() -> None:
         "cpu_time": [
             times(*size, on_towers, options.seed) for size in SIZES for on_towers in (0.0, 0.5)
         ],
-        "machine": describe(),
     }
-    RESULTS.write_text(json.dumps(results, indent=1) + "\n", encoding="utf-8")
+    write_result(RESULT, results)
 
 
 if __name__ == "__main__":

@@ -8,10 +8,9 @@ of the recipes, ``sorting-curves``, ``reach-curves`` and ``pick-curves`` of ours
 time, a line per seed. A curve without a result file is left out.
 """
 
-import json
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -20,10 +19,10 @@ from numpy.typing import NDArray
 
 from app.policies.configs import presets
 from tools.arguments import parser_of
+from tools.docs.results import IMAGES, RESULTS, Json, read_if_measured
 from tools.docs.world.plots import BLUE, GREEN, GREY, ORANGE, RED, panels, save
 
-ROOT = Path(__file__).resolve().parents[2]
-RESULTS, IMAGE = ROOT / "docs/results", ROOT / "docs/img/recipes.png"
+IMAGE = IMAGES / "recipes.png"
 AXES = (
     ("step", "environment steps"),
     ("updates", "updates"),
@@ -35,7 +34,6 @@ FOUR = "four attempts per update"
 """Another one."""
 POOLED = 200
 """Least number of episodes behind a drawn point."""
-Json = dict[str, Any]
 Grid = NDArray[np.float64]
 
 
@@ -123,9 +121,8 @@ def pooled(curve: Json) -> list[Json]:
 
 def curves_of(results: Path, file: str, name: str) -> list[Json]:
     """Return the curves of a preset in a result file, one per seed; empty without the file."""
-    path = results / f"{file}.json"
-    found = json.loads(path.read_text("utf-8"))["curves"] if path.exists() else []
-    return [one for one in found if one["name"] == name]
+    found = read_if_measured(results / f"{file}.json") or {"curves": []}
+    return [one for one in found["curves"] if one["name"] == name]
 
 
 def _columns(points: Sequence[Json], over: str, end: str) -> tuple[Grid, Grid]:

@@ -9,18 +9,15 @@ between model and recorded points. The recordings are not part of this repositor
 """
 
 import argparse
-import json
 import time
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from app.provenance import describe
 from app.sim.core.arrays import Vec
 from app.sim.mocap.artifacts import MAX_SPEED, Artifact, clean_runs, find_artifacts
 from app.sim.mocap.bvh import read_bvh
@@ -36,11 +33,10 @@ from app.sim.mocap.joint_centres import (
     model_points,
 )
 from app.sim.mocap.skeletons import body_track
+from tools.docs.results import IMAGES, RESULTS, Json, write_result
 from tools.docs.world.plots import BLUE, GREEN, GREY, ORANGE, RED, panels, save
 
-ROOT = Path(__file__).resolve().parents[2]
-
-RESULTS, IMAGE = ROOT / "docs/results/recordings.json", ROOT / "docs/img/motions/error.png"
+RESULT, IMAGE = RESULTS / "recordings.json", IMAGES / "motions/error.png"
 WRISTS = {"right wrist": (WRIST_R, BLUE), "left wrist": (WRIST_L, ORANGE)}
 POINTS = {"pelvis": (PELVIS, GREEN), **WRISTS}
 LABELS = {
@@ -56,7 +52,6 @@ NEIGHBOURS = 0.12
 """Artefacts closer than this share of the file share a label."""
 TIMINGS = 3
 """Imports of each file; the fastest counts."""
-Json = dict[str, Any]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -251,9 +246,8 @@ def main() -> None:
     result = {
         "command": "python -m tools.docs.recording_plots FILE ...",
         "results": [row(path) for path in files],
-        "machine": describe(),
     }
-    RESULTS.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
+    write_result(RESULT, result)
     save(draw, IMAGE, shown_of([clip_errors(path) for path in files]))
 
 

@@ -8,14 +8,13 @@ Chromium, which draws the scene in software: about two minutes on two free cores
 """
 
 import shutil
-from pathlib import Path
 from typing import NamedTuple
 
 from playwright.sync_api import Page, ViewportSize, sync_playwright
 
 from tools.arguments import parser_of
+from tools.docs.results import IMAGES
 
-IMAGES = Path(__file__).resolve().parents[2] / "docs/img"
 FLAGS = ("--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader")
 SIZE = ViewportSize(width=1440, height=900)
 PATIENCE_MS = 180_000

@@ -9,23 +9,19 @@ results without rows are written by other scripts. A section without a result fi
 unchanged and reported by a test. A second test compares pages and results.
 """
 
-import json
 import re
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 from app.policies.report.commands import command_of
 from tools.arguments import parser_of
 from tools.docs import headline, pick_seeds, pick_tables
 from tools.docs.reach import tables as reach_tables
+from tools.docs.results import ROOT, Json, read_if_measured
 from tools.docs.sorting.tables import is_sorting, lines_of
 
-ROOT = Path(__file__).resolve().parents[2]
-
 BLOCK = re.compile(r"(<!-- begin ([a-z0-9_-]+) -->\n).*?(<!-- end \2 -->)", re.DOTALL)
-Json = dict[str, Any]
 MULTI_RESULT_TABLES = {"headline": headline.lines, "pick-seeds": pick_seeds.lines}
 """Tables of several results by their names."""
 UNITS = {
@@ -55,10 +51,8 @@ def render(text: str, results: Path) -> str:
             lines = MULTI_RESULT_TABLES[match[2]](results)
             return match[0] if lines is None else f"{match[1]}{_table(lines)}\n{match[3]}"
         path = results / f"{match[2].removesuffix(reach_tables.DIRECTED)}.json"
-        if not path.exists():
-            return match[0]
-        found = json.loads(path.read_text(encoding="utf-8"))
-        if "results" not in found:
+        found = read_if_measured(path)
+        if found is None or "results" not in found:
             return match[0]
         found = reach_tables.part_of(found, directed=match[2].endswith(reach_tables.DIRECTED))
         others = reach_tables.siblings(path) if reach_tables.is_reach(found) else []

@@ -11,7 +11,6 @@ Writes ``docs/results/task-maximisation-bias.json`` and
 """
 
 import argparse
-import json
 import math
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -31,17 +30,16 @@ from app.policies.inference.value_networks import pick_preset_of
 from app.policies.networks.pick import actor_of, critics_for
 from app.policies.training.curve import play
 from app.policies.training.pick import settings_of, values_of
-from app.provenance import describe
 from app.sim.cells.cell import load_cell
 from app.sim.pick.batch import OUTCOMES
 from app.sim.pick.valued_targets import ValuedTargetBatch
 from tools.docs.learning_curves import policies
+from tools.docs.results import IMAGES, RESULTS, Json, write_result
 from tools.docs.training_curves import record
 from tools.docs.world.plots import BLUE, GREY, ORANGE, panels, save
 
-ROOT = Path(__file__).resolve().parents[2]
-RESULT = ROOT / "docs/results/task-maximisation-bias.json"
-IMAGE = ROOT / "docs/img/pick/task-maximisation-bias.png"
+RESULT = RESULTS / "task-maximisation-bias.json"
+IMAGE = IMAGES / "pick/task-maximisation-bias.png"
 CHOICES = ("critic", "uniform")
 SEEDS = (1, 2, 3)
 EPISODES, SEED = 1600, 11
@@ -59,7 +57,6 @@ SETUP: dict[str, Any] = {
 }
 """Changes to ``pick-reach-td3`` in all trainings: targets are stations, and no start depends
 on the target."""
-Json = dict[str, Any]
 Numbers = dict[str, dict[str, float]]
 """Numbers of one policy by row and name."""
 
@@ -245,9 +242,8 @@ def main() -> None:
         "settings": {"preset": "pick-reach-td3", **SETUP, "seeds": list(options.seeds)},
         "results": rows,
         "paired": paired,
-        "machine": describe(),
     }
-    RESULT.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
+    write_result(RESULT, result)
     save(draw, IMAGE, result)
 
 

@@ -14,7 +14,6 @@ fields are listed in the file.
 
 import argparse
 from pathlib import Path
-from typing import Any
 
 import torch
 
@@ -29,14 +28,13 @@ from app.sim.cells.cell import load_cell
 from app.sim.pick.batch import PickBatch
 from app.sim.reach.mixed_batch import ReachEnvironments
 from tools.docs.learning_curves import add_curves, lines
+from tools.docs.results import RESULTS, Json
 from tools.docs.training_curves import read
 
-RESULTS = Path(__file__).resolve().parents[2] / "docs/results"
 KEYS = (
     "step", "updates", "cpu_s", "episodes", "success", "collision", "timeout", "reward",
 )  # fmt: skip
 """Content of a point."""
-Json = dict[str, Any]
 
 
 class StandingStill(torch.nn.Module):

@@ -25,8 +25,6 @@ from app.policies.training.state import TrainingState
 from app.policies.training.state_folder import StateFolder
 from app.policies.training.train import train
 
-ROOT = Path(__file__).resolve().parents[2]
-
 
 def main() -> None:
     """Train one preset with one seed."""

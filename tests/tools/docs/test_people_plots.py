@@ -4,7 +4,8 @@ import json
 from pathlib import Path
 
 from app.sim.primitives.library_file import load_primitives
-from tools.docs.people_plots import IMAGES, KINDS, PAGE, RESULTS, page
+from tools.docs.people_plots import KINDS, PAGE, PICTURES, page
+from tools.docs.results import RESULTS, read_result
 from tools.make_primitives import N_DEMONSTRATIONS, SEED
 
 
@@ -14,7 +15,7 @@ def test_page_is_what_the_results_give() -> None:
 
 
 def test_every_number_of_the_section_follows_the_results(tmp_path: Path) -> None:
-    found = json.loads((RESULTS / "task-primitives.json").read_text(encoding="utf-8"))
+    found = read_result(RESULTS / "task-primitives.json")
     found["lowest_m"], found["primitives"][0]["duration_s"] = 0.077, 7.7
     (tmp_path / "task-primitives.json").write_text(json.dumps(found), encoding="utf-8")
     text = page(PAGE.read_text(encoding="utf-8"), tmp_path)
@@ -22,7 +23,7 @@ def test_every_number_of_the_section_follows_the_results(tmp_path: Path) -> None
 
 
 def test_section_describes_the_shipped_primitives() -> None:
-    found = json.loads((RESULTS / "task-primitives.json").read_text(encoding="utf-8"))
+    found = read_result(RESULTS / "task-primitives.json")
     assert found["header"]["seed"] == SEED
     assert found["header"]["demonstrations"] == N_DEMONSTRATIONS
     legs = [(one["start"], one["end"], one["hand"]) for one in found["primitives"]]
@@ -33,4 +34,4 @@ def test_section_shows_a_small_picture_of_every_kind_of_leg() -> None:
     text = PAGE.read_text(encoding="utf-8")
     for name in (*KINDS, "styles"):
         assert f"](img/people/{name}.png)" in text
-        assert (IMAGES / f"{name}.png").stat().st_size <= 300_000
+        assert (PICTURES / f"{name}.png").stat().st_size <= 300_000

@@ -1,18 +1,13 @@
 """The pictures of the case studies and of the calibration show what the results state."""
 
-import json
-
 import numpy as np
 
-from tools.docs.pick_plots import IMAGES, RESULTS, ROOT, cases, reliability
-
-
-def stored(name: str) -> dict:
-    return json.loads((RESULTS / f"{name}.json").read_text("utf-8"))
+from tools.docs.pick_plots import PICTURES, cases, reliability
+from tools.docs.results import RESULTS, ROOT, read_result
 
 
 def test_each_case_shows_the_values_of_both_goals_over_time() -> None:
-    result = stored("pick-cases")
+    result = read_result(RESULTS / "pick-cases.json")
     for view, row in zip(cases(result).axes, result["results"], strict=True):
         curves = result["curves"][row["name"]]
         medians = {tuple(line.get_ydata()) for line in view.lines}
@@ -22,7 +17,7 @@ def test_each_case_shows_the_values_of_both_goals_over_time() -> None:
 
 
 def test_the_reliability_diagram_shows_every_bin() -> None:
-    result = stored("risk-calibration")
+    result = read_result(RESULTS / "risk-calibration.json")
     for view, row in zip(reliability(result).axes, result["results"], strict=False):
         assert view.get_title() == row["name"]
         success = view.lines[0]
@@ -33,5 +28,5 @@ def test_the_reliability_diagram_shows_every_bin() -> None:
 def test_the_page_shows_the_pictures() -> None:
     page = (ROOT / "docs/results/pick.md").read_text("utf-8")
     for image in ("cases.png", "reliability.png"):
-        assert (IMAGES / image).is_file()
+        assert (PICTURES / image).is_file()
         assert f"(../img/pick/{image})" in page

@@ -3,10 +3,10 @@ from pathlib import Path
 import pytest
 
 from tools.docs.reach.tables import DIRECTED
+from tools.docs.results import ROOT
 from tools.docs.tables import (
     BLOCK,
     MULTI_RESULT_TABLES,
-    ROOT,
     conditions,
     header,
     pages,

@@ -13,7 +13,6 @@ success rate to the base preset (Welch's t).
 """
 
 import argparse
-import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from statistics import median
@@ -28,14 +27,12 @@ from app.policies.checkpoints.checkpoint import Checkpoint
 from app.policies.configs import presets
 from app.policies.evaluation.reach.bench import ReachBench
 from app.policies.evaluation.statistics import clustered
-from app.provenance import describe
 from tools.docs.learning_curves import lines
 from tools.docs.reach.curves import ENDS
+from tools.docs.results import RESULTS, Json, write_result
 from tools.docs.training_curves import read_if_there, record
 
-ROOT = Path(__file__).resolve().parents[3]
-
-RESULTS = ROOT / "docs/results/reach-ablation.json"
+RESULT = RESULTS / "reach-ablation.json"
 BASE = "reach-td3"
 SHORT = {
     "learning.total_steps": 1_280_000,
@@ -63,7 +60,6 @@ CHANGES: Mapping[str, Mapping[str, Any]] = {
 PER_TARGET = 50
 SEED = 77
 """Seed of the episodes; not used in training or in reported results."""
-Json = dict[str, Any]
 
 
 def folder_of(root: Path, name: str, seed: int) -> Path:
@@ -166,9 +162,8 @@ def main() -> None:
         "episodes": options.episodes,
         "changes": {name: dict(changed) for name, changed in CHANGES.items()},
         "results": measured(options.folder, options.seeds, options.episodes),
-        "machine": describe(),
     }
-    RESULTS.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
+    write_result(RESULT, result)
 
 
 if __name__ == "__main__":

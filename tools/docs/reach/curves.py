@@ -13,18 +13,16 @@ A curve has ``played``, the greedy evaluations during training on the goals of t
 """
 
 from pathlib import Path
-from typing import Any
 
 from app.policies.evaluation.reach.bench import ReachBench
 from tools.docs.learning_curves import collect, lines, policies
+from tools.docs.results import RESULTS, Json
 
-RESULTS = Path(__file__).resolve().parents[3] / "docs/results/reach-curves.json"
 SEED = 77
 """Seed of the episodes; not used in training."""
 PER_TARGET = 20
 """Episodes of each target (docs/method.md 2.5)."""
 ENDS = ("success", "collision", "timeout")
-Json = dict[str, Any]
 
 
 def curve_of_run(folder: Path, per_target: int | None) -> Json:
@@ -68,7 +66,7 @@ def curve_of_stock(name: str, path: Path) -> Json:
 if __name__ == "__main__":
     collect(
         "Collect learning curves of reaching.",
-        results=RESULTS,
+        results=RESULTS / "reach-curves.json",
         command="python -m tools.docs.reach.curves RUN ...",
         seed=SEED,
         of_run=curve_of_run,

@@ -11,7 +11,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullFormatter
 
-from tools.docs.reach.style import INK, MODES, PURPLE, Json, draw_rates, percent
+from tools.docs.reach.style import INK, MODES, PURPLE, draw_rates, percent
+from tools.docs.results import Json
 from tools.docs.world.plots import BLUE, GREEN, GREY, ORANGE, RED, panels
 
 PEOPLE = {"direct": "nearest person", "direct-rollout": "nearest, rollout"}

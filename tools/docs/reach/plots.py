@@ -8,10 +8,8 @@ between targets, other people and trackers, joint trajectories of an episode, an
 curves. Pictures without results are skipped.
 """
 
-import json
 from collections.abc import Sequence
 from itertools import count, islice
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -24,14 +22,13 @@ from app.sim.people.kernels.pedestrian import WALKING
 from app.sim.people.pedestrian import PedestrianSettings
 from tools.arguments import parser_of
 from tools.docs.reach.other_plots import curves, others, smoothness
-from tools.docs.reach.style import INK, MODES, PURPLE, Json, draw_rates, percent
+from tools.docs.reach.style import INK, MODES, PURPLE, draw_rates, percent
 from tools.docs.reach.tables import policy_of, siblings
+from tools.docs.results import IMAGES, RESULTS, Json, read_if_measured
 from tools.docs.world.plots import BLUE, GREEN, GREY, MISSES, ORANGE, RED, panels, save
 from tools.docs.world.walks import Walk, walk
 
-ROOT = Path(__file__).resolve().parents[3]
-
-RESULTS, IMAGES = ROOT / "docs/results", ROOT / "docs/img/reach"
+PICTURES = IMAGES / "reach"
 FLOOR, CEILING = 0.90, 0.10
 """Success at and below which, and collisions at and above which, the colour saturates."""
 HITS = LinearSegmentedColormap.from_list("hits", ["#f4f5f7", "#f3c567", "#d9622b", "#7f1d1d"])
@@ -40,8 +37,7 @@ HITS = LinearSegmentedColormap.from_list("hits", ["#f4f5f7", "#f3c567", "#d9622b
 
 def read(name: str) -> Json | None:
     """Return a result, or None if it does not exist."""
-    path = RESULTS / f"{name}.json"
-    return json.loads(path.read_text(encoding="utf-8")) if path.exists() else None
+    return read_if_measured(RESULTS / f"{name}.json")
 
 
 def read_all(name: str) -> list[Json]:
@@ -249,24 +245,24 @@ def four_walks() -> tuple[list[Walk], PedestrianSettings]:
 
 def main() -> None:
     """Draw the pictures of all existing results."""
-    save(walks, IMAGES / "walks.png", *four_walks())
+    save(walks, PICTURES / "walks.png", *four_walks())
     if targets := read("reach-targets"):
-        save(heat_maps, IMAGES / "targets.png", targets)
-        save(start_rules, IMAGES / "starts.png", targets)
+        save(heat_maps, PICTURES / "targets.png", targets)
+        save(start_rules, PICTURES / "starts.png", targets)
     if randoms := read_all("reach-random"):
-        save(between_targets, IMAGES / "between.png", randoms)
+        save(between_targets, PICTURES / "between.png", randoms)
     three = read_all("reach-people"), read("reach-speeds"), read("reach-tracker")
     if any(three):
-        save(others, IMAGES / "others.png", *three)
+        save(others, PICTURES / "others.png", *three)
     smooth = {
         one["settings"]["action"]["degree"]: one
         for one in reversed(read_all("reach-smoothness"))
         if one["example"]
     }
     if smooth:
-        save(smoothness, IMAGES / "smoothness.png", [smooth[k] for k in sorted(smooth)])
+        save(smoothness, PICTURES / "smoothness.png", [smooth[k] for k in sorted(smooth)])
     if trained := read("reach-curves"):
-        save(curves, IMAGES / "curves.png", trained["curves"])
+        save(curves, PICTURES / "curves.png", trained["curves"])
 
 
 if __name__ == "__main__":

@@ -10,24 +10,19 @@ thesis (greedy episodes on the goals of the training) [CPU min]. Writes
 """
 
 import argparse
-import json
 from pathlib import Path
-from typing import Any
 
 import torch
 
 from app.policies.evaluation.reach.bench import ReachBench, suffix_of
-from app.provenance import describe
 from tools.docs.learning_curves import lines
+from tools.docs.results import RESULTS, Json, write_result
 from tools.docs.training_curves import read
 
-ROOT = Path(__file__).resolve().parents[3]
-
-RESULTS = ROOT / "docs/results/reach-seeds.json"
+RESULT = RESULTS / "reach-seeds.json"
 THESIS_SUCCESS = 0.9176
 """Success on the targets in the thesis."""
 PER_TARGET = 100
-Json = dict[str, Any]
 
 
 def rows_of(folder: Path, seed: int, per_target: int) -> tuple[str, list[Json]]:
@@ -66,9 +61,8 @@ def main() -> None:
         "seed": options.seed,
         "episodes": options.episodes,
         "results": [row for _, rows in found for row in rows],
-        "machine": describe(),
     }
-    RESULTS.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
+    write_result(RESULT, result)
 
 
 if __name__ == "__main__":

@@ -7,21 +7,17 @@ override over time in one crossing (thesis fig. 4.9), and ``docs/img/reach/arriv
 share of the runs that reached the goal over time.
 """
 
-import json
 import sys
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
 
 from tools.arguments import parser_of
+from tools.docs.results import IMAGES, RESULTS, ROOT, Json, read_result
 from tools.docs.world.plots import BLUE, GREEN, GREY, ORANGE, RED, panels, save
 
-ROOT = Path(__file__).resolve().parents[3]
-
-RESULT = ROOT / "docs/results/reach-ssm.json"
-IMAGES = ROOT / "docs/img/reach"
+RESULT = RESULTS / "reach-ssm.json"
+PICTURES = IMAGES / "reach"
 ROWS = {
     "policy-rollout": ("policy with rollout", BLUE, "-"),
     "policy-rollout-ssm-agnostic": ("rollout without SSM", BLUE, "--"),
@@ -38,7 +34,6 @@ LAYER = "directed"
 """Assumption of the safety layer in the pictures."""
 SHOWN = ("policy-rollout", "rrtstar-once")
 """Rows of the override picture."""
-Json = dict[str, Any]
 
 
 def override(example: Json) -> Figure:
@@ -91,10 +86,10 @@ def main() -> int:
     if not RESULT.exists():
         print(f"{RESULT.relative_to(ROOT)} is not there: run `evaluate reach-ssm` first")
         return 1
-    result = json.loads(RESULT.read_text(encoding="utf-8"))
+    result = read_result(RESULT)
     example, seconds = result["example"][LAYER], result["seconds"][LAYER]
-    save(override, IMAGES / "override.png", example)
-    save(arrivals, IMAGES / "arrivals.png", seconds, result["settings"]["cap_s"])
+    save(override, PICTURES / "override.png", example)
+    save(arrivals, PICTURES / "arrivals.png", seconds, result["settings"]["cap_s"])
     return 0
 
 

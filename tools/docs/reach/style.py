@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 from matplotlib.ticker import FuncFormatter
 
+from tools.docs.results import Json
 from tools.docs.world.plots import BLUE, GREEN, ORANGE
 
-Json = dict[str, Any]
 PURPLE, INK = "#7c5aa6", "#374151"
 MODES = {
     "direct": ("direct", BLUE, "o"),

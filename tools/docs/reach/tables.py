@@ -5,12 +5,11 @@ other checkpoints under the same evaluation. Differences of rates are given in p
 points.
 """
 
-import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-Json = dict[str, Any]
+from tools.docs.results import Json, read_result
 
 RATES = {
     "n": "n",
@@ -121,7 +120,7 @@ def siblings(path: Path) -> list[Json]:
     found = []
     for other in sorted(path.parent.glob(f"{path.stem}.*.json")):
         label = other.name.removeprefix(f"{path.stem}.").removesuffix(".json")
-        found.append({"label": label, **json.loads(other.read_text(encoding="utf-8"))})
+        found.append({"label": label, **read_result(other)})
     return found
 
 

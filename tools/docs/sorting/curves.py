@@ -12,7 +12,6 @@ stored policy.
 """
 
 from pathlib import Path
-from typing import Any
 
 from app.policies.checkpoints.trained_cell import cell_of
 from app.policies.configs import presets
@@ -23,12 +22,11 @@ from app.sim.core.arrays import Vec
 from app.sim.sorting.batch import fail_of
 from app.sim.sorting.state import SortingShape
 from tools.docs.learning_curves import collect, lines, policies
+from tools.docs.results import RESULTS, Json
 
-RESULTS = Path(__file__).resolve().parents[3] / "docs/results/sorting-curves.json"
 SEED = 77
 """Seed of the episodes; not used in training."""
 STOCK = "stock Stable-Baselines3 DQN"
-Json = dict[str, Any]
 
 
 def curve_episodes(shape: SortingShape) -> int:
@@ -106,7 +104,7 @@ def _point(one: Json, step: int, mean_return: float) -> Json:
 if __name__ == "__main__":
     collect(
         "Collect learning curves of sorting.",
-        results=RESULTS,
+        results=RESULTS / "sorting-curves.json",
         command="python -m tools.docs.sorting.curves RUN ...",
         seed=SEED,
         of_run=curve_of_run,

@@ -7,9 +7,7 @@ over all pairs (K_E, K_G) as in thesis fig. 3.2, and ``curves-e0.png`` and ``cur
 learning curves as in thesis fig. 3.1. Pictures without results are skipped.
 """
 
-import json
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -21,11 +19,10 @@ from matplotlib.ticker import FuncFormatter, NullFormatter, PercentFormatter
 from numpy.typing import NDArray
 
 from tools.arguments import parser_of
+from tools.docs.results import IMAGES, RESULTS, Json, read_if_measured
 from tools.docs.world.plots import BLUE, GREEN, GREY, MISSES, ORANGE, RED, panels, save
 
-ROOT = Path(__file__).resolve().parents[3]
-
-RESULTS, IMAGES = ROOT / "docs/results", ROOT / "docs/img/sorting"
+PICTURES = IMAGES / "sorting"
 TASKS = ("e0", "e1")
 STARTS = ("clean", "disturbed")
 """Rows of the result to draw."""
@@ -33,7 +30,6 @@ FLOOR = 0.95
 """Success at and below which the colour saturates."""
 COLOURS = {"dqn": BLUE, "pure": GREEN, "thesis": ORANGE, "stock": GREY}
 """Colour of a curve by a part of its name; later entries take precedence."""
-Json = dict[str, Any]
 Grid = NDArray[np.float64]
 
 
@@ -179,18 +175,13 @@ def _columns(points: Sequence[Json], x: str, y: str) -> tuple[Grid, Grid]:
 def main() -> None:
     """Draw the pictures of all existing results."""
     for task in TASKS:
-        path = RESULTS / f"sorting-grid-{task}.json"
-        if path.exists():
-            result = json.loads(path.read_text(encoding="utf-8"))
-            save(heat_maps, IMAGES / f"grid-{task}.png", result)
-    path = RESULTS / "sorting-curves.json"
-    if not path.exists():
-        return
-    every = json.loads(path.read_text(encoding="utf-8"))["curves"]
+        if result := read_if_measured(RESULTS / f"sorting-grid-{task}.json"):
+            save(heat_maps, PICTURES / f"grid-{task}.png", result)
+    trained = read_if_measured(RESULTS / "sorting-curves.json") or {"curves": []}
     for task in TASKS:
-        of_task = [one for one in every if one["task"] == f"sorting-{task}"]
+        of_task = [one for one in trained["curves"] if one["task"] == f"sorting-{task}"]
         if of_task:
-            save(curves, IMAGES / f"curves-{task}.png", of_task)
+            save(curves, PICTURES / f"curves-{task}.png", of_task)
 
 
 if __name__ == "__main__":

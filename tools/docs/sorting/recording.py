@@ -7,7 +7,6 @@ episode is the first one of ``python -m app evaluate sorting-tests`` that is sol
 failed pick, as in the run that the thesis shows.
 """
 
-from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
@@ -34,9 +33,10 @@ from app.sim.sorting.benchmark_tasks import TESTS
 from app.sim.sorting.layout import block_height, half_size
 from app.sim.sorting.state import NULL, SortingShape, SortingState
 from tools.arguments import parser_of
+from tools.docs.results import IMAGES
 from tools.docs.world.plots import LIGHT, STYLE
 
-IMAGE = Path(__file__).resolve().parents[3] / "docs/img/sorting/test-4.gif"
+IMAGE = IMAGES / "sorting/test-4.gif"
 SEED, N_EPISODES = 11, 20
 """Seed of the stored result, and number of its episodes that are searched."""
 PER_SECOND, LAST = 1, 3

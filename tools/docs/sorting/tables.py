@@ -5,9 +5,8 @@ one line per measure, one column per row of the result.
 """
 
 from collections.abc import Mapping
-from typing import Any
 
-Json = dict[str, Any]
+from tools.docs.results import Json
 
 RATIOS = frozenset({"moves_over_minimum", "attempts_over_expected"})
 """Measures that are ratios, not rates."""

@@ -7,12 +7,10 @@ has two clutter slots, two colours and two sizes; its reachable states are enume
 """
 
 import argparse
-import json
 import re
 import time
 from collections.abc import Callable
-from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import torch
@@ -21,7 +19,6 @@ from numpy.typing import NDArray
 from app.policies.algorithms.dqn import SortingDQN
 from app.policies.algorithms.vecenv import BatchVecEnv
 from app.policies.configs.sorting import SortingPreset
-from app.provenance import describe
 from app.sim.cells.cell import load_cell
 from app.sim.core.arrays import Vec
 from app.sim.envs.sorting import SortingTask
@@ -36,10 +33,9 @@ from app.sim.sorting.batch import (
 from app.sim.sorting.kernels.reward import SortingWeights, distance_cost
 from app.sim.sorting.planner import solve
 from app.sim.sorting.state import SortingShape, SortingState
+from tools.docs.results import RESULTS, ROOT, Json, write_result
 
-ROOT = Path(__file__).resolve().parents[3]
-
-RESULTS, PAGE = ROOT / "docs/results/sorting-tiny.json", ROOT / "docs/sorting-tiny.md"
+RESULT, PAGE = RESULTS / "sorting-tiny.json", ROOT / "docs/sorting-tiny.md"
 SHAPE = SortingShape(n_cells=2, n_colours=2, n_sizes=2)
 FAIL = np.array([0.4, 0.1])
 """Failure probabilities of the two slots."""
@@ -58,7 +54,6 @@ NEAR = 0.005
 WEIGHTS = SortingWeights()
 NAMES = ("", "red small", "red large", "blue small", "blue large")
 """Objects by code."""
-Json = dict[str, Any]
 
 
 class Model(NamedTuple):
@@ -306,7 +301,6 @@ def measure(seed: int) -> Json:
             move_text(action) for action in solve(model.states[shown], SHAPE).first
         ],
         "attempts": {"tabular": TABLE_ENVS * TABLE_STEPS, "DQN": preset().learning.total_steps},
-        "machine": describe(),
     }
 
 
@@ -344,7 +338,7 @@ def main() -> None:
     options = parser.parse_args()
     torch.set_num_threads(1)
     found = measure(options.seed)
-    RESULTS.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
+    write_result(RESULT, found)
     PAGE.write_text(render(PAGE.read_text(encoding="utf-8"), found), encoding="utf-8")
 
 

@@ -4,7 +4,6 @@ Seeded. Called by ``world/page.py``.
 """
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -24,9 +23,9 @@ from app.sim.scene.scene import arm_of
 from tests.sim.configurations import CHUNK, N, configurations
 from tests.sim.fast_hands import HAND_SPEED, passes
 from tests.sim.mesh_gap import FARTHEST, Gap, gaps
+from tools.docs.results import Json
 from tools.docs.world.walks import Walk, walk
 
-Json = dict[str, Any]
 POSTURES = 2000
 """Number of configurations for the comparison of capsules and meshes."""
 EPISODES, PERIODS, HOLD = 40, 250, 15

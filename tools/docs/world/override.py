@@ -5,7 +5,6 @@ Measured and drawn for ``docs/world.md``.
 """
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -19,9 +18,9 @@ from app.sim.primitives.phase import min_jerk
 from app.sim.robot.ur10 import Robot
 from app.sim.safety.layer import SafetyLayer, safety_settings
 from app.sim.scene.scene import NO_CYLINDERS, arm_of, people_of
+from tools.docs.results import Json
 from tools.docs.world.plots import BLUE, GREY, RED, WIDTH
 
-Json = dict[str, Any]
 CUBES = ("cube0", "cube5")
 """Stations between which the robot moves."""
 FAR, NEAR = 3.2, 1.2

@@ -9,24 +9,20 @@ Seeded; takes about half a minute. The benchmarks ``sim-steps`` and ``sim-scalin
 """
 
 import argparse
-import json
 import sys
 from pathlib import Path
-from typing import Any
 
 from app.provenance import describe
+from tools.docs.results import IMAGES, RESULTS, ROOT, Json, read_result, write_result
 from tools.docs.tables import render
 from tools.docs.world import measures as world_measures
 from tools.docs.world import override as world_override
 from tools.docs.world import plots as world_plots
 
-ROOT = Path(__file__).resolve().parents[3]
-
 SEED = 11
-RESULTS, IMAGES = ROOT / "docs/results", ROOT / "docs/img/world"
+PICTURES = IMAGES / "world"
 PAGE, TEMPLATE = ROOT / "docs/world.md", ROOT / "tools/docs/world.template.md"
 SHARES = ("qd_share", "qdd_share", "jerk_share")
-Json = dict[str, Any]
 
 
 def values(world: Json, scaling: Json) -> Json:
@@ -106,27 +102,24 @@ def page(results: Path) -> str:
     Args:
         results: Folder of the JSON files.
     """
-    read = {
-        name: json.loads((results / f"{name}.json").read_text(encoding="utf-8"))
-        for name in ("world", "sim-scaling")
-    }
+    read = (read_result(results / f"{name}.json") for name in ("world", "sim-scaling"))
     text = TEMPLATE.read_text(encoding="utf-8")
-    return render(text.format(**values(read["world"], read["sim-scaling"])), results)
+    return render(text.format(**values(*read)), results)
 
 
 def measure_and_draw() -> Json:
     """Write the pictures; return the numbers."""
     machine = describe()  # of the tree that is measured, before a file is written
     gap, postures = world_measures.mesh_gap(SEED)
-    world_plots.save(world_plots.mesh_gap, IMAGES / "mesh-gap.png", postures)
+    world_plots.save(world_plots.mesh_gap, PICTURES / "mesh-gap.png", postures)
     limits, *shown = world_measures.limits(SEED)
-    world_plots.save(world_plots.limits, IMAGES / "limits.png", *shown)
+    world_plots.save(world_plots.limits, PICTURES / "limits.png", *shown)
     walker, *walks = world_measures.walker(SEED)
-    world_plots.save(world_plots.walker, IMAGES / "walker.png", *walks)
+    world_plots.save(world_plots.walker, PICTURES / "walker.png", *walks)
     visit, seen = world_override.visit()
-    world_plots.save(world_override.draw, IMAGES / "override.png", seen)
+    world_plots.save(world_override.draw, PICTURES / "override.png", seen)
     reach, maps = world_measures.reach()
-    world_plots.save(world_plots.reach, IMAGES / "reach.png", maps)
+    world_plots.save(world_plots.reach, PICTURES / "reach.png", maps)
     return {
         "page": "world",
         "seed": SEED,
@@ -143,8 +136,8 @@ def measure_and_draw() -> Json:
 
 def draw_scaling() -> None:
     """Draw what ``bench sim-scaling`` measured."""
-    scaling = json.loads((RESULTS / "sim-scaling.json").read_text(encoding="utf-8"))
-    world_plots.save(world_plots.scaling, IMAGES / "scaling.png", scaling["results"])
+    scaling = read_result(RESULTS / "sim-scaling.json")
+    world_plots.save(world_plots.scaling, PICTURES / "scaling.png", scaling["results"])
 
 
 def main() -> None:
@@ -154,13 +147,11 @@ def main() -> None:
         "--page", action="store_true", help="from docs/results, measuring nothing"
     )
     if not parser.parse_args().page:
-        text = json.dumps(measure_and_draw(), indent=1) + "\n"
-        (RESULTS / "world.json").write_text(text, encoding="utf-8")
+        write_result(RESULTS / "world.json", measure_and_draw())
     draw_scaling()
     PAGE.write_text(page(RESULTS), encoding="utf-8")
-    print(
-        f"{PAGE.relative_to(ROOT)}, {len(list(IMAGES.glob('*.png')))} pictures", file=sys.stderr
-    )
+    n_pictures = len(list(PICTURES.glob("*.png")))
+    print(f"{PAGE.relative_to(ROOT)}, {n_pictures} pictures", file=sys.stderr)
 
 
 if __name__ == "__main__":

@@ -117,7 +117,7 @@ def test_every_picture_of_page_and_report_is_drawn(
 ) -> None:
     images = results / "img"
     monkeypatch.setattr(reach_plots, "RESULTS", results)
-    monkeypatch.setattr(reach_plots, "IMAGES", images)
+    monkeypatch.setattr(reach_plots, "PICTURES", images)
     reach_plots.main()
     shown = set(re.findall(r"\]\(\.\./img/reach/([a-z-]+\.png)\)", PAGE + REPORT))
     of_ssm = {"override.png", "arrivals.png"}  # drawn by reach_ssm_plots.py
@@ -129,7 +129,7 @@ def test_without_results_only_walks_are_drawn(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(reach_plots, "RESULTS", tmp_path)
-    monkeypatch.setattr(reach_plots, "IMAGES", tmp_path / "img")
+    monkeypatch.setattr(reach_plots, "PICTURES", tmp_path / "img")
     reach_plots.main()
     assert [path.name for path in tmp_path.rglob("*.png")] == ["walks.png"]
 

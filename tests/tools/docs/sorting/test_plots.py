@@ -149,7 +149,7 @@ def test_pictures_are_drawn_of_what_has_a_result(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(sorting_plots, "RESULTS", tmp_path)
-    monkeypatch.setattr(sorting_plots, "IMAGES", tmp_path / "img")
+    monkeypatch.setattr(sorting_plots, "PICTURES", tmp_path / "img")
     sorting_plots.main()
     assert not (tmp_path / "img").exists()
     (tmp_path / "sorting-grid-e1.json").write_text(json.dumps(result()))

@@ -6,11 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from tools.docs.world.page import IMAGES, PAGE, RESULTS, page, values
-
-
-def read(name: str) -> dict:
-    return json.loads((RESULTS / f"{name}.json").read_text(encoding="utf-8"))
+from tools.docs.results import RESULTS, read_result
+from tools.docs.world.page import PAGE, PICTURES, page, values
 
 
 def test_page_is_what_the_results_give() -> None:
@@ -20,7 +17,7 @@ def test_page_is_what_the_results_give() -> None:
 def test_every_number_of_the_page_follows_the_results(tmp_path: Path) -> None:
     for path in RESULTS.glob("*.json"):
         (tmp_path / path.name).write_text(path.read_text(encoding="utf-8"), encoding="utf-8")
-    world = read("world")
+    world = read_result(RESULTS / "world.json")
     world["gap"]["links"]["mean_mm"], world["fast_hands"]["late"] = 77.7, 5
     (tmp_path / "world.json").write_text(json.dumps(world), encoding="utf-8")
     text = page(tmp_path)
@@ -30,12 +27,12 @@ def test_every_number_of_the_page_follows_the_results(tmp_path: Path) -> None:
 
 def test_page_shows_every_picture_and_no_other() -> None:
     shown = set(re.findall(r"\]\(img/world/([a-z-]+\.png)\)", page(RESULTS)))
-    assert shown == {path.name for path in IMAGES.glob("*.png")}
+    assert shown == {path.name for path in PICTURES.glob("*.png")}
 
 
 def test_results_hold_to_what_the_page_claims() -> None:
-    world = read("world")
-    found = values(world, read("sim-scaling"))
+    world = read_result(RESULTS / "world.json")
+    found = values(world, read_result(RESULTS / "sim-scaling.json"))
     assert world["gap"]["all"]["min_mm"] > -1e-6
     assert found["gap_mean"] < 15.0
     assert max(found["ends"], found["distances"]) < 1e-9
@@ -48,6 +45,6 @@ def test_results_hold_to_what_the_page_claims() -> None:
 
 @pytest.mark.parametrize("name", ["world", "sim-steps", "sim-scaling", "mesh-gap"])
 def test_results_say_where_they_were_measured(name: str) -> None:
-    result = read(name)
+    result = read_result(RESULTS / f"{name}.json")
     assert result["seed"] == 11
     assert {"cpu", "cores", "commit"} <= set(result["machine"])
