@@ -40,11 +40,6 @@ Expert = Callable[[NDArray[np.uint8]], NDArray[np.bool_]]
 """Marks the best moves of observations, shape (n, obs_size): shape (n, n_actions)."""
 
 
-def network_of(preset: SortingPreset, shape: SortingShape) -> SharedNetwork | PrintedNetwork:
-    """Return a new network as a preset describes it."""
-    return NETWORKS[preset.networks.kind](shape, preset.networks.width)
-
-
 class _SB3QNetwork(QNetwork):
     """Stable-Baselines3's network with one of ours in place of its own layers."""
 
@@ -54,7 +49,7 @@ class _SB3QNetwork(QNetwork):
         self, *args: Any, preset: SortingPreset, shape: SortingShape, **kwargs: Any
     ) -> None:
         super().__init__(*args, **{**kwargs, "net_arch": [1]})
-        self.q_net = network_of(preset, shape)
+        self.q_net = NETWORKS[preset.networks.kind](shape, preset.networks.width)
 
     def forward(self, obs: PyTorchObs) -> Tensor:
         """Return the values of all moves, (B, n_actions)."""

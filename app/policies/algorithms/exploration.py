@@ -11,8 +11,8 @@ and by parameter-space noise (section 5.3.4; ``parameter_noise.py``).
 """
 
 import math
-from collections.abc import Callable, Mapping
-from typing import Any, Protocol
+from abc import ABC, abstractmethod
+from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +22,7 @@ from app.policies.configs.td3 import NoiseExploration
 from app.sim.core.arrays import Vec
 from app.sim.pick.batch import PickBatch
 from app.sim.pick.kernels.base_motion import base_motions
-from app.state_dict import State, Stateful
+from app.state_dict import Stateful
 
 HOLD, HOME, NEARBY, ELSEWHERE = range(4)
 STRAIGHT_ON = 0.5
@@ -31,23 +31,18 @@ OPTION_STEPS = (4, 30)
 """Shortest duration of an option and end of the range [control periods]."""
 
 
-class Exploration(Protocol):
+class Exploration(Stateful, ABC):
     """Perturbs the actions of a policy."""
 
     n_greedy: int
     """Environments without exploration, the first ones."""
 
+    @abstractmethod
     def apply(self, act: NDArray[np.float32]) -> NDArray[np.float32]:
         """Return perturbed actions, shape (n_envs, n_act)."""
 
-    def state_dict(self) -> State:
-        """Return a copy of the state."""
 
-    def load_state_dict(self, state: Mapping[str, Any]) -> None:
-        """Restore a state."""
-
-
-class PerEnvAR1Noise(Stateful):
+class PerEnvAR1Noise(Exploration):
     """AR(1) noise whose scale grows with the number of the environment.
 
     Args:
@@ -81,7 +76,7 @@ class PerEnvAR1Noise(Stateful):
         return np.clip(act + self._noise, -1.0, 1.0).astype(np.float32)
 
 
-class OUNoise(Stateful):
+class OUNoise(Exploration):
     """Ornstein-Uhlenbeck noise: ``x += -theta x dt + sigma sqrt(dt) N(0, 1)`` per period.
 
     The process starts at 0 with every episode. The time step ``dt`` is one of the process, not
@@ -116,7 +111,7 @@ class OUNoise(Stateful):
         return np.clip(act + self._noise, -1.0, 1.0).astype(np.float32)
 
 
-class OptionExploration(Stateful):
+class OptionExploration(Exploration):
     """AR(1) noise, and temporally extended options in every second noisy environment.
 
     Args:

@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 from torch import nn
 
+from app.policies.algorithms.exploration import Exploration
 from app.policies.networks.forward import EPSILON, Floats, Layer, Layers, layers_of
 from app.sim.pick.batch import PickBatch
-from app.state_dict import Stateful
 
 FACTOR = 1.01
 """Factor of one adaptation."""
@@ -26,7 +26,7 @@ ADAPT_EVERY = 50
 """Updates between two adaptations."""
 
 
-class ParameterNoise(Stateful):
+class ParameterNoise(Exploration):
     """Perturbed copies of an actor, one per environment.
 
     Args:

@@ -65,33 +65,14 @@ class Minibatch(NamedTuple):
     """Places in a prioritised replay buffer, (B,)."""
 
 
-class _SB3Actor(Actor):
-    """Stable-Baselines3's actor with another network."""
-
-    def __init__(self, *args: Any, networks: Networks, **kwargs: Any) -> None:
-        super().__init__(*args, **kwargs)
-        self.mu = networks.actor()  # type: ignore[assignment]
-
-
-class _SB3Critic(ContinuousCritic):
-    """Stable-Baselines3's critic with :class:`Critics` as its networks."""
-
-    def __init__(self, *args: Any, networks: Networks, **kwargs: Any) -> None:
-        super().__init__(*args, **kwargs)
-        for index in range(self.n_critics):
-            delattr(self, f"qf{index}")
-        self.own = networks.critic()
-        self.q_networks = list(self.own.children())
-
-
 def critics_of(critic: ContinuousCritic) -> Critics:
-    """Return the networks inside a critic of Stable-Baselines3."""
-    assert isinstance(critic, _SB3Critic)
+    """Return the networks inside a critic of :class:`BatchTD3Policy`."""
+    assert isinstance(critic.own, Critics)
     return critic.own
 
 
 class BatchTD3Policy(TD3Policy):
-    """Policy with the networks of this project."""
+    """Policy with the networks of this project in place of Stable-Baselines3's."""
 
     def __init__(self, *args: Any, networks: Networks, **kwargs: Any) -> None:
         self._networks = networks
@@ -99,15 +80,20 @@ class BatchTD3Policy(TD3Policy):
 
     def make_actor(self, features_extractor: BaseFeaturesExtractor | None = None) -> Actor:
         """Return an actor with the network of this project."""
-        kwargs = self._update_features_extractor(self.actor_kwargs, features_extractor)
-        return _SB3Actor(**kwargs, networks=self._networks).to(self.device)
+        actor = super().make_actor(features_extractor)
+        actor.mu = self._networks.actor()  # type: ignore[assignment]
+        return actor
 
     def make_critic(
         self, features_extractor: BaseFeaturesExtractor | None = None
     ) -> ContinuousCritic:
         """Return critics with the networks of this project."""
-        kwargs = self._update_features_extractor(self.critic_kwargs, features_extractor)
-        return _SB3Critic(**kwargs, networks=self._networks).to(self.device)
+        critic = super().make_critic(features_extractor)
+        for index in range(critic.n_critics):
+            delattr(critic, f"qf{index}")
+        critic.own = self._networks.critic()
+        critic.q_networks = list(critic.own.children())
+        return critic
 
 
 class BatchTD3(TD3, Stateful):

@@ -5,7 +5,6 @@ Ended environments restart within the step; their final observation is in
 ``infos[i]["terminal_observation"]``.
 """
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -62,7 +61,7 @@ class BatchVecEnv(VecEnv, Stateful):
 
     def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
         """Return an attribute of the batch, once per environment."""
-        return [getattr(self.batch, attr_name, None)] * len(self._chosen(indices))
+        return [getattr(self.batch, attr_name, None)] * len(list(self._get_indices(indices)))
 
     def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
         """Refuse: the environments share one batch."""
@@ -76,7 +75,4 @@ class BatchVecEnv(VecEnv, Stateful):
 
     def env_is_wrapped(self, wrapper_class: Any, indices: Any = None) -> list[bool]:
         """Return that no environment is wrapped."""
-        return [False] * len(self._chosen(indices))
-
-    def _chosen(self, indices: None | int | Sequence[int]) -> Sequence[int]:
-        return list(self._get_indices(indices))
+        return [False] * len(list(self._get_indices(indices)))

@@ -13,7 +13,7 @@ from app.policies.networks.actor_critic import Critics, PlainActor, QNetwork, Re
 from app.policies.training import pick as pick_training
 from app.policies.training import reach as reach_training
 from app.policies.training.run import TrainingRun
-from app.sim.cells.cell import load_cell
+from app.sim.cells.cell import Cell, load_cell
 from app.sim.pick.batch import PickBatch, PickSettings
 from app.sim.pick.kernels.observation_layout import LAYOUT, N_FEATURES, N_PICK
 from tests.policies.conftest import preset_of
@@ -148,12 +148,17 @@ def test_the_plain_actor_sees_the_first_numbers_and_holds_still_at_first():
     assert torch.equal(act, actor(obs[:, :7]))
 
 
-def test_options_take_over_in_every_second_noisy_row():
-    batch = PickBatch(load_cell("pick-and-place"), 16, 1, PickSettings())
+def options_of(cell: Cell, rate: float) -> tuple[PickBatch, OptionExploration]:
+    """Return 16 environments of a cell, and their exploration by options without noise."""
+    batch = PickBatch(cell, 16, 1, PickSettings())
     batch.reset()
     rng, silent = np.random.default_rng(3), NoiseExploration(sigma_max=0.0)
     noise = PerEnvAR1Noise((16, 5), batch.arm.dt, silent, rng)
-    explorer = OptionExploration(noise, batch, batch.world.station_q, 0.5, rng)
+    return batch, OptionExploration(noise, batch, batch.world.station_q, rate, rng)
+
+
+def test_options_take_over_in_every_second_noisy_row():
+    batch, explorer = options_of(load_cell("pick-and-place"), 0.5)
     still = np.zeros((16, 5), dtype=np.float32)
     changed = np.zeros(16, dtype=bool)
     for _ in range(200):
@@ -168,12 +173,7 @@ def test_options_move_joints_with_other_speed_limits_straight():
     cell = load_cell("pick-and-place")
     limits = np.array([0.5, 1.0, 0.25, 2.0, 3.2])
     robot = cell.robot.model_copy(update={"qd_max": (*limits, 3.2)})
-    unequal = cell.model_copy(update={"robot": robot})
-    batch = PickBatch(unequal, 16, 1, PickSettings())
-    batch.reset()
-    rng, silent = np.random.default_rng(3), NoiseExploration(sigma_max=0.0)
-    noise = PerEnvAR1Noise((16, 5), batch.arm.dt, silent, rng)
-    explorer = OptionExploration(noise, batch, batch.world.station_q[:1], 1.0, rng)
+    batch, explorer = options_of(cell.model_copy(update={"robot": robot}), 1.0)
     acts = explorer.apply(np.zeros((16, 5), dtype=np.float32))
     for act, goal, q in zip(acts, explorer._goal, batch.state.q[:, :5], strict=True):
         if act.any():
