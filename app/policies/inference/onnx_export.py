@@ -19,10 +19,10 @@ from app.errors import InvalidInput
 from app.policies.checkpoints.checkpoint import CHOOSING, SORTING, Checkpoint, purpose_of
 from app.policies.inference.reach_policy import PEOPLE_SET, ReachPolicy
 from app.policies.inference.value_networks import ValueNetworks, pick_preset_of
-from app.policies.networks.actor_critic import BASE_WEIGHT, ResidualActor
+from app.policies.networks.actor_critic import BASE_WEIGHT, PlainActor, ResidualActor
 from app.policies.networks.ddpg import CLIP
 from app.policies.networks.forward import EPSILON
-from app.policies.networks.pick import NormedActor, actor_of
+from app.policies.networks.pick import actor_of
 from app.sim.envs.pick import PickEnv
 from app.sim.envs.reach import ReachEnv
 from app.sim.reach.batch import N_ACT
@@ -170,8 +170,8 @@ def _pick(graph: Graph, checkpoint: Checkpoint, obs: str) -> list[onnx.ValueInfo
     ]
 
 
-def _pick_action(graph: Graph, actor: ResidualActor | NormedActor, obs: str) -> str:
-    if isinstance(actor, NormedActor):
+def _pick_action(graph: Graph, actor: ResidualActor | PlainActor, obs: str) -> str:
+    if isinstance(actor, PlainActor):
         return graph.add("Tanh", graph.layers(obs, "actor.net"), output="action")
     columns = graph.columns(obs, actor.base.start, actor.base.stop)
     base = graph.clip(columns, -1.0, 1.0)

@@ -129,11 +129,7 @@ class PlainActor(nn.Module):
     """Map observations to actions in [-1, 1] without a nominal action.
 
     Args:
-        width: Units per hidden layer.
-        n_obs: Input size: length of the observation's part that the actor uses.
-        n_act: Length of an action.
-        layers: Number of hidden layers.
-        people_set: Position of the people set; None without one.
+        normed: Whether hidden layers are normalised; the others as in :class:`ResidualActor`.
     """
 
     def __init__(
@@ -143,12 +139,14 @@ class PlainActor(nn.Module):
         n_act: int,
         layers: int = 2,
         people_set: PeopleSetShape | None = None,
+        normed: bool = False,
     ) -> None:
         super().__init__()
         n_seen, before = _first_layer(people_set, n_obs)
         self.n_obs = n_obs
         self.crowd = nn.Sequential(*before)
-        self.net = nn.Sequential(*hidden(n_seen, width, layers), nn.Linear(width, n_act))
+        layers_before = hidden(n_seen, width, layers, normed)
+        self.net = nn.Sequential(*layers_before, nn.Linear(width, n_act))
         with torch.no_grad():
             self.net[-1].weight.mul_(FIRST_RESIDUAL)  # type: ignore[operator]
             self.net[-1].bias.zero_()  # type: ignore[operator]
@@ -181,13 +179,9 @@ class QNetwork(nn.Sequential):
     """Map observation and action to one or several values.
 
     Args:
-        width: Units per hidden layer.
-        n_obs: Length of observations.
-        n_act: Length of an action.
-        layers: Number of hidden layers.
         normed: Whether hidden layers are normalised.
-        n_values: Number of values: 1, or quantiles of one.
-        people_set: Position of the people set; None without one.
+        n_values: Number of values: 1, or quantiles of one; the others as in
+            :class:`ResidualActor`.
     """
 
     def __init__(

@@ -11,7 +11,7 @@ Stable-Baselines 2 and of the authors' parameters (docs/method.md 2.5).
 import torch
 from torch import nn
 
-from app.policies.networks.actor_critic import hidden, initialise_glorot
+from app.policies.networks.actor_critic import PlainActor, hidden, initialise_glorot
 
 LAST_WEIGHT = 3e-3
 """Bound of the initial weights of last layers."""
@@ -61,40 +61,31 @@ def initialise(net: nn.Sequential) -> None:
     nn.init.uniform_(net[-1].weight, -LAST_WEIGHT, LAST_WEIGHT)  # type: ignore[arg-type]
 
 
-class DDPGActor(nn.Module):
-    """Map observations to actions in [-1, 1].
+class DDPGActor(PlainActor):
+    """Actor with the initial weights of DDPG.
 
     Args:
-        width: Units per hidden layer.
-        n_obs: Length of observations.
-        n_act: Length of an action.
-        layers: Number of hidden layers.
-        norm: Normalisation of observations; None for raw ones.
+        norm: Normalisation of observations; None for raw ones. The others as in
+            :class:`PlainActor`.
     """
 
     def __init__(
         self, width: int, n_obs: int, n_act: int, layers: int, norm: RunningNormalisation | None
     ) -> None:
-        super().__init__()
-        self.n_obs, self.norm = n_obs, norm
-        self.net = nn.Sequential(*hidden(n_obs, width, layers), nn.Linear(width, n_act))
+        super().__init__(width, n_obs, n_act, layers)
+        self.norm = norm
         initialise(self.net)
 
     def forward(self, obs: torch.Tensor) -> torch.Tensor:
         """Return actions, shape (n, n_act), for observations, shape (n, n_obs)."""
-        seen = obs if self.norm is None else self.norm(obs)
-        return torch.tanh(self.net(seen))
+        return super().forward(obs if self.norm is None else self.norm(obs))
 
 
 class LateActionQ(nn.Module):
     """Map an observation and an action to a value; the action enters after the first layer.
 
     Args:
-        width: Units per hidden layer.
-        n_obs: Length of observations.
-        n_act: Length of an action.
-        layers: Number of hidden layers, at least 2.
-        norm: Normalisation of observations; None for raw ones.
+        layers: Number of hidden layers, at least 2; the others as in :class:`DDPGActor`.
     """
 
     def __init__(

@@ -1,16 +1,13 @@
 """Networks of the pick scenario, and the layout of their observations."""
 
-import torch
-from torch import nn
-
 from app.policies.configs.pick import PickPreset
 from app.policies.networks.actor_critic import (
     Critics,
     MeanCritics,
+    PlainActor,
     QNetwork,
     ResidualActor,
     ResidualFading,
-    hidden,
     initialise_glorot,
 )
 from app.policies.networks.quantiles import QuantileCritics
@@ -41,32 +38,17 @@ LAYOUTS = {
 """Names and sizes of the groups of each kind of observation, as manifests carry them."""
 
 
-class NormedActor(nn.Module):
-    """Map observations to actions in [-1, 1]; hidden layers are normalised.
+def actor_of(preset: PickPreset, n_obs: int) -> ResidualActor | PlainActor:
+    """Return a new actor for observations of a length.
 
-    Perturbations of its weights have similar effects in all layers (Plappert et al. 2018).
-
-    Args:
-        width: Units per hidden layer.
-        n_obs: Length of observations.
+    Hidden layers of plain actors are normalised, so that perturbations of their weights have
+    similar effects in all layers (Plappert et al. 2018).
     """
-
-    def __init__(self, width: int, n_obs: int, layers: int) -> None:
-        super().__init__()
-        before = hidden(n_obs, width, layers, normed=True)
-        self.net = nn.Sequential(*before, nn.Linear(width, CONTROLLED))
-        initialise_glorot(self)
-
-    def forward(self, obs: torch.Tensor) -> torch.Tensor:
-        """Return actions, shape (n, 5), for observations, shape (n, n_obs)."""
-        return torch.tanh(self.net(obs))
-
-
-def actor_of(preset: PickPreset, n_obs: int) -> ResidualActor | NormedActor:
-    """Return a new actor for observations of a length."""
     sizes, fade = preset.networks, None
     if sizes.actor == "plain":
-        return NormedActor(sizes.width, n_obs, sizes.layers)
+        actor = PlainActor(sizes.width, n_obs, CONTROLLED, sizes.layers, normed=True)
+        initialise_glorot(actor)
+        return actor
     if preset.episode.task == "pick":
         fade = ResidualFading(
             CLEARANCE, RESIDUAL_FULL_M / DISTANCE_SCALE, RESIDUAL_ZERO_M / DISTANCE_SCALE

@@ -46,23 +46,12 @@ def layout_of(shape: SortingShape) -> list[list[Any]]:
     return [["clutter", k], ["towers", c * k], ["goal", c * k], ["fail", k]]
 
 
-class SortingView(nn.Module):
-    """Split observations into clutter slots, towers, goal and failure probabilities."""
-
-    def __init__(self, shape: SortingShape) -> None:
-        super().__init__()
-        self.shape = shape
-
-    def forward(self, obs: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor]:
-        """Return clutter (B, K), towers (B, C, K), goal (B, C, K) and probabilities (B, K)."""
-        k, c = self.shape.n_cells, self.shape.n_colours
-        clutter, towers, goal, fail = torch.split(obs, [k, c * k, c * k, k], dim=1)
-        return (
-            clutter.long(),
-            towers.long().view(-1, c, k),
-            goal.long().view(-1, c, k),
-            fail.float() / FAILURE_SCALE,
-        )
+def groups_of(shape: SortingShape, obs: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor]:
+    """Return clutter (B, K), towers and goal (B, C, K), and failure probabilities (B, K)."""
+    k, c = shape.n_cells, shape.n_colours
+    clutter, towers, goal, fail = torch.split(obs, [k, c * k, c * k, k], dim=1)
+    towers, goal = (one.long().view(-1, c, k) for one in (towers, goal))
+    return clutter.long(), towers, goal, fail.float() / FAILURE_SCALE
 
 
 def valid_moves(clutter: Tensor, towers: Tensor) -> Tensor:
@@ -103,7 +92,7 @@ class SharedNetwork(nn.Module):
 
     def __init__(self, shape: SortingShape, width: int) -> None:
         super().__init__()
-        self.shape, self.view = shape, SortingView(shape)
+        self.shape = shape
         n_colours, n_types = shape.n_colours, shape.n_types
         codes = n_types + 1
         relative = _relative_codes(shape)
@@ -119,7 +108,7 @@ class SharedNetwork(nn.Module):
 
     def forward(self, obs: Tensor) -> Tensor:
         """Return the values of all moves, NEVER where nothing changes, (B, n_actions)."""
-        clutter, towers, goal, fail = self.view(obs)
+        clutter, towers, goal, fail = groups_of(self.shape, obs)
         n, n_towers, _ = towers.shape
         seen = self.tower(self._features(clutter, towers, goal, fail))
         # Inputs of a tower come first, then those of the others in order of their colours.

@@ -11,10 +11,11 @@ from app.policies.algorithms.parameter_noise import FACTOR, ParameterNoise, dist
 from app.policies.configs import presets
 from app.policies.configs.pick import ENV_BYTES, PickPreset
 from app.policies.networks.forward import Layer, layers_of
-from app.policies.networks.pick import NormedActor
+from app.policies.networks.pick import actor_of
 from app.policies.training.pick import batch_of
 from app.sim.cells.cell import load_cell
 from app.sim.pick.batch import PickBatch, PickSettings
+from tests.policies.conftest import preset_of
 
 
 @pytest.fixture
@@ -25,12 +26,12 @@ def batch() -> PickBatch:
 
 
 @pytest.fixture
-def actor() -> NormedActor:
+def actor() -> nn.Module:
     torch.manual_seed(4)
-    return NormedActor(16, 51, 2)
+    return actor_of(preset_of("pick-td3-thesis", {"networks.width": 16}), 51)
 
 
-def noise_of(batch: PickBatch, actor: NormedActor, sigma: float = 0.5) -> ParameterNoise:
+def noise_of(batch: PickBatch, actor: nn.Module, sigma: float = 0.5) -> ParameterNoise:
     noise = ParameterNoise(batch, sigma, np.random.default_rng(1))
     noise.follow(actor)
     return noise

@@ -7,8 +7,8 @@ import torch
 from torch import nn
 
 from app.policies.configs.pick import PICK, REACH_ONLY, THESIS, PickPreset
-from app.policies.networks.actor_critic import Critics, MeanCritics, QNetwork
-from app.policies.networks.pick import NormedActor, actor_of, critics_for
+from app.policies.networks.actor_critic import Critics, MeanCritics, PlainActor, QNetwork
+from app.policies.networks.pick import actor_of, critics_for
 from app.policies.networks.quantiles import QuantileCritics
 
 
@@ -29,7 +29,7 @@ def test_the_preset_says_which():
 def test_networks_of_the_recipe_are_glorot_uniform_and_normalised():
     torch.manual_seed(0)
     actor, critics = actor_of(THESIS, 51), critics_for(THESIS, 51)
-    assert type(actor) is NormedActor and type(critics) is Critics
+    assert type(actor) is PlainActor and type(critics) is Critics
     for net, n_in, n_out in ((actor.net, 51, 5), (critics.q1, 56, 1), (critics.q2, 56, 1)):
         kinds = [type(layer) for layer in net]
         hidden = [nn.Linear, nn.LayerNorm, nn.ReLU]
