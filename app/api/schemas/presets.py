@@ -6,7 +6,7 @@ from typing import Self
 from pydantic import Field
 
 from app.api.schemas.numbers import Answer
-from app.policies.configs.fields import PresetEntry, entries
+from app.policies.configs.fields import PresetEntry, bounds_of, choices_of, entries, unit_of
 from app.policies.configs.presets import PRESETS, TITLES
 from jobs.spec import OBJECTIVES, QUANTITIES
 
@@ -28,18 +28,19 @@ class PresetField(Answer):
     def from_entry(cls, entry: PresetEntry) -> Self:
         """Describe one field."""
         title, _, text = (entry.info.description or "").partition(": ")
-        low, high = entry.bounds or (None, None)
+        low, high = bounds_of(entry.info) or (None, None)
+        choices = choices_of(entry.info) or None
         number = "int" if isinstance(entry.value, int) else "float"
         return cls(
             name=entry.path,
-            type="choice" if entry.choices else number,
+            type="choice" if choices else number,
             default=entry.value,
             minimum=low,
             maximum=high,
-            unit=entry.unit,
+            unit=unit_of(entry.info),
             title=title,
             help=text,
-            choices=entry.choices,
+            choices=choices,
         )
 
 

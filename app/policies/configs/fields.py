@@ -90,11 +90,7 @@ class Learning(FieldGroup):
 
     @model_validator(mode="after")
     def _check(self) -> Self:
-        """Check that intervals are whole multiples and that learning takes place.
-
-        Raises:
-            InvalidInput: Two fields contradict each other.
-        """
+        """Check that intervals are whole multiples and that learning takes place."""
         rounds = (
             ("total_steps", "n_envs"),
             ("progress_steps", "n_envs"),
@@ -136,20 +132,10 @@ class PresetEntry(NamedTuple):
     info: FieldInfo
     """Its declaration."""
 
-    @property
-    def bounds(self) -> tuple[float, float] | None:
-        """Smallest and largest value of a number; None for a choice."""
-        return bounds_of(self.info)
 
-    @property
-    def choices(self) -> tuple[str, ...] | None:
-        """Allowed names; None for a number."""
-        return get_args(self.info.annotation) or None
-
-    @property
-    def unit(self) -> str:
-        """Unit; empty for a choice and for a dimensionless number."""
-        return unit_of(self.info)
+def choices_of(info: FieldInfo) -> tuple[str, ...]:
+    """Return the allowed names of a choice; none for other fields."""
+    return get_args(info.annotation)
 
 
 def bounds_of(info: FieldInfo) -> tuple[Any, Any] | None:
@@ -214,7 +200,7 @@ def _invalid_input(
         return InvalidInput(field, value, "must be text")
     if (bounds := bounds_of(info)) is not None:
         return InvalidInput(field, value, _rule_of_number(fault["type"], bounds, unit_of(info)))
-    if choices := get_args(info.annotation):
+    if choices := choices_of(info):
         return InvalidInput(field, value, "must be one of the choices", choices)
     return InvalidInput(field, value, "must be an object of fields")
 

@@ -80,11 +80,7 @@ class PickNetworks(ActorCriticNetworks):
 
     @model_validator(mode="after")
     def _check(self) -> Self:
-        """Check that the values of targets fit the critics.
-
-        Raises:
-            InvalidInput: They contradict each other.
-        """
+        """Check that the values of targets fit the critics."""
         if self.critic == "quantiles" and self.target_value != "mean":
             raise InvalidInput(
                 "networks.target_value", self.target_value, "needs critic = mean"
@@ -151,19 +147,9 @@ class PickEpisode(FieldGroup):
         """Whether a timeout is an end of the task, and no truncation."""
         return self.observation != "state" or self.timeout == "terminates"
 
-    @property
-    def _drawn_elsewhere(self) -> bool:
-        """Whether some targets are not at stations, or some starts depend on the target."""
-        shares = self.on_path_share, self.at_target_share, self.anywhere_share
-        return self.target_jitter_m > 0.0 or max(shares) > 0.0
-
     @model_validator(mode="after")
     def _check(self) -> Self:
-        """Check the time limits against each other, and the observation against the task.
-
-        Raises:
-            InvalidInput: The short limit is the longer one, or a pick has no phase.
-        """
+        """Check time limits, and observation, curriculum and targets against the task."""
         sees_phase = self.observation in ("phase", "two-people")
         if sees_phase != (self.task == "pick"):
             rule = f"must {'not ' if sees_phase else ''}contain the phase: task = {self.task}"
@@ -173,8 +159,10 @@ class PickEpisode(FieldGroup):
         ):
             rule = "needs safety = none, on_path_share = 0 and at_target_share = 0"
             raise InvalidInput("episode.curriculum_steps", self.curriculum_steps, rule)
+        shares = self.on_path_share, self.at_target_share, self.anywhere_share
+        drawn_elsewhere = any((self.target_jitter_m, *shares))
         if self.target_choice == "critic" and (
-            self.curriculum_steps or self.safety != "none" or self._drawn_elsewhere
+            self.curriculum_steps or self.safety != "none" or drawn_elsewhere
         ):
             rule = (
                 "needs safety = none, curriculum_steps = 0, target_jitter_m = 0, "
@@ -227,7 +215,6 @@ class PickReward(FieldGroup):
 PICK_LEARNING = PickLearning(
     total_steps=12_288_000,
     batch_size=512,
-    lr_end=2e-5,
     gamma=0.995,
     policy_delay=2,
     actor_frozen_updates=3_000,
@@ -254,11 +241,7 @@ class PickPreset(TrainingConfig):
 
     @model_validator(mode="after")
     def _check(self) -> Self:
-        """Check the groups against each other.
-
-        Raises:
-            InvalidInput: Two fields contradict each other.
-        """
+        """Check the groups against each other."""
         actor, episode = self.networks.actor, self.episode
         if (actor == "plain") != (episode.observation == "state"):
             rule = "must be plain with observation = state, and residual with features"

@@ -52,11 +52,7 @@ class ReachNetworks(ActorCriticNetworks):
 
     @model_validator(mode="after")
     def _check(self) -> Self:
-        """Check the kinds of network against each other.
-
-        Raises:
-            InvalidInput: The normalisation has no user, or a critic has no layer for actions.
-        """
+        """Check the kinds of network against each other."""
         if self.normalisation == "running" and (self.actor, self.critic) != ("ddpg", "ddpg"):
             rule = "needs actor = ddpg and critic = ddpg"
             raise InvalidInput("networks.normalisation", self.normalisation, rule)
@@ -148,11 +144,7 @@ class ReachPreset(TrainingConfig):
 
     @model_validator(mode="after")
     def _check(self) -> Self:
-        """Check the groups against each other.
-
-        Raises:
-            InvalidInput: Two fields contradict each other.
-        """
+        """Check the groups against each other."""
         episode, people, actor = self.episode, self.people, self.networks.actor
         if actor == "residual" and episode.observation == "state":
             rule = "must be plain or ddpg with observation = state"

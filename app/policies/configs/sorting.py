@@ -91,11 +91,7 @@ class SortingEpisode(FieldGroup):
 
     @model_validator(mode="after")
     def _check(self) -> Self:
-        """Check that the shares of solved and disturbed episodes fit together.
-
-        Raises:
-            InvalidInput: Their sum exceeds 1.
-        """
+        """Check that the shares of solved and disturbed episodes sum to 1 at most."""
         if self.solved_episodes + self.disturbed_share > 1.0:
             rule = f"must not exceed 1 - disturbed_share = {digits(1.0 - self.disturbed_share)}"
             raise InvalidInput("episode.solved_episodes", self.solved_episodes, rule)

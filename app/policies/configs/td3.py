@@ -61,26 +61,12 @@ class ActorCriticNetworks(FieldGroup):
         return 4 * ((1 + self.n_critics) * per_network + values)
 
     @model_validator(mode="after")
-    def _check_quantiles(self) -> Self:
-        """Check that targets keep quantiles.
-
-        Raises:
-            InvalidInput: All quantiles are dropped.
-        """
+    def _check_sizes(self) -> Self:
+        """Check that targets keep quantiles, and that the networks fit into a checkpoint."""
         if self.dropped_quantiles >= self.n_quantiles:
             rule = f"must be below n_quantiles = {self.n_quantiles}"
             raise InvalidInput("networks.dropped_quantiles", self.dropped_quantiles, rule)
-        return self
-
-    @model_validator(mode="after")
-    def _check_size(self) -> Self:
-        """Check that the networks fit into a checkpoint.
-
-        Raises:
-            InvalidInput: They are too large.
-        """
-        size = self.n_bytes
-        if size + SPARE_BYTES > MAX_BYTES:
+        if (size := self.n_bytes) + SPARE_BYTES > MAX_BYTES:
             rule = (
                 f"makes networks of {size / 2**20:.0f} MB with layers = {self.layers} and "
                 f"n_critics = {self.n_critics}; must stay below {MAX_BYTES // 2**20} MB"
@@ -128,11 +114,7 @@ class ActionConfig(FieldGroup):
 
     @model_validator(mode="after")
     def _check(self) -> Self:
-        """Check the bounds against the degree.
-
-        Raises:
-            InvalidInput: They contradict each other.
-        """
+        """Check the bounds against the degree."""
         if self.degree == 3 and self.bounds != "viable":
             rule = "must be viable with degree = 3"
             raise InvalidInput("action.bounds", self.bounds, rule)
