@@ -222,7 +222,7 @@ class TaskChooser(TrainedPolicy):
 
     def _query(
         self, q: Vec, qd: Vec, candidates: Sequence[Candidate], terms: ChoiceTerms
-    ) -> "_SelectionQuery":
+    ) -> _SelectionQuery:
         """Return a checked query."""
         state = self._limits.take(q, qd)
         ids, goals = _check_candidates(candidates)
@@ -235,9 +235,7 @@ class TaskChooser(TrainedPolicy):
         observed = min(LONGEST_S, max(0.0, terms.time_left_s))
         return _SelectionQuery(state, ids, goals, last, terms._replace(time_left_s=observed))
 
-    def _evaluate(
-        self, query: "_SelectionQuery", people: tuple[Vec, Vec, Vec]
-    ) -> "_Evaluation":
+    def _evaluate(self, query: _SelectionQuery, people: tuple[Vec, Vec, Vec]) -> _Evaluation:
         """Return values and choices beside people, or beside each of m sets of people."""
         terms, last = query.terms, query.last
         q, qd, _ = query.state.clamped

@@ -40,17 +40,31 @@ def play(
     return ended, returns
 
 
-def outcome_rates(
-    ended: NDArray[np.int64], returns: NDArray[np.floating], outcomes: Sequence[str]
+def played_rates(
+    policy: Callable[[torch.Tensor], torch.Tensor], batch: SteppedBatch, outcomes: Sequence[str]
 ) -> dict[str, Any]:
-    """Return the point of a curve of played episodes.
+    """Return the point of a curve of one greedy episode in every environment of a batch."""
+    ended, returns = play(policy, batch)
+    counts = np.bincount(ended, minlength=len(outcomes))
+    return outcome_rates(counts, float(returns.sum()), outcomes)
+
+
+def outcome_rates(
+    counts: NDArray[np.int64], total_return: float, outcomes: Sequence[str]
+) -> dict[str, Any]:
+    """Return the point of a curve of episodes; without any, its rates are None.
 
     Args:
+        counts: Episodes of each outcome.
+        total_return: Sum of their returns.
         outcomes: Names of the outcomes; the rate of one that is not among them is None.
     """
-    shares = {name: float((ended == k).mean()) for k, name in enumerate(outcomes)}
+    n = int(counts.sum())
+    shares = {
+        name: count / n for name, count in zip(outcomes, counts.tolist(), strict=True) if n
+    }
     return {
-        "episodes": len(ended),
+        "episodes": n,
         **{name: shares.get(name) for name in ("success", "collision", "timeout")},
-        "reward": float(returns.mean()),
+        "reward": total_return / n if n else None,
     }

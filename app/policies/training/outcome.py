@@ -110,16 +110,13 @@ def collect(
             kept[e], episode[e] = [], episode[e] + n
         steps += 1
         collected &= (ended == 0) | (steps < n_steps)
-    if not rows:
-        none = np.zeros(0, dtype=np.float32)
-        return OutcomeData(batch.obs[:0], none, none.astype(int), none, none.astype(int))
-    obs_, value_, label_, time_, episode_ = zip(*rows, strict=True)
+    seen, values, labels, times, episodes = zip(*rows, strict=True) if rows else ((),) * 5
     return OutcomeData(
-        np.stack(obs_),
-        np.array(value_, dtype=np.float32),
-        np.array(label_),
-        np.array(time_, dtype=np.float32),
-        np.array(episode_),
+        np.array(seen, dtype=np.float32).reshape(-1, batch.obs_size),
+        np.array(values, dtype=np.float32),
+        np.array(labels, dtype=np.int64),
+        np.array(times, dtype=np.float32),
+        np.array(episodes, dtype=np.int64),
     )
 
 

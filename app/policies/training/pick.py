@@ -14,17 +14,15 @@ from app.policies.algorithms.exploration import (
 )
 from app.policies.algorithms.parameter_noise import ParameterNoise
 from app.policies.algorithms.td3 import BatchTD3, Networks, critics_of
-from app.policies.checkpoints.checkpoint import Checkpoint
 from app.policies.checkpoints.model_state import tensors_under
 from app.policies.configs.pick import PickPeople, PickPreset
 from app.policies.networks.actor_critic import Critics
-from app.policies.networks.outcome import OutcomeHead
 from app.policies.networks.pick import LAYOUTS, actor_of, critics_for
-from app.policies.training.curve import CURVE_SEED, outcome_rates, play
+from app.policies.training.curve import CURVE_SEED, outcome_rates, played_rates
 from app.policies.training.outcome import FitStopped, collect, fit
 from app.policies.training.reporter import Callbacks, Reporter
 from app.policies.training.run import TrainingRun
-from app.policies.training.td3 import TD3Scenario, TrainingMonitor, start_td3
+from app.policies.training.td3 import TrainingMonitor, start_td3
 from app.sim.cells.cell import Cell
 from app.sim.core.arrays import Vec
 from app.sim.envs.tasks import ArmTask
@@ -82,20 +80,12 @@ def workers_of(people: PickPeople) -> tuple[HumanKind, ...] | None:
 
 def settings_of(preset: PickPreset) -> PickSettings:
     """Return the scenario's settings of a preset."""
-    episode = preset.episode
+    of_training = {"task", "target_choice", "curriculum_steps", "timeout", "safety"}
     return PickSettings(
-        time_limit_s=episode.time_limit_s,
-        short_limit_s=episode.short_limit_s,
-        short_share=episode.short_share,
-        start_clearance_m=episode.start_clearance_m,
-        target_jitter_m=episode.target_jitter_m,
-        on_path_share=episode.on_path_share,
-        at_target_share=episode.at_target_share,
-        anywhere_share=episode.anywhere_share,
-        grasp=episode.grasp,
+        **preset.episode.model_dump(exclude=of_training),
+        grasp=preset.episode.grasp,
         people=workers_of(preset.people),
         work=work_of(preset.people),
-        observation=episode.observation,
         action=preset.action.settings,
         weights=RewardWeights(**preset.reward.model_dump(exclude={"c_c_end"}), gamma=1.0),
     )
@@ -150,7 +140,10 @@ def start(preset: PickPreset, seed: int, cell: Cell) -> tuple[TrainingRun, Train
     batch = batch_of(preset, cell, preset.learning.n_envs, seed)
     follow_schedules(preset, batch, 0)
     exploration = exploration_of(preset, batch, seed)
-    scenario = TD3Scenario(
+    run, monitor = start_td3(
+        preset,
+        seed,
+        cell,
         task=ArmTask(batch, sees_time=preset.episode.sees_time),
         exploration=exploration,
         networks=Networks(
@@ -159,10 +152,8 @@ def start(preset: PickPreset, seed: int, cell: Cell) -> tuple[TrainingRun, Train
             width=preset.networks.width,
         ),
         layout=LAYOUTS[preset.episode.observation],
-        act_size=CONTROLLED,
         visited_states=lambda: visited_states(batch),
     )
-    run, monitor = start_td3(preset, seed, cell, scenario)
     if isinstance(batch, ValuedTargetBatch):
         assert isinstance(run.model, BatchTD3)
         batch.values = values_of(monitor.actor, critics_of(run.model.critic))
@@ -171,51 +162,30 @@ def start(preset: PickPreset, seed: int, cell: Cell) -> tuple[TrainingRun, Train
     return run, monitor
 
 
-def fit_outcomes(
-    preset: PickPreset,
-    seed: int,
-    cell: Cell,
-    policy: Checkpoint,
-    should_stop: Callable[[], bool],
-) -> OutcomeHead | None:
-    """Return the outcome probabilities of a trained policy.
-
-    Args:
-        seed: Seed of the training.
-        cell: Work cell of the training.
-        should_stop: Called before every step and every pass over the data.
-
-    Returns:
-        The ensemble; None where too few episodes ended to fit one.
-
-    Raises:
-        FitStopped: ``should_stop`` asked for it.
-    """
-    learning = preset.learning
-    batch = batch_of(preset, cell, learning.n_envs, seed + OUTCOME_SEED)
-    actor = actor_of(preset, batch.obs_size)
-    critic = critics_for(preset, batch.obs_size)
-    arrays = policy.arrays()
-    actor.load_state_dict(tensors_under(arrays, "actor"))
-    critic.load_state_dict(tensors_under(arrays, "critic"))
-    n_steps = round(OUTCOME_SHARE * learning.total_steps) // learning.n_envs
-    data = collect(batch, actor, critic, n_steps, seed, should_stop)
-    enough = len(np.unique(data.episode)) >= MIN_EPISODES
-    return fit(data, seed, should_stop) if enough else None
-
-
 def add_outcomes(run: TrainingRun, preset: PickPreset, should_stop: Callable[[], bool]) -> bool:
     """Fit the outcome probabilities of a finished policy and add them to its checkpoint.
+
+    The checkpoint gets none where fewer than MIN_EPISODES ended.
+
+    Args:
+        should_stop: Called before every step and every pass over the data.
 
     Returns:
         Whether that was done; false where ``should_stop`` ended it.
     """
+    learning, arrays = preset.learning, run.policy().arrays()
+    batch = batch_of(preset, run.cell, learning.n_envs, run.seed + OUTCOME_SEED)
+    actor = actor_of(preset, batch.obs_size)
+    critic = critics_for(preset, batch.obs_size)
+    actor.load_state_dict(tensors_under(arrays, "actor"))
+    critic.load_state_dict(tensors_under(arrays, "critic"))
+    n_steps = round(OUTCOME_SHARE * learning.total_steps) // learning.n_envs
     try:
-        head = fit_outcomes(preset, run.seed, run.cell, run.policy(), should_stop)
+        data = collect(batch, actor, critic, n_steps, run.seed, should_stop)
+        if len(np.unique(data.episode)) >= MIN_EPISODES:
+            run.add("outcome", fit(data, run.seed, should_stop))
     except FitStopped:
         return False
-    if head is not None:
-        run.add("outcome", head)
     return True
 
 
@@ -251,8 +221,6 @@ class PickReporter(Reporter):
     It also sets the collision cost and the starts of the present step.
 
     Args:
-        run: The attempt.
-        callbacks: Receivers of the curve and of checkpoints.
         monitor: Data behind the curve.
     """
 
@@ -294,12 +262,7 @@ class PickReporter(Reporter):
         """
         if self._test_batch is not None:
             with self._run.untimed():
-                return outcome_rates(*play(self._monitor.actor, self._test_batch), OUTCOMES)
-        episodes = int(self._counts.sum())
-        shares = {
-            name: int(self._counts[OUTCOMES.index(name)]) / episodes if episodes else None
-            for name in ("success", "collision", "timeout")
-        }
-        reward = self._total_return / episodes if episodes else None
+                return played_rates(self._monitor.actor, self._test_batch, OUTCOMES)
+        rates = outcome_rates(self._counts, self._total_return, OUTCOMES)
         self._counts[:], self._total_return = 0, 0.0
-        return {"episodes": episodes, **shares, "reward": reward}
+        return rates

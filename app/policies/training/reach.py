@@ -16,10 +16,10 @@ from app.policies.inference.reach_policy import LAYOUTS, PEOPLE_SET, blocked_rul
 from app.policies.networks.actor_critic import Critics, PlainActor, QNetwork, ResidualActor
 from app.policies.networks.ddpg import DDPGActor, LateActionQ, RunningNormalisation
 from app.policies.networks.quantiles import QuantileCritics
-from app.policies.training.curve import CURVE_SEED, outcome_rates, play
+from app.policies.training.curve import CURVE_SEED, played_rates
 from app.policies.training.reporter import Callbacks, Reporter
 from app.policies.training.run import TrainingRun
-from app.policies.training.td3 import TD3Scenario, TrainingMonitor, start_td3
+from app.policies.training.td3 import TrainingMonitor, start_td3
 from app.sim.cells.cell import Cell
 from app.sim.core.arrays import Vec
 from app.sim.envs.tasks import ArmTask
@@ -40,17 +40,11 @@ def settings_of(preset: ReachPreset) -> ReachSettings:
     walker: HumanKind = "walker"
     episode, weights = preset.episode, preset.reward.model_dump(exclude={"c_u", "bonus"})
     return ReachSettings(
-        time_limit_s=episode.time_limit_s,
-        goals=episode.goals,
-        n_halton=episode.n_halton,
+        **episode.model_dump(exclude={"collision", "timeout", "safety"}),
         people=(walker,) * preset.people.n_people,
-        start=episode.start,
-        start_clearance_m=episode.start_clearance_m,
         collision_ends=episode.collision == "terminates",
-        limits=episode.limits,
         blocked=blocked_rules_of(preset),
         action=preset.action.settings,
-        observation=episode.observation,
         weights=ReachWeights(**weights, gamma=1.0),
     )
 
@@ -122,23 +116,22 @@ def start(preset: ReachPreset, seed: int, cell: Cell) -> tuple[TrainingRun, Trai
     batch = batch_of(preset, cell, preset.learning.n_envs, seed)
     episode = preset.episode
     ends = episode.observation != "state" or episode.timeout == "terminates"
-    scenario = TD3Scenario(
+    return start_td3(
+        preset,
+        seed,
+        cell,
         task=ArmTask(batch, sees_time=ends),
         exploration=exploration_of(preset.exploration, batch, seed),
         networks=networks_of(preset, batch.obs_size),
         layout=LAYOUTS[preset.episode.observation],
-        act_size=N_ACT,
         visited_states=lambda: visited_states(batch),
     )
-    return start_td3(preset, seed, cell, scenario)
 
 
 class ReachReporter(Reporter):
     """Learning curve of greedy episodes that are simulated for each point.
 
     Args:
-        run: The attempt.
-        callbacks: Receivers of the curve and of checkpoints.
         monitor: Data behind the curve.
     """
 
@@ -157,7 +150,7 @@ class ReachReporter(Reporter):
     def rates(self) -> dict[str, Any]:
         """Return rates of greedy episodes of the present actor."""
         with self._run.untimed():
-            return outcome_rates(*play(self._monitor.actor, self._test_batch), OUTCOMES)
+            return played_rates(self._monitor.actor, self._test_batch, OUTCOMES)
 
 
 def visited_states(batch: ReachEnvironments) -> dict[str, Vec]:

@@ -5,7 +5,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 import torch
@@ -32,25 +32,12 @@ from app.policies.training.state import (
 )
 from app.provenance import describe
 from app.sim.cells.cell import Cell
-from app.state_dict import State, under
+from app.state_dict import State, Stateful, under
 
 logger = logging.getLogger(__name__)
 
 OnCheckpoint = Callable[[int, Checkpoint, TrainingState | None], None]
 """Takes the step, the policy and, where states are kept, the state to resume from."""
-
-
-Algorithm = SortingDQN | BatchTD3
-
-
-class StatePart(Protocol):
-    """Part of a training that changes while it runs."""
-
-    def state_dict(self) -> State:
-        """Return a copy of the state: arrays and JSON values by name."""
-
-    def load_state_dict(self, state: Mapping[str, Any]) -> None:
-        """Restore a state."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -87,7 +74,7 @@ class TrainingRun:
         preset: Preset,
         seed: int,
         cell: Cell,
-        model: Algorithm,
+        model: SortingDQN | BatchTD3,
         env: BatchVecEnv,
         parts: CheckpointParts,
     ) -> None:
@@ -100,7 +87,7 @@ class TrainingRun:
         self._commits: list[Any] = []
         self._files: MemoryFiles | None = None
         self._saved: Mapping[str, Any] | None = None
-        self.state_parts: dict[str, StatePart] = {
+        self.state_parts: dict[str, Stateful] = {
             "networks": NetworkState({**parts.policy, **parts.targets}, parts.optimizers),
             "model": model,
             "env": env,

@@ -15,7 +15,7 @@ from app.policies.algorithms.dqn import Expert, SortingDQN
 from app.policies.algorithms.vecenv import BatchVecEnv
 from app.policies.configs.sorting import SortingPreset
 from app.policies.networks.sorting_q import layout_of
-from app.policies.training.curve import CURVE_SEED, outcome_rates, play
+from app.policies.training.curve import CURVE_SEED, played_rates
 from app.policies.training.reporter import Callbacks, Reporter
 from app.policies.training.run import CheckpointParts, TrainingRun
 from app.sim.cells.cell import Cell
@@ -31,11 +31,7 @@ FADE_EVERY = 16
 
 
 def start(preset: SortingPreset, seed: int, cell: Cell) -> tuple[TrainingRun, SortingDQN]:
-    """Return a run of the preset and its model.
-
-    Args:
-        seed: Seed of everything random.
-        cell: Work cell trained in.
+    """Return a run of the preset and its model; see :func:`~app.policies.training.train.start`.
 
     Raises:
         InvalidInput: There is nothing to sort in the cell.
@@ -80,8 +76,6 @@ class SortingReporter(Reporter):
     """Fades the curriculum and runs the episodes behind the curve.
 
     Args:
-        run: The attempt.
-        callbacks: Receivers of the curve and of checkpoints.
         trained: The model.
     """
 
@@ -113,7 +107,7 @@ class SortingReporter(Reporter):
     def rates(self) -> dict[str, Any]:
         """Return rates of greedy episodes of the present network."""
         with self._run.untimed():
-            return outcome_rates(*play(self._greedy, self._played), OUTCOMES)
+            return played_rates(self._greedy, self._played, OUTCOMES)
 
     def _greedy(self, obs: torch.Tensor) -> torch.Tensor:
         moves: torch.Tensor = self._trained.q_net(obs).argmax(dim=1)

@@ -22,12 +22,12 @@ from app.policies.checkpoints.checkpoint import (
     check_file,
     tensor_bytes,
 )
-from app.policies.checkpoints.model_state import moments_of, restore, weights_of
+from app.policies.checkpoints.model_state import tensors_under, weights_of
 from app.policies.checkpoints.trained_cell import DEFINITION, manifest_fields
 from app.policies.configs.fields import read_config
 from app.policies.configs.presets import Preset
 from app.sim.cells.cell import Cell
-from app.state_dict import State
+from app.state_dict import State, Stateful
 
 FORMAT = "tandem-training-state/1"
 REQUIRED = {
@@ -123,7 +123,7 @@ def _leaves(tree: Mapping[str, Any], path: str = "") -> Iterator[tuple[str, Any]
             yield f"{path}{name}", value
 
 
-class NetworkState:
+class NetworkState(Stateful):
     """Networks and optimisers as a part of a state."""
 
     def __init__(
@@ -134,15 +134,28 @@ class NetworkState:
         self._modules, self._optimizers = modules, optimizers
 
     def state_dict(self) -> State:
-        """Return weights and moments."""
-        return {**weights_of(self._modules), **moments_of(self._optimizers)}
+        """Return weights, and moments as ``optimizer.index.moment``."""
+        moments = {
+            f"{name}.{index}.{key}": tensor.numpy()
+            for name, optimizer in self._optimizers.items()
+            for index, tensors in optimizer.state_dict()["state"].items()
+            for key, tensor in tensors.items()
+        }
+        return {**weights_of(self._modules), **moments}
 
     def load_state_dict(self, state: Mapping[str, Any]) -> None:
         """Restore weights and moments."""
-        restore(state, self._modules, self._optimizers)
+        for name, module in self._modules.items():
+            module.load_state_dict(tensors_under(state, name))
+        for name, optimizer in self._optimizers.items():
+            moments: dict[int, dict[str, torch.Tensor]] = {}
+            for key, tensor in tensors_under(state, name).items():
+                index, moment = key.split(".", 1)
+                moments.setdefault(int(index), {})[moment] = tensor.clone()
+            optimizer.load_state_dict({**optimizer.state_dict(), "state": moments})
 
 
-class Priorities:
+class Priorities(Stateful):
     """Priorities and random generator of a replay memory as a part of a state."""
 
     def __init__(self, memory: PrioritisedReplay) -> None:
@@ -160,7 +173,7 @@ class Priorities:
         self._memory._greatest = state["greatest"]
 
 
-class GlobalGenerators:
+class GlobalGenerators(Stateful):
     """Global random generators as a part of a state; Stable-Baselines3 uses them all."""
 
     def state_dict(self) -> State:

@@ -7,7 +7,6 @@ is used. ``memory/`` holds the files of the replay memory.
 import json
 import logging
 import shutil
-from collections.abc import Iterator
 from pathlib import Path
 
 from app.digests import has_digest
@@ -55,13 +54,6 @@ class StateFolder:
         Raises:
             StorageUnavailable: A file cannot be read for now.
         """
-        return next(self._sound(), None)
-
-    def remove(self) -> None:
-        """Delete all states, once the training has ended."""
-        shutil.rmtree(self._folder, ignore_errors=True)
-
-    def _sound(self) -> Iterator[TrainingState]:
         for path in self._newest_first():
             try:
                 content = json.loads(read_stored(path))
@@ -80,7 +72,12 @@ class StateFolder:
             ) as error:
                 logger.warning("%s cannot be used, an earlier state is: %s", path, error)
             else:
-                yield state
+                return state
+        return None
+
+    def remove(self) -> None:
+        """Delete all states, once the training has ended."""
+        shutil.rmtree(self._folder, ignore_errors=True)
 
     def _newest_first(self) -> list[Path]:
         return sorted(self._folder.glob("step-*.json"), reverse=True)

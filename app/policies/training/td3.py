@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import torch
+from gymnasium.spaces import flatdim
 
 from app.policies.algorithms.exploration import Exploration
 from app.policies.algorithms.td3 import BatchTD3, Networks, critics_of
@@ -19,24 +20,6 @@ from app.sim.envs.tasks import ArmTask
 
 RANGE_EVERY = 8
 """Steps of all environments between two updates of the training range."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class TD3Scenario:
-    """Parts of a training that depend on the scenario."""
-
-    task: ArmTask
-    """The environments."""
-    exploration: Exploration
-    """Perturbs the actions."""
-    networks: Networks
-    """How actor and critics are made."""
-    layout: list[list[Any]]
-    """Names and sizes of the groups of an observation."""
-    act_size: int
-    """Numbers of an action."""
-    visited_states: Callable[[], Mapping[str, Vec]]
-    """Returns the present states of all environments, for the training range."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -61,21 +44,29 @@ class TrainingMonitor:
 
 
 def start_td3(
-    preset: PickPreset | ReachPreset, seed: int, cell: Cell, scenario: TD3Scenario
+    preset: PickPreset | ReachPreset,
+    seed: int,
+    cell: Cell,
+    *,
+    task: ArmTask,
+    exploration: Exploration,
+    networks: Networks,
+    layout: list[list[Any]],
+    visited_states: Callable[[], Mapping[str, Vec]],
 ) -> tuple[TrainingRun, TrainingMonitor]:
     """Return a training and its monitor.
 
     Args:
-        scenario: Environments, exploration and networks.
+        seed: Seed of everything random.
+        cell: Work cell trained in.
+        task: The environments.
+        exploration: Perturbs the actions.
+        networks: How actor and critics are made.
+        layout: Names and sizes of the groups of an observation.
+        visited_states: Returns the present states of all environments, for the training range.
     """
-    env = BatchVecEnv(scenario.task)
-    model = BatchTD3(
-        preset.learning,
-        env,
-        seed,
-        exploration=scenario.exploration,
-        networks=scenario.networks,
-    )
+    env = BatchVecEnv(task)
+    model = BatchTD3(preset.learning, env, seed, exploration=exploration, networks=networks)
     targets = {
         "actor_target": model.actor_target.mu,
         "critic_target": critics_of(model.critic_target),
@@ -90,17 +81,17 @@ def start_td3(
             "actor_adam": model.actor.optimizer,
             "critic_adam": model.critic.optimizer,
         },
-        layout=scenario.layout,
-        act_size=scenario.act_size,
+        layout=layout,
+        act_size=flatdim(task.action_space),
         trained_range=ranges.as_json,
     )
     run = TrainingRun(preset, seed, cell, model, env, parts)
     run.state_parts["ranges"] = ranges
     monitor = TrainingMonitor(
-        n_greedy=model.exploration.n_greedy,
+        n_greedy=exploration.n_greedy,
         env=env,
         actor=model.evaluated_actor,
         ranges=ranges,
-        visited_states=scenario.visited_states,
+        visited_states=visited_states,
     )
     return run, monitor

@@ -15,15 +15,7 @@ from app.policies.configs.pick import PickPreset
 from app.policies.configs.presets import Preset
 from app.policies.configs.reach import ReachPreset
 from app.policies.configs.sorting import SortingPreset
-from app.policies.training import (
-    pick as pick_training,
-)
-from app.policies.training import (
-    reach as reach_training,
-)
-from app.policies.training import (
-    sorting as sorting_training,
-)
+from app.policies.training import pick, reach, sorting
 from app.policies.training.memory_files import MemoryFiles
 from app.policies.training.progress import Progress, TrainResult
 from app.policies.training.reporter import Callbacks, Reporter
@@ -106,7 +98,7 @@ def train(
             stopped = run.learn(reporter, reporter.report)
         completed = False
         if not stopped and isinstance(preset, PickPreset) and preset.predicts_outcomes:
-            completed = pick_training.add_outcomes(run, preset, should_stop)
+            completed = pick.add_outcomes(run, preset, should_stop)
             stopped = not completed
         if completed or run.step % preset.learning.checkpoint_steps:
             run.save(on_checkpoint)
@@ -125,13 +117,13 @@ def start(
     """
     reporter: Reporter
     if isinstance(preset, SortingPreset):
-        run, model = sorting_training.start(preset, seed, cell)
-        reporter = sorting_training.SortingReporter(run, calls, model)
+        run, model = sorting.start(preset, seed, cell)
+        reporter = sorting.SortingReporter(run, calls, model)
     elif isinstance(preset, ReachPreset):
-        run, monitor = reach_training.start(preset, seed, cell)
-        reporter = reach_training.ReachReporter(run, calls, monitor)
+        run, monitor = reach.start(preset, seed, cell)
+        reporter = reach.ReachReporter(run, calls, monitor)
     else:
-        run, monitor = pick_training.start(preset, seed, cell)
-        reporter = pick_training.PickReporter(run, calls, monitor)
+        run, monitor = pick.start(preset, seed, cell)
+        reporter = pick.PickReporter(run, calls, monitor)
     run.state_parts["reporter"] = reporter
     return run, reporter
