@@ -6,7 +6,6 @@ Every write is fenced (``app.store.fencing``). ``app.store.completion`` ends att
 import logging
 import math
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import Any
 
@@ -26,20 +25,6 @@ logger = logging.getLogger(__name__)
 
 MAX_RESUME = 256 * 1024 * 1024
 """Largest tensors of a resume state [bytes]."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class RunningJob:
-    """State of a running job for its supervisor."""
-
-    claim: Claim
-    """The running attempt."""
-    cancel_requested: bool
-    """Whether a cancel was requested."""
-    heartbeat_at: datetime | None
-    """Last heartbeat of its worker."""
-    waiting: str | None
-    """Reason for which its worker cannot write."""
 
 
 def claim_next(store: Store) -> tuple[Claim, JobRecord] | None:
@@ -75,7 +60,8 @@ def claim_next(store: Store) -> tuple[Claim, JobRecord] | None:
         }
         data = {"attempt": attempt, "resumed_from_step": max(step, 0)}
         change_state(connection, job_id, "running", changes, data)
-        return Claim(job_id=job_id, attempt=attempt), read_job(connection, job_id)
+        job = read_job(connection, job_id)
+        return job.claim, job
 
 
 def heartbeat(
@@ -255,20 +241,11 @@ def resume_manifests(store: Store, job_id: str) -> tuple[Mapping[str, Any], ...]
         return tuple(connection.execute(query).scalars())
 
 
-def running_jobs(store: Store) -> tuple[RunningJob, ...]:
+def running_jobs(store: Store) -> list[JobRecord]:
     """Return the running jobs that have a worker."""
     running = jobs.c.state == "running"
     with store.reading() as connection:
-        found = select_jobs(connection, running, jobs.c.kind.not_in(COMPOSITE_KINDS))
-    return tuple(
-        RunningJob(
-            claim=Claim(job_id=job.id, attempt=job.attempt),
-            cancel_requested=job.cancel_requested,
-            heartbeat_at=job.heartbeat_at,
-            waiting=job.waiting,
-        )
-        for job in found
-    )
+        return select_jobs(connection, running, jobs.c.kind.not_in(COMPOSITE_KINDS))
 
 
 def _forget_beyond_resume(connection: sa.Connection, job_id: str) -> int:

@@ -15,7 +15,7 @@ from app.store.database.reserve import write_with_reserve
 from app.store.database.tables import job_checkpoints, jobs, resume_states
 from app.store.engine import Store
 from app.store.fencing import change_state, fenced_update
-from app.store.jobs import ended_now, read_job
+from app.store.jobs import ended_now, read_job, select_jobs
 from app.store.records import COMPOSITE_KINDS, Claim, JobRecord, SpentBudget
 
 MAX_ERROR = 4000
@@ -53,10 +53,10 @@ def finish(
     if run_s is not None:
         changes["run_s"] = run_s
 
+    is_complete = state == "succeeded" and ended_by is None
+
     def end(connection: sa.Connection) -> None:
-        if (
-            state == "succeeded" and ended_by is None
-        ):  # first, which frees space in a full database
+        if is_complete:  # first, which frees space in a full database
             mine = resume_states.c.job_id == claim.job_id
             connection.execute(sa.delete(resume_states).where(mine))
         _end(connection, claim, state, changes)
@@ -72,11 +72,7 @@ def fail(store: Store, claim: Claim, error: str) -> None:
         StorageFull: No room is left.
     """
     changes = {"error": _shown(error)}
-
-    def end(connection: sa.Connection) -> None:
-        _end(connection, claim, "failed", changes)
-
-    write_with_reserve(store, end)
+    write_with_reserve(store, lambda connection: _end(connection, claim, "failed", changes))
 
 
 def crash(store: Store, claim: Claim, error: str, *, max_failures: int) -> JobRecord:
@@ -100,7 +96,7 @@ def crash(store: Store, claim: Claim, error: str, *, max_failures: int) -> JobRe
         failures = job.failures + 1
         if failures < max_failures or job.cancel_requested:
             changes = {"failures": failures, "error": _shown(error)}
-            _requeue(connection, claim.job_id, changes)
+            _requeue(connection, claim, changes)
         else:
             text = f"Failed after {failures} attempts. Last error: {error}"
             _end(connection, claim, "failed", {"error": _shown(text), "failures": failures})
@@ -115,12 +111,7 @@ def give_back(store: Store, claim: Claim) -> None:
     Raises:
         StaleAttempt: The attempt no longer holds the job.
     """
-
-    def requeue(connection: sa.Connection) -> None:
-        fenced_update(connection, claim, {}, counts=False)
-        _requeue(connection, claim.job_id, {})
-
-    write_with_reserve(store, requeue)
+    write_with_reserve(store, lambda connection: _requeue(connection, claim, {}))
 
 
 def requeue_orphans(store: Store) -> tuple[str, ...]:
@@ -136,16 +127,13 @@ def requeue_orphans(store: Store) -> tuple[str, ...]:
     Raises:
         StorageFull: No room is left.
     """
-    running = sa.select(jobs.c.id).where(
-        jobs.c.state == "running", jobs.c.kind.not_in(COMPOSITE_KINDS)
-    )
-    running = running.order_by(jobs.c.number)
+    running = jobs.c.state == "running", jobs.c.kind.not_in(COMPOSITE_KINDS)
 
     def requeue(connection: sa.Connection) -> tuple[str, ...]:
-        orphans = connection.execute(running).scalars().all()
-        for job_id in orphans:
-            _requeue_killed(connection, job_id)
-        return tuple(orphans)
+        orphans = select_jobs(connection, *running)
+        for job in orphans:
+            _requeue_killed(connection, job)
+        return tuple(job.id for job in orphans)
 
     return write_with_reserve(store, requeue)
 
@@ -179,7 +167,8 @@ def _end(
         if changes.get(name):
             data[name] = changes[name]
     values = {"error": None, **changes, **ended_now(), "waiting": None}
-    values["step"] = _steps_done(connection, claim.job_id, changes.get("result"))
+    job = read_job(connection, claim.job_id)
+    values["step"] = _steps_done(connection, job, changes.get("result"))
     values["heartbeat_at"] = values["finished_at"]
     if state != "cancelled":  # its end came before the cancel of the pruner
         values.setdefault("ended_by", None)
@@ -187,20 +176,19 @@ def _end(
 
 
 def _steps_done(
-    connection: sa.Connection, job_id: str, result: Mapping[str, Any] | None = None
+    connection: sa.Connection, job: JobRecord, result: Mapping[str, Any] | None = None
 ) -> int:
     """Return the steps that the attempts of a job have done, by all that they have recorded."""
     saved = sa.select(sa.func.max(job_checkpoints.c.step))
-    step = connection.execute(saved.where(job_checkpoints.c.job_id == job_id)).scalar() or 0
+    step = connection.execute(saved.where(job_checkpoints.c.job_id == job.id)).scalar() or 0
     stated = (result or {}).get("step")  # results of trainings state it
-    return max(read_job(connection, job_id).step, step, stated if type(stated) is int else 0)
+    return max(job.step, step, stated if type(stated) is int else 0)
 
 
-def _requeue_killed(connection: sa.Connection, job_id: str) -> None:
-    job = read_job(connection, job_id)
+def _requeue_killed(connection: sa.Connection, job: JobRecord) -> None:
     kills = job.kills + 1
     if kills < MAX_KILLS or job.cancel_requested:
-        _requeue(connection, job_id, {"kills": kills})
+        _requeue(connection, job.claim, {"kills": kills})
         return
     error = (
         f"Killed {kills} times with the server, the limit; at step {job.step} of its attempt "
@@ -208,17 +196,18 @@ def _requeue_killed(connection: sa.Connection, job_id: str) -> None:
         "log of the system names the reason"
     )
     changes = {"error": error, "kills": kills}
-    _end(connection, Claim(job_id=job_id, attempt=job.attempt), "failed", changes)
+    _end(connection, job.claim, "failed", changes)
 
 
-def _requeue(connection: sa.Connection, job_id: str, changes: Mapping[str, Any]) -> None:
-    job = read_job(connection, job_id)
+def _requeue(connection: sa.Connection, claim: Claim, changes: Mapping[str, Any]) -> None:
+    fenced_update(connection, claim, {}, counts=False)
+    job = read_job(connection, claim.job_id)
     data: dict[str, Any] = {"attempt": job.attempt}
-    changes = {**changes, "step": _steps_done(connection, job_id), "waiting": None}
+    changes = {**changes, "step": _steps_done(connection, job), "waiting": None}
     if job.cancel_requested:
         values = {**changes, "error": None, **ended_now()}
-        change_state(connection, job_id, "cancelled", values, data)
+        change_state(connection, job.id, "cancelled", values, data)
         return
     if changes.get("error"):
         data["error"] = changes["error"]
-    change_state(connection, job_id, "queued", changes, data)
+    change_state(connection, job.id, "queued", changes, data)

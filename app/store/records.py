@@ -17,7 +17,6 @@ JobKind = Literal["train", "evaluate", "sweep", "report"]
 """Kinds of jobs, as :mod:`jobs.spec` defines them."""
 
 FINAL_STATES: tuple[JobState, ...] = ("succeeded", "failed", "cancelled")
-"""Final states."""
 
 SpentBudget = Literal["step budget", "time budget"]
 """A budget that ended a training before its last step."""
@@ -86,6 +85,16 @@ class References:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Claim:
+    """The right of one attempt to write about its job, while the job runs that attempt."""
+
+    job_id: str
+    """The job."""
+    attempt: int
+    """Number of the attempt."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class JobRecord(NewJob):
     """A job: what was submitted, and its state."""
 
@@ -141,15 +150,10 @@ class JobRecord(NewJob):
         """Whether the state is final."""
         return self.state in FINAL_STATES
 
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Claim:
-    """The right of one attempt to write about its job, while the job runs that attempt."""
-
-    job_id: str
-    """The job."""
-    attempt: int
-    """Number of the attempt."""
+    @property
+    def claim(self) -> Claim:
+        """The claim of its newest attempt."""
+        return Claim(job_id=self.id, attempt=self.attempt)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -310,7 +310,7 @@ def test_sweep_is_no_work_for_a_worker_and_outlives_its_server(store: Store) -> 
     sweep = post(store)
     assert attempts.claim_next(store) is None
     look(store, sweep)
-    assert attempts.running_jobs(store) == ()
+    assert attempts.running_jobs(store) == []
     assert completion.requeue_orphans(store) == ()
     assert [one.id for one in composed_jobs.open_jobs(store, "sweep")] == [sweep.id]
 
