@@ -138,7 +138,7 @@ class RecordingCatalog:
         file_name, name = checked_names(file_name, name)
         sha256 = hashlib.sha256(content).hexdigest()
         suffix = format_of(file_name)
-        if stored.find_same(self._store, name, sha256) is not None:
+        if stored.is_stored(self._store, name, sha256):
             same, _ = stored.read_runs(self._store, name)
             if suffix == f".{same.summary['format']}":
                 return _read_alike(same, options), False

@@ -8,7 +8,7 @@ checkpoints  Trained policies and their aliases
 completion   Ends of attempts: succeeded, cancelled, failed, crashed, interrupted, orphaned
 composed_jobs
              Jobs made of jobs: sweeps and reports
-cursors      Cursors of lists: opaque text with the number of the last item of a page
+cursors      Pages of lists, and their cursors: opaque text with the number of the last item
 events       Events of jobs, the source of event streams
 fencing      Fencing of writes about a running job by its attempt number
 job_actions  Actions on jobs beside cancel: resume, name, notes, priority

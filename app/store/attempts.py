@@ -16,7 +16,7 @@ from app.errors import InvalidInput
 from app.store.checkpoints import drop_job_checkpoints, insert_checkpoint
 from app.store.database.tables import events, job_checkpoints, jobs, metrics, resume_states
 from app.store.engine import Store
-from app.store.events import append_event
+from app.store.events import append_event, drop_points
 from app.store.fencing import change_state, fenced_update
 from app.store.jobs import read_job, select_jobs
 from app.store.records import COMPOSITE_KINDS, Claim, JobRecord, NewCheckpoint, ResumeState
@@ -47,7 +47,9 @@ def claim_next(store: Store) -> tuple[Claim, JobRecord] | None:
         job_id = connection.execute(first.limit(1)).scalar()
         if job_id is None:
             return None
-        step = _forget_beyond_resume(connection, job_id)
+        found = next(_sound_states(connection, job_id), None)
+        step = -1 if found is None else found.step
+        _forget_beyond(connection, job_id, step)
         attempt = read_job(connection, job_id).attempt + 1
         now, started = datetime.now(UTC), jobs.c.started_at
         changes = {
@@ -248,21 +250,10 @@ def running_jobs(store: Store) -> list[JobRecord]:
         return select_jobs(connection, running, jobs.c.kind.not_in(COMPOSITE_KINDS))
 
 
-def _forget_beyond_resume(connection: sa.Connection, job_id: str) -> int:
-    """Delete the last attempt's writes after its resume state; return the state's step."""
-    found = next(_sound_states(connection, job_id), None)
-    step = -1 if found is None else found.step
-    _forget_beyond(connection, job_id, step)
-    return step
-
-
 def _forget_beyond(connection: sa.Connection, job_id: str, step: int) -> None:
     beyond = sa.and_(resume_states.c.job_id == job_id, resume_states.c.step > step)
     connection.execute(sa.delete(resume_states).where(beyond))
-    connection.execute(
-        sa.delete(metrics).where(metrics.c.job_id == job_id, metrics.c.step > step)
-    )
-    connection.execute(sa.delete(events).where(events.c.job_id == job_id, events.c.step > step))
+    drop_points(connection, job_id, beyond=step)
     drop_job_checkpoints(connection, job_id, beyond=step)
 
 

@@ -47,13 +47,9 @@ def put_cell(store: Store, name: str, definition: Mapping[str, Any]) -> bool:
             raise WrongState("name", name, rule)
         if len(known) >= MAX_CELLS:
             raise Conflict(f"{MAX_CELLS} cells are stored, the limit: remove one first")
-        values = {
-            "name": name,
-            "definition": dict(definition),
-            "digest": digest({"definition": dict(definition)}),
-            "created_at": datetime.now(UTC),
-        }
-        connection.execute(sa.insert(cells).values(values))
+        content = {"definition": dict(definition)}
+        values = {"name": name, "digest": digest(content), "created_at": datetime.now(UTC)}
+        connection.execute(sa.insert(cells).values({**values, **content}))
     return True
 
 
@@ -100,11 +96,8 @@ def remove_cell(store: Store, name: str) -> None:
         NotFound: No cell has that name.
         WrongState: A job that has not ended trains in it.
     """
+    query = sa.delete(cells).where(cells.c.name == name)
     with store.writing() as connection:
-        if (
-            connection.execute(sa.select(cells.c.name).where(cells.c.name == name)).first()
-            is None
-        ):
+        if not connection.execute(query).rowcount:
             raise NotFound("cell", name)
         require_unused(connection, "cell", name, lambda job: job.cell == name)
-        connection.execute(sa.delete(cells).where(cells.c.name == name))

@@ -14,13 +14,7 @@ import sqlalchemy as sa
 
 from app.digests import has_digest
 from app.errors import Damaged, InvalidInput, NotFound
-from app.store.cursors import (
-    MAX_INTEGER,
-    MAX_NUMBER,
-    check_limit,
-    decode_cursor,
-    encode_cursor,
-)
+from app.store.cursors import MAX_INTEGER, MAX_NUMBER, read_page
 from app.store.database.tables import aliases, checkpoints, job_checkpoints
 from app.store.engine import Store
 from app.store.records import CheckpointRecord, NewCheckpoint, Page
@@ -68,7 +62,8 @@ def find_checkpoint(connection: sa.Connection, reference: str) -> CheckpointReco
         NotFound: Nothing has that name.
     """
     sha256 = _resolve(connection, reference)
-    row = connection.execute(_described().where(checkpoints.c.sha256 == sha256)).first()
+    query = _described().where(checkpoints.c.sha256 == sha256)
+    row = connection.execute(query).mappings().first()
     if row is None:
         raise NotFound("checkpoint", reference)
     return _record(row, _names(connection))
@@ -84,14 +79,15 @@ def read_checkpoint(store: Store, reference: str) -> tuple[CheckpointRecord, byt
     with store.reading() as connection:
         sha256 = _resolve(connection, reference)
         query = _described().add_columns(checkpoints.c.tensors)
-        row = connection.execute(query.where(checkpoints.c.sha256 == sha256)).first()
+        query = query.where(checkpoints.c.sha256 == sha256)
+        row = connection.execute(query).mappings().first()
         names = _names(connection)
     if row is None and reference == sha256:
         raise NotFound("checkpoint", reference)
-    if row is None or not has_digest(sha256, row.manifest, row.tensors):
+    if row is None or not has_digest(sha256, row["manifest"], row["tensors"]):
         known = ", ".join(names.get(sha256, ()))
         raise Damaged("checkpoint", known or sha256, REMEDY, sha256)
-    return _record(row, names), row.tensors
+    return _record(row, names), row["tensors"]
 
 
 def stored_among(store: Store, names: Collection[str]) -> set[str]:
@@ -131,17 +127,13 @@ def list_checkpoints(
         InvalidInput: The cursor or limit is invalid.
     """
     found = _described(job_id).subquery()
-    place = found.c.number if job_id is None else found.c.step
-    query = sa.select(found).order_by(place.desc()).limit(check_limit(limit) + 1)
-    below = decode_cursor(cursor, MAX_NUMBER if job_id is None else MAX_INTEGER)
-    if below is not None:
-        query = query.where(place < below)
+    number, most = found.c.number, MAX_NUMBER
+    if job_id is not None:
+        number, most = found.c.step, MAX_INTEGER
     with store.reading() as connection:
-        rows = connection.execute(query).all()
+        rows, more = read_page(connection, sa.select(found), number, cursor, limit, most)
         names = _names(connection)
-    items = tuple(_record(row, names) for row in rows[:limit])
-    last = getattr(rows[limit - 1], place.name) if len(rows) > limit else None
-    return Page(items=items, next_cursor=None if last is None else encode_cursor(last))
+    return Page(items=tuple(_record(row, names) for row in rows), next_cursor=more)
 
 
 def set_alias(store: Store, name: str, sha256: str) -> None:
@@ -280,14 +272,8 @@ def _described(job_id: str | None = None) -> sa.Select[Any]:
     return query if job_id is None else query.where(sa.exists().where(*makes))
 
 
-def _record(row: Any, names: dict[str, tuple[str, ...]]) -> CheckpointRecord:
-    return CheckpointRecord(
-        sha256=row.sha256,
-        number=row.number,
-        job_id=row.job_id,
-        step=row.step,
-        manifest=row.manifest if isinstance(row.manifest, dict) else {},
-        size=row.size,
-        created_at=row.created_at,
-        aliases=names.get(row.sha256, ()),
-    )
+def _record(row: sa.RowMapping, names: dict[str, tuple[str, ...]]) -> CheckpointRecord:
+    fields = {name: value for name, value in row.items() if name != "tensors"}
+    if not isinstance(fields["manifest"], dict):
+        fields["manifest"] = {}
+    return CheckpointRecord(**fields, aliases=names.get(row["sha256"], ()))

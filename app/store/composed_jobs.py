@@ -11,9 +11,9 @@ from typing import Any, Literal
 import sqlalchemy as sa
 
 from app.errors import NotFound, WrongState
-from app.store.database.tables import events, jobs, metrics
+from app.store.database.tables import jobs, metrics
 from app.store.engine import Store
-from app.store.events import append_event
+from app.store.events import append_event, drop_points
 from app.store.fencing import change_state
 from app.store.jobs import cancel_parts, ended_now, read_job, select_jobs
 from app.store.jobs import request_cancel as cancel_job
@@ -57,9 +57,7 @@ def record(store: Store, job_id: str, done: int, values: Mapping[str, float | No
         job = read_job(connection, job_id)
         if done == job.step or job.is_final:
             return
-        for table in (metrics, events):
-            repeated = sa.and_(table.c.job_id == job_id, table.c.step >= done)
-            connection.execute(sa.delete(table).where(repeated))
+        drop_points(connection, job_id, beyond=done - 1)
         event = job.last_event + 1
         if done < job.step:  # which revokes the points of readers
             data = {"state": job.state, "attempt": job.attempt}

@@ -1,7 +1,11 @@
-"""Cursors of lists: opaque text with the number of the last item of a page."""
+"""Pages of lists; a cursor is opaque text with the number of the last item of a page."""
 
 import base64
 import binascii
+from collections.abc import Sequence
+from typing import Any
+
+import sqlalchemy as sa
 
 from app.errors import InvalidInput
 
@@ -40,12 +44,25 @@ def decode_cursor(cursor: str | None, greatest: int = MAX_NUMBER) -> int | None:
     return number
 
 
-def check_limit(limit: int) -> int:
-    """Return ``limit`` if it is a valid length of a page.
+def read_page(
+    connection: sa.Connection,
+    query: sa.Select[Any],
+    number: sa.ColumnElement[int],
+    cursor: str | None,
+    limit: int,
+    greatest: int = MAX_NUMBER,
+) -> tuple[Sequence[sa.RowMapping], str | None]:
+    """Return the rows of a page, highest number first, and the cursor of the next page.
 
     Raises:
-        InvalidInput: It lies outside [1, MAX_PAGE].
+        InvalidInput: The limit lies outside [1, MAX_PAGE], or the cursor is invalid.
     """
     if not 1 <= limit <= MAX_PAGE:
         raise InvalidInput("limit", limit, f"must lie in [1, {MAX_PAGE}]")
-    return limit
+    below = decode_cursor(cursor, greatest)
+    if below is not None:
+        query = query.where(number < below)
+    query = query.order_by(number.desc()).limit(limit + 1)
+    rows = connection.execute(query).mappings().all()
+    more = len(rows) > limit
+    return rows[:limit], encode_cursor(rows[limit - 1][number]) if more else None

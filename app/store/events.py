@@ -60,6 +60,14 @@ def append_event(
     )
 
 
+def drop_points(connection: sa.Connection, job_id: str, *, beyond: int) -> None:
+    """Delete the points of a job's curve beyond a step, and their events."""
+    for table in (metrics, events):
+        connection.execute(
+            sa.delete(table).where(table.c.job_id == job_id, table.c.step > beyond)
+        )
+
+
 def _data(row: Any) -> dict[str, Any]:
     step = {} if row.step is None else {"step": row.step}
     return {**step, **row.data, **(row.curve or {})}

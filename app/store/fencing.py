@@ -54,9 +54,7 @@ def peek(store: Store, claim: Claim) -> JobRecord:
     Raises:
         StaleAttempt: The attempt no longer holds the job.
     """
-    job = find_job(store, claim.job_id)
-    if job is None:  # deleted after its end
-        raise StaleAttempt(claim.job_id, claim.attempt)
-    if job.attempt != claim.attempt or job.state not in ("running", "cancelling"):
+    job = find_job(store, claim.job_id)  # None: deleted after its end
+    if job is None or job.claim != claim or job.state not in ("running", "cancelling"):
         raise StaleAttempt(claim.job_id, claim.attempt)
     return job

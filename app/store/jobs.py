@@ -14,25 +14,18 @@ import uuid
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from datetime import UTC, datetime
-from typing import Any, NamedTuple, get_args
+from typing import Any, get_args
 
 import sqlalchemy as sa
 
 from app.digests import digest
 from app.errors import Conflict, InvalidInput, NotFound, WrongState
-from app.store.cursors import check_limit, decode_cursor, encode_cursor
+from app.store.cursors import read_page
 from app.store.database.reserve import write_with_reserve
 from app.store.database.tables import jobs
 from app.store.engine import Store
 from app.store.events import append_event
-from app.store.records import (
-    FINAL_STATES,
-    JobRecord,
-    JobState,
-    NewJob,
-    Page,
-    References,
-)
+from app.store.records import FINAL_STATES, JobRecord, JobState, NewJob, Page, References
 from app.store.references import named_checkpoint, require_stored
 
 MAX_KEY_LENGTH = 255
@@ -43,14 +36,6 @@ NO_PARTS = "none"
 """Selects the jobs that are part of no other job."""
 DERIVED = frozenset({"preset", "seed", "overrides", "total_steps"})
 """Members of a new job that follow from its spec; an update of Tandem may change them."""
-
-
-class _Key(NamedTuple):
-    """An idempotency key."""
-
-    text: str
-    digest: str
-    """SHA-256 of what is submitted with it."""
 
 
 def create_job(
@@ -77,19 +62,20 @@ def create_job(
         InvalidInput: The key is empty or too long, or a reference is not stored.
         StorageFull: No room is left.
     """
-    if idempotency_key is not None and not 1 <= len(idempotency_key) <= MAX_KEY_LENGTH:
-        rule = f"must have 1 to {MAX_KEY_LENGTH} characters"
-        raise InvalidInput("idempotency_key", idempotency_key, rule)
-    key = None
+    key: dict[str, str] = {}
     if idempotency_key is not None:
-        key = _Key(idempotency_key, digest(_members(new) if submitted is None else submitted))
+        if not 1 <= len(idempotency_key) <= MAX_KEY_LENGTH:
+            rule = f"must have 1 to {MAX_KEY_LENGTH} characters"
+            raise InvalidInput("idempotency_key", idempotency_key, rule)
+        submission = digest(_members(new) if submitted is None else submitted)
+        key = {"idempotency_key": idempotency_key, "submission_digest": submission}
     with store.writing() as connection:
-        earlier = _by_key(connection, key)
-        if earlier is None:
-            require_stored(connection, references)
-            return _insert(connection, new, key)
-    assert key is not None
-    return _same_submission(earlier, new, key)
+        if key:
+            for earlier in select_jobs(connection, jobs.c.idempotency_key == idempotency_key):
+                _require_same(earlier, new, key["submission_digest"])
+                return earlier
+        require_stored(connection, references)
+        return _insert(connection, new, key)
 
 
 def get_job(store: Store, job_id: str) -> JobRecord:
@@ -173,16 +159,10 @@ def _page(
     store: Store, cursor: str | None, limit: int, where: Sequence[sa.ColumnElement[bool]]
 ) -> Page[JobRecord]:
     """Return one page of the jobs that meet all conditions, newest first."""
-    query = sa.select(jobs).order_by(jobs.c.number.desc()).limit(check_limit(limit) + 1)
-    below = decode_cursor(cursor)
-    if below is not None:
-        query = query.where(jobs.c.number < below)
-    query = query.where(*where)
+    query = sa.select(jobs).where(*where)
     with store.reading() as connection:
-        rows = connection.execute(query).mappings().all()
-    items = tuple(_record(row) for row in rows[:limit])
-    more = len(rows) > limit
-    return Page(items=items, next_cursor=encode_cursor(items[-1].number) if more else None)
+        rows, more = read_page(connection, query, jobs.c.number, cursor, limit)
+    return Page(items=tuple(_record(row) for row in rows), next_cursor=more)
 
 
 def count_jobs(store: Store) -> dict[JobState, int]:
@@ -245,12 +225,9 @@ def select_jobs(
 
 def cancel_parts(connection: sa.Connection, job_id: str) -> None:
     """Cancel the parts of a job that have not ended, in a transaction."""
-    parts = sa.select(jobs.c.id).where(
-        jobs.c.part_of == job_id, jobs.c.state.not_in(FINAL_STATES)
-    )
-    for part_id in connection.execute(parts.order_by(jobs.c.number)).scalars().all():
-        part = read_job(connection, part_id)
-        if part.state in ("queued", "running"):
+    is_open = jobs.c.state.not_in(FINAL_STATES)
+    for part in select_jobs(connection, jobs.c.part_of == job_id, is_open):
+        if part.state != "cancelling":
             _cancel(connection, part)
 
 
@@ -281,12 +258,8 @@ def _members(new: NewJob) -> dict[str, Any]:
     }
 
 
-def _insert(connection: sa.Connection, new: NewJob, key: _Key | None) -> JobRecord:
-    """Insert a queued job with its first event.
-
-    Raises:
-        NotFound, WrongState: As for :func:`create_job`.
-    """
+def _insert(connection: sa.Connection, new: NewJob, key: Mapping[str, str]) -> JobRecord:
+    """Insert a queued job with its first event; ``key``: its key, and digest, if it has one."""
     if new.parent is not None:
         _check_single(connection, new)
     if new.part_of is not None:
@@ -298,10 +271,9 @@ def _insert(connection: sa.Connection, new: NewJob, key: _Key | None) -> JobReco
         "spec": dict(new.spec),
         "checkpoint": named_checkpoint(connection, new.spec.get("checkpoint")),
         "state": "queued",
-        "idempotency_key": None if key is None else key.text,
-        "submission_digest": None if key is None else key.digest,
         "created_at": datetime.now(UTC),
         "last_event": 1,
+        **key,
     }
     connection.execute(sa.insert(jobs).values(values))
     data = {"state": "queued", "attempt": 0}
@@ -344,28 +316,16 @@ def _cancel(connection: sa.Connection, job: JobRecord) -> None:
     append_event(connection, job.id, job.last_event + 1, "state", data=data)
 
 
-def _by_key(connection: sa.Connection, key: _Key | None) -> JobRecord | None:
-    if key is None:
-        return None
-    return next(iter(select_jobs(connection, jobs.c.idempotency_key == key.text)), None)
-
-
-def _same_submission(earlier: JobRecord, new: NewJob, key: _Key) -> JobRecord:
-    """Return the job of an earlier submission.
-
-    Raises:
-        Conflict: It was another submission.
-    """
+def _require_same(earlier: JobRecord, new: NewJob, submission: str) -> None:
+    """Refuse another submission under the key of an earlier one."""
+    same = earlier.submission_digest == submission
     if earlier.submission_digest is None:  # a job queued before migration 0015
         same = dict(earlier.spec) == dict(new.spec)
-    else:
-        same = earlier.submission_digest == key.digest
     if not same:
         raise Conflict(
             f"idempotency key {earlier.idempotency_key!r} belongs to job {earlier.id}, which "
             "was submitted with another body: use a new key"
         )
-    return earlier
 
 
 def _in_state(state: JobState) -> sa.ColumnElement[bool]:

@@ -28,7 +28,6 @@ MAX_TOTAL = 2 * 1024 * 1024 * 1024
 """Limit of the size of all recordings [bytes]."""
 
 _LISTED = [one for one in recordings.c if one.name not in ("digest", "tensors", "detail")]
-_DETAILED = [*_LISTED, recordings.c.detail]
 
 
 def put_recording(store: Store, new: NewRecording) -> bool:
@@ -46,7 +45,7 @@ def put_recording(store: Store, new: NewRecording) -> bool:
         rule = f"bytes exceed the limit of {MAX_TENSORS} bytes per recording"
         raise InvalidInput("recording", len(new.tensors), rule)
     with store.writing() as connection:
-        if _same(connection, new.name, new.sha256) is not None:
+        if _is_stored(connection, new.name, new.sha256):
             return False
         summary, detail = dict(new.summary), dict(new.detail)
         values = {
@@ -60,8 +59,8 @@ def put_recording(store: Store, new: NewRecording) -> bool:
     return True
 
 
-def find_same(store: Store, name: str, sha256: str) -> StoredRecording | None:
-    """Return the recording of a file under a name; None where it could be stored now.
+def is_stored(store: Store, name: str, sha256: str) -> bool:
+    """Return whether a file is stored under a name; otherwise it could be stored now.
 
     Args:
         sha256: Of the file.
@@ -71,7 +70,7 @@ def find_same(store: Store, name: str, sha256: str) -> StoredRecording | None:
         Conflict: The limits are reached.
     """
     with store.reading() as connection:
-        return _same(connection, name, sha256)
+        return _is_stored(connection, name, sha256)
 
 
 def read_runs(store: Store, name: str) -> tuple[StoredRecording, bytes]:
@@ -147,12 +146,12 @@ def _row(connection: sa.Connection, name: str, columns: list[sa.Column[Any]]) ->
     return row
 
 
-def _same(connection: sa.Connection, name: str, sha256: str) -> StoredRecording | None:
-    query = sa.select(*_DETAILED).where(recordings.c.name == name)
-    row = connection.execute(query).mappings().first()
-    if row is not None:
-        if row["sha256"] == sha256:
-            return _record(row)
+def _is_stored(connection: sa.Connection, name: str, sha256: str) -> bool:
+    query = sa.select(recordings.c.sha256).where(recordings.c.name == name)
+    stored = connection.execute(query).scalar()
+    if stored == sha256:
+        return True
+    if stored is not None:
         rule = "from another file is stored: remove it first, or choose another name"
         raise WrongState("name", name, rule)
     held = sa.select(sa.func.count(), sa.func.coalesce(sa.func.sum(recordings.c.size), 0))
@@ -163,4 +162,4 @@ def _same(connection: sa.Connection, name: str, sha256: str) -> StoredRecording 
         raise Conflict(
             f"the stored recordings take {total} of at most {MAX_TOTAL} bytes: remove one first"
         )
-    return None
+    return False

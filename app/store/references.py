@@ -31,13 +31,18 @@ def require_stored(connection: sa.Connection, references: References) -> None:
     Raises:
         InvalidInput: Something is not, since it was deleted after the job was checked.
     """
-    named = checkpoints.c.sha256 == named_checkpoint(connection, references.checkpoint)
-    _require(connection, "checkpoint", references.checkpoint, checkpoints, named)
-    cell = references.cell
-    _require(connection, "overrides.cell", cell, cells, cells.c.name == cell)
+    checkpoint, cell = references.checkpoint, references.cell
+    named = named_checkpoint(connection, checkpoint)
+    rows = [
+        ("checkpoint", checkpoint, checkpoints.c.sha256 == named),
+        ("overrides.cell", cell, cells.c.name == cell),
+    ]
     for place, name in enumerate(references.recordings):
-        field = f"recordings[{place}]"
-        _require(connection, field, name, recordings, recordings.c.name == name)
+        rows.append((f"recordings[{place}]", name, recordings.c.name == name))
+    for field, given, same in rows:
+        query = sa.select(sa.literal(1)).where(same)
+        if given is not None and connection.execute(query).first() is None:
+            raise InvalidInput(field, given, "is no longer stored")
 
 
 def to_be_evaluated(
@@ -84,16 +89,3 @@ def _references(spec: Mapping[str, Any], overrides: Mapping[str, Any]) -> Refere
         cell=overrides.get("cell"),
         recordings=tuple(spec.get("recordings", ())),
     )
-
-
-def _require(
-    connection: sa.Connection,
-    field: str,
-    name: str | None,
-    table: sa.Table,
-    same: sa.ColumnElement[bool],
-) -> None:
-    """Check that a table has the row of a name; None names nothing."""
-    query = sa.select(sa.literal(1)).select_from(table).where(same)
-    if name is not None and connection.execute(query).first() is None:
-        raise InvalidInput(field, name, "is no longer stored")

@@ -8,6 +8,7 @@ import pytest
 import sqlalchemy as sa
 
 from app.store import jobs
+from app.store.cursors import encode_cursor
 from app.store.database.tables import jobs as table
 from app.store.engine import Store
 from app.store.records import JobState
@@ -104,7 +105,7 @@ def test_a_page_is_read_by_an_index_without_sorting(
     store: Store, state: JobState | None, cursor: bool, expected: str
 ) -> None:
     add(store, 0, 300)
-    below = jobs.encode_cursor(200) if cursor else None
+    below = encode_cursor(200) if cursor else None
     ((query, parameters),) = asked(
         store, lambda: jobs.list_jobs(store, state=state, cursor=below)
     )

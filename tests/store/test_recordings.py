@@ -44,14 +44,11 @@ def test_same_file_may_have_two_names(store: Store) -> None:
 
 
 def test_what_is_stored_is_found_before_the_file_is_imported(store: Store) -> None:
-    assert recordings.find_same(store, "wave", WAVE.sha256) is None
+    assert not recordings.is_stored(store, "wave", WAVE.sha256)
     recordings.put_recording(store, WAVE)
-    assert (
-        recordings.find_same(store, "wave", WAVE.sha256)
-        == recordings.read_runs(store, "wave")[0]
-    )
+    assert recordings.is_stored(store, "wave", WAVE.sha256)
     with pytest.raises(Conflict, match="choose another name"):
-        recordings.find_same(store, "wave", "b" * 64)
+        recordings.is_stored(store, "wave", "b" * 64)
 
 
 def test_recordings_are_listed_by_name_without_their_detail(store: Store) -> None:
@@ -89,7 +86,7 @@ def test_only_so_many_recordings_are_kept(
     with pytest.raises(Conflict, match="2 recordings are stored, the limit"):
         recordings.put_recording(store, replace(WAVE, name="c"))
     with pytest.raises(Conflict, match="2 recordings are stored, the limit"):
-        recordings.find_same(store, "c", WAVE.sha256)
+        recordings.is_stored(store, "c", WAVE.sha256)
 
 
 def test_only_so_many_bytes_are_kept(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -48,12 +48,9 @@ def is_backup(file: Path) -> bool:
 
 def measured(path: Path) -> dict[str, Any]:
     """Return size [bytes] and SHA-256 of a file, as the head of an archive states them."""
-    digest, size = hashlib.sha256(), 0
     with path.open("rb") as file:
-        while chunk := file.read(CHUNK):
-            digest.update(chunk)
-            size += len(chunk)
-    return {"size": size, "sha256": digest.hexdigest()}
+        digest = hashlib.file_digest(file, "sha256")
+        return {"size": file.tell(), "sha256": digest.hexdigest()}
 
 
 def write_archive(part: Path, head: Mapping[str, Any], files: Mapping[str, Path]) -> None:

@@ -292,8 +292,6 @@ def _copy_database(source: Path, copy: Path, shown: str) -> None:
     if not source.exists():
         raise InvalidInput("TANDEM_DATA", str(source.parent), "has no database")
     compact = copy.with_name(f"{copy.name}.compact")
-    for left in (copy, compact):
-        left.unlink(missing_ok=True)
     try:
         with (
             closing(sqlite3.connect(source, timeout=BUSY_TIMEOUT_S)) as live,
