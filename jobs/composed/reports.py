@@ -5,7 +5,6 @@ killed server continues, and a resumed report repeats only those without a resul
 """
 
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import Any
 
 from app.policies.evaluation.registry import most_episodes
@@ -14,8 +13,8 @@ from app.provenance import describe
 from app.store import composed_jobs, jobs
 from app.store.engine import Store
 from app.store.records import EarlyEnd, JobRecord
-from jobs.composed.composer import Composer
-from jobs.spec import AnySpec, ReportSpec, parse_spec
+from jobs.composed.composer import Composer, queue_part
+from jobs.spec import ReportSpec, parse_spec
 
 
 class Reports(Composer):
@@ -46,9 +45,7 @@ class Reports(Composer):
                 ended[file] = part
             elif active < spec.parallel:
                 name = f"report {job.number}, {file}"
-                new = replace(_evaluation(spec, *tested).new_job(), name=name, trial=number)
-                new = replace(new, priority=job.priority, part_of=job.id)
-                jobs.create_job(store, new, idempotency_key=key, submitted=new.spec)
+                queue_part(store, job, number, name, key, _evaluation(spec, *tested))
                 active += 1
         composed_jobs.record(store, job.id, len(ended), {})
         if len(ended) == len(wanted):
@@ -61,10 +58,10 @@ class Reports(Composer):
                 composed_jobs.end(store, job.id, "succeeded", result=result, ended_by=lacking)
 
 
-def _evaluation(spec: ReportSpec, protocol: str, checkpoint: str | None) -> AnySpec:
+def _evaluation(spec: ReportSpec, protocol: str, checkpoint: str | None) -> dict[str, Any]:
     episodes = spec.episodes and min(spec.episodes, most_episodes(protocol))
     body = {"kind": "evaluate", "protocol": protocol, "checkpoint": checkpoint}
-    return parse_spec({**body, "episodes": episodes, "seed": spec.seed})
+    return {**body, "episodes": episodes, "seed": spec.seed}
 
 
 def _written(ended: Mapping[str, JobRecord]) -> dict[str, Any]:

@@ -9,7 +9,7 @@ Source: Bergstra et al. (2011), Golovin et al. (2017); Optuna (Akiba et al. 2019
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, Literal
 
 import optuna
@@ -24,10 +24,10 @@ from optuna.trial import FrozenTrial, TrialState, create_trial
 from app.errors import InvalidInput, NotFound
 from app.policies.configs import presets
 from app.policies.configs.fields import entries
-from app.store import composed_jobs, jobs, metrics
+from app.store import composed_jobs, metrics
 from app.store.engine import Store
 from app.store.records import JobRecord
-from jobs.composed.composer import Composer
+from jobs.composed.composer import Composer, queue_part
 from jobs.spec import SweepSpec, parse_spec
 
 optuna.logging.set_verbosity(optuna.logging.ERROR)
@@ -233,16 +233,8 @@ def _evaluate(store: Store, job: JobRecord, spec: SweepSpec, trial: SweepTrial) 
 
 
 def _queue(store: Store, job: JobRecord, number: int, body: Mapping[str, Any]) -> None:
-    """Queue a job of a trial; once, however often this is repeated, with any priority."""
-    new = replace(
-        parse_spec(body).new_job(),
-        name=f"sweep {job.number}, trial {number}",
-        priority=job.priority,
-        part_of=job.id,
-        trial=number,
-    )
-    key = f"{job.id}-{number}-{new.kind}"
-    jobs.create_job(store, new, idempotency_key=key, submitted=new.spec)
+    name, key = f"sweep {job.number}, trial {number}", f"{job.id}-{number}-{body['kind']}"
+    queue_part(store, job, number, name, key, body)
 
 
 def _drawn(spec: SweepSpec, trials: Sequence[SweepTrial], number: int) -> dict[str, Any]:
@@ -269,11 +261,10 @@ def _drawn(spec: SweepSpec, trials: Sequence[SweepTrial], number: int) -> dict[s
 
 
 def _study(spec: SweepSpec, seed: int) -> optuna.Study:
-    direction: Literal["maximize", "minimize"] = "minimize"
-    if spec.objective.maximised:
-        direction = "maximize"
     sampler = optuna.samplers.TPESampler(seed=seed % 2**31)
-    return optuna.create_study(direction=direction, sampler=sampler)
+    return optuna.create_study(
+        direction="maximize" if spec.objective.maximised else "minimize", sampler=sampler
+    )
 
 
 def _distributions(spec: SweepSpec) -> dict[str, BaseDistribution]:
