@@ -8,7 +8,8 @@ import faulthandler
 import logging
 import os
 import signal
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
+from dataclasses import asdict
 from typing import Any
 
 from app import logs
@@ -20,37 +21,34 @@ from jobs.worker import JobWorker, Runner
 
 logger = logging.getLogger(__name__)
 
-Connect = Callable[[Claim], tuple[JobAccess, Mapping[str, Runner]]]
-"""Returns the access to the job of an attempt, and the runner of each kind of job."""
+Connected = tuple[JobAccess, Mapping[str, Runner]]
+"""The access to the job of an attempt, and the runner of each kind of job."""
 NICENESS = 10
 """Niceness of a worker, below the priority of the server and its live cell."""
 
 
-def run_attempt(
-    connect: Connect,
-    style: logs.Style = "text",
-    arguments: Sequence[str] | None = None,
-) -> int:
-    """Run the attempt of the command line.
+def claim_of_arguments(description: str) -> Claim:
+    """Return the claim that the command line of this process names."""
+    parser = argparse.ArgumentParser(description=description)
+    parser.add_argument("--job", required=True, help="id of the job")
+    parser.add_argument("--attempt", required=True, type=int, help="claimed attempt")
+    options = parser.parse_args()
+    return Claim(job_id=options.job, attempt=options.attempt)
 
-    Args:
-        connect: Opens the access to the job.
-        style: Form of the log's lines.
-        arguments: Command line; that of the process by default.
+
+def run_attempt(connect: Callable[[Claim], Connected], style: logs.Style = "text") -> int:
+    """Run the attempt of the command line; ``connect`` opens the access to its job.
 
     Returns:
         The exit status: 0 when the job's row contains the result, ``EX_TEMPFAIL`` where the
         database takes no writes.
     """
-    parser = argparse.ArgumentParser(description="Run one attempt of a job.")
-    parser.add_argument("--job", required=True, help="id of the job")
-    parser.add_argument("--attempt", required=True, type=int, help="claimed attempt")
-    options = parser.parse_args(arguments)
+    claim = claim_of_arguments("Run one attempt of a job.")
     os.nice(NICENESS)
     faulthandler.enable()
-    logs.set_up(style, job_id=options.job, attempt=options.attempt)
+    logs.set_up(style, **asdict(claim))
     try:
-        access, runners = connect(Claim(job_id=options.job, attempt=options.attempt))
+        access, runners = connect(claim)
         worker = JobWorker(access)
     except (StorageFull, StorageUnavailable) as error:
         logger.error("%s", error.message)

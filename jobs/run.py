@@ -6,7 +6,7 @@ Executors start it. Settings come from the environment, the spec from the job's 
 
 import logging
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import asdict
 from functools import partial
 from typing import Any
@@ -26,8 +26,8 @@ from app.policies.training.state import TrainingState
 from app.policies.training.train import train as train_policy
 from app.settings import Settings, load_settings
 from app.store.records import Claim, ResumeState
-from jobs.access import JobAccess, open_access
-from jobs.attempt import run_attempt
+from jobs.access import open_access
+from jobs.attempt import Connected, run_attempt
 from jobs.checkpoints import to_store
 from jobs.inputs import JobInputs, StoreInputs
 from jobs.spec import EvaluateSpec, parse_spec
@@ -120,13 +120,13 @@ def runners(inputs: JobInputs) -> Mapping[str, Runner]:
     return {"train": partial(train, inputs), "evaluate": partial(evaluate, inputs)}
 
 
-def connect(settings: Settings, claim: Claim) -> tuple[JobAccess, Mapping[str, Runner]]:
+def connect(settings: Settings, claim: Claim) -> Connected:
     """Open the database for an attempt."""
     access = open_access(settings.database, settings.data, claim)
     return access, runners(StoreInputs(access.store, settings.data, claim.job_id))
 
 
-def main() -> int:
+def main(connect: Callable[[Settings, Claim], Connected] = connect) -> int:
     """Run the attempt of the command line with the settings of the environment."""
     torch.set_num_threads(1)
     settings = load_settings()

@@ -8,7 +8,6 @@ started, a cluster that fails queues the job again; afterwards it counts as a cr
 that SIGTERM ended, as when the node's machine shuts down, is queued again.
 """
 
-import argparse
 import logging
 import os
 import signal
@@ -17,6 +16,7 @@ import threading
 import time
 from collections.abc import Iterator
 from contextlib import closing, contextmanager, suppress
+from dataclasses import asdict
 from typing import Any
 
 import ray
@@ -30,6 +30,7 @@ from app.storage_errors import StaleAttempt, StorageFull, StorageUnavailable
 from app.store import attempts
 from app.store.engine import Store
 from app.store.records import Claim
+from jobs.attempt import claim_of_arguments
 from jobs.executor import NO_CLUSTER, NO_CPU, Exit
 from jobs.remote.ray_node import NodeWorker
 
@@ -44,11 +45,7 @@ HEARTBEAT_S = 5.0
 
 
 class RayDriver:
-    """Runs one attempt.
-
-    Args:
-        settings: Settings of the server.
-    """
+    """Runs one attempt, with the settings of the server."""
 
     def __init__(self, settings: Settings, claim: Claim) -> None:
         self._settings, self._claim = settings, claim
@@ -147,12 +144,9 @@ class RayDriver:
 
 
 def exit_status(code: int) -> int:
-    """Return the exit status of an attempt whose process on a node has ended.
+    """Return the exit status of an attempt by that of its process on a node.
 
-    ``EX_TEMPFAIL``, which queues the job again, where SIGTERM ended it.
-
-    Args:
-        code: Exit status of the process; negative: the signal that killed it.
+    ``EX_TEMPFAIL``, which queues the job again, where SIGTERM ended it (a negative ``code``).
     """
     if code >= 0:
         return code
@@ -162,15 +156,11 @@ def exit_status(code: int) -> int:
 
 def main() -> int:
     """Run the attempt of the command line; return its exit status."""
-    parser = argparse.ArgumentParser(description="Run one attempt of a job on a Ray cluster.")
-    parser.add_argument("--job", required=True, help="id of the job")
-    parser.add_argument("--attempt", required=True, type=int, help="claimed attempt")
-    options = parser.parse_args()
+    claim = claim_of_arguments("Run one attempt of a job on a Ray cluster.")
     settings = load_settings()
-    logs.set_up(settings.log, job_id=options.job, attempt=options.attempt)
-    driver = RayDriver(settings, Claim(job_id=options.job, attempt=options.attempt))
+    logs.set_up(settings.log, **asdict(claim))
     try:
-        return driver.run()
+        return RayDriver(settings, claim).run()
     except ServiceError as error:
         logger.error("%s", error.message)
         return os.EX_CONFIG
