@@ -185,17 +185,14 @@ def band(
     at = np.asarray(steps, dtype=float)
     rows = np.full((len(curves), len(at)), np.nan)
     for row, curve in zip(rows, curves, strict=True):
-        known = [(step, value) for step, value in curve if value is not None]
-        if known:
-            x, y = np.array(known, dtype=float).T
+        points = [(step, value) for step, value in curve if value is not None]
+        if points:
+            x, y = np.array(points, dtype=float).T
             row[:] = np.interp(at, x, y, left=np.nan, right=np.nan)
-    present = np.isfinite(rows)
-    n = present.sum(axis=0)
-    total = np.where(present, rows, 0.0).sum(axis=0)
-    mean = np.divide(total, n, out=np.full(len(at), np.nan), where=n > 0)
-    low = np.where(present, rows, np.inf).min(axis=0, initial=np.inf)
-    high = np.where(present, rows, -np.inf).max(axis=0, initial=-np.inf)
-    return mean, np.where(n > 0, low, np.nan), np.where(n > 0, high, np.nan), n.astype(float)
+    known = np.ma.masked_invalid(rows)
+    mean, low, high = known.mean(axis=0), known.min(axis=0), known.max(axis=0)
+    n = known.count(axis=0).astype(float)
+    return mean.filled(np.nan), low.filled(np.nan), high.filled(np.nan), n
 
 
 def curves_as_csv(store: Store, job_ids: Sequence[str]) -> str:
@@ -228,21 +225,17 @@ def _groups(
     lines: Mapping[str, Sequence[tuple[int, float | None]]],
     steps: Sequence[int],
 ) -> tuple[Group, ...]:
-    members: dict[str, list[JobRecord]] = {}
-    fields: dict[str, dict[str, Any]] = {}
+    members: dict[str, tuple[dict[str, Any], list[str]]] = {}
     for job in trained:
         own = {name: value for name, value in settings_of(job).items() if name != "seed"}
-        key = repr(sorted(own.items()))
-        members.setdefault(key, []).append(job)
-        fields[key] = own
-    differences = differing(list(fields.values()))
+        members.setdefault(repr(sorted(own.items())), (own, []))[1].append(job.id)
+    differences = differing([own for own, _ in members.values()])
     groups = []
-    for place, (key, own) in enumerate(fields.items()):
-        mean, low, high, n = band([lines[job.id] for job in members[key]], steps)
+    for place, (own, ids) in enumerate(members.values()):
+        mean, low, high, n = band([lines[one] for one in ids], steps)
         values = {name: row[place] for name, row in differences.items()}
         label = _label(values) or str(own.get("preset"))
-        ids = tuple(job.id for job in members[key])
-        groups.append(Group(label=label, jobs=ids, mean=mean, low=low, high=high, n=n))
+        groups.append(Group(label=label, jobs=tuple(ids), mean=mean, low=low, high=high, n=n))
     return _distinct(groups, {job.id: job.number for job in trained})
 
 
