@@ -77,7 +77,7 @@ class LocalProcess:
         self._environment = {
             **os.environ,
             "TANDEM_DATA": str(data_dir.absolute()),
-            "PYTHONPATH": search_path(os.environ),
+            "PYTHONPATH": search_path(),
             "PYTHONUNBUFFERED": "1",
             # One job trains on one core and leaves the others to the server.
             "OMP_NUM_THREADS": "1",
@@ -105,16 +105,17 @@ class LocalProcess:
                 stderr=output,
                 start_new_session=True,  # Ctrl-C goes to the server, which stops its workers
             )
-            return LocalHandle(
-                process=process,
-                log=log,
-                log_start=os.fstat(output.fileno()).st_size,
-            )
+            log_start = os.fstat(output.fileno()).st_size
+        return LocalHandle(process=process, log=log, log_start=log_start)
 
     def poll(self, handle: LocalHandle) -> Exit | None:
         """Return the end of the process; None while it runs."""
         code = handle.process.poll()
-        return None if code is None else Exit(code=code, tail=_tail(handle))
+        if code is None:
+            return None
+        return Exit(
+            code=code, tail=end_of_log(handle.log, TAIL_BYTES, handle.log_start).strip()
+        )
 
     def stop(self, handle: LocalHandle, *, force: bool) -> None:
         """Send SIGTERM, after which a worker stops at its next step, or SIGKILL by force."""
@@ -124,13 +125,8 @@ class LocalProcess:
             handle.process.terminate()
 
 
-def _tail(handle: LocalHandle) -> str:
-    """Return the end of what an attempt logged; empty once its job was deleted."""
-    return end_of_log(handle.log, TAIL_BYTES, handle.log_start).strip()
-
-
 def end_of_log(log: Path, n_bytes: int, start: int = 0) -> str:
-    """Return the end of a log as text; empty where there is no log.
+    """Return the end of a log as text; empty where there is none, as once a job was deleted.
 
     Args:
         n_bytes: Largest length [bytes].
@@ -145,9 +141,9 @@ def end_of_log(log: Path, n_bytes: int, start: int = 0) -> str:
         return ""
 
 
-def search_path(environment: Mapping[str, str]) -> str:
+def search_path() -> str:
     """Return the ``PYTHONPATH`` of a child process."""
-    earlier = environment.get("PYTHONPATH")
+    earlier = os.environ.get("PYTHONPATH")
     return os.pathsep.join([str(PROJECT_ROOT), *([earlier] if earlier else [])])
 
 

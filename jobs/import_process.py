@@ -16,7 +16,7 @@ import subprocess
 import sys
 import threading
 from collections.abc import Mapping
-from dataclasses import asdict, fields
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -64,7 +64,6 @@ class ImportProcess:
             file_name: Its name; the suffix gives the format.
             name: Name of the recording.
             sha256: Of the file.
-            options: How the file is read.
 
         Raises:
             BadRecording: It is unsound; each fault names line or column and rule.
@@ -85,7 +84,11 @@ class ImportProcess:
             rule = f"takes more than {MAX_IMPORT_S:g} s to import: cut it into parts"
             raise InvalidInput("file", f"<{len(content)} bytes>", rule) from error
         finally:
-            self._end(process)
+            with self._lock:
+                self._running.discard(process)
+                if process.returncode is None:
+                    process.kill()
+                    process.communicate()
         if self._stopped:
             raise NotReady("stopping")
         if process.returncode in (-signal.SIGXCPU, -signal.SIGKILL):
@@ -97,7 +100,10 @@ class ImportProcess:
                 f"the import of {file_name!r} ended without an answer (exit status "
                 f"{process.returncode}); the server's log has its output"
             )
-        return _answered(output)
+        answer, tensors = _unframed(output)
+        if "faults" in answer:
+            raise BadRecording([Fault(**fault) for fault in answer["faults"]])
+        return NewRecording(**answer["recording"], tensors=tensors)
 
     def stop(self) -> None:
         """End all imports; later ones are refused."""
@@ -115,7 +121,7 @@ class ImportProcess:
                 cwd=PROJECT_ROOT,
                 env={
                     **os.environ,
-                    "PYTHONPATH": search_path(os.environ),
+                    "PYTHONPATH": search_path(),
                     "OMP_NUM_THREADS": "1",
                     "OPENBLAS_NUM_THREADS": "1",
                 },
@@ -126,13 +132,6 @@ class ImportProcess:
             )
             self._running.add(process)
             return process
-
-    def _end(self, process: subprocess.Popen[bytes]) -> None:
-        with self._lock:
-            self._running.discard(process)
-            if process.returncode is None:
-                process.kill()
-                process.communicate()
 
 
 def import_here(
@@ -167,7 +166,7 @@ def main() -> None:
         fault = Fault(place="file", value="", rule=rule, hint="cut it into parts")
         answer = _framed({"faults": [asdict(fault)]}, b"")
     else:
-        members = {entry.name: getattr(new, entry.name) for entry in fields(NewRecording)}
+        members = asdict(new)
         answer = _framed({"recording": members}, members.pop("tensors"))
     sys.stdout.buffer.write(answer)
 
@@ -179,13 +178,6 @@ def _limit() -> None:
         pages = int(Path("/proc/self/statm").read_text().split()[0])
         limit = pages * resource.getpagesize() + MAX_MEMORY_BYTES
         resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
-
-
-def _answered(output: bytes) -> NewRecording:
-    head, tensors = _unframed(output)
-    if "faults" in head:
-        raise BadRecording([Fault(**fault) for fault in head["faults"]])
-    return NewRecording(**head["recording"], tensors=tensors)
 
 
 def _framed(head: Mapping[str, Any], payload: bytes) -> bytes:

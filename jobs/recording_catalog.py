@@ -30,11 +30,7 @@ _NAME = re.compile(r"[a-z0-9][a-z0-9-]{0,63}")
 
 
 class RecordingCatalog:
-    """Finds recordings by name; safe to use from any thread.
-
-    Args:
-        importer: Imports files.
-    """
+    """Finds recordings by name; safe to use from any thread."""
 
     def __init__(self, store: Store, importer: Importer = import_here) -> None:
         self._store = store
@@ -50,14 +46,6 @@ class RecordingCatalog:
     def all(self) -> tuple[StoredRecording, ...]:
         """Return all recordings, by name, without their runs."""
         return stored.list_recordings(self._store)
-
-    def record(self, name: str) -> StoredRecording:
-        """Return a recording without its runs.
-
-        Raises:
-            NotFound: No recording has that name.
-        """
-        return self.with_runs(name)[0]
 
     def with_runs(self, name: str) -> tuple[StoredRecording, bytes]:
         """Return a recording with its runs as safetensors bytes.
@@ -123,7 +111,6 @@ class RecordingCatalog:
         Args:
             file_name: Its name; the suffix gives the format.
             name: Name of the recording; made from the file's name if None.
-            options: How the file is read.
 
         Returns:
             The recording, and whether it is new: the same file under the same name again has
@@ -171,27 +158,24 @@ class RecordingCatalog:
 
 
 def checked_names(file_name: str, name: str | None) -> tuple[str, str]:
-    """Return a file's name without folders, and the name of its recording.
-
-    Args:
-        file_name: Name of the file; its suffix gives the format.
-        name: Name of the recording; made from the file's name if None.
+    """Return a file's name without folders, and the given or derived name of its recording.
 
     Raises:
         BadRecording: The suffix is that of no supported format.
         InvalidInput: A name is invalid.
     """
-    file_name = checked_file_name(file_name)
+    file_name = _checked_file_name(file_name)
     format_of(file_name)
-    return file_name, recording_name(file_name) if name is None else checked_name(name)
+    if name is None:
+        return file_name, recording_name(file_name)
+    if not _NAME.fullmatch(name):
+        rule = "must have 1 to 64 of the characters a-z 0-9 - and start with a-z or 0-9"
+        raise InvalidInput("name", name[:80], rule)
+    return file_name, name
 
 
-def checked_file_name(file_name: str) -> str:
-    """Return a file's name without folders.
-
-    Raises:
-        InvalidInput: It is empty, too long or has unprintable characters.
-    """
+def _checked_file_name(file_name: str) -> str:
+    """Return a file's name without folders; refuse one that cannot be shown."""
     shown = file_name[:60]
     if len(file_name) > MAX_FILE_NAME:
         rule = f"must have at most {MAX_FILE_NAME} characters, not {len(file_name)}"
@@ -201,18 +185,6 @@ def checked_file_name(file_name: str) -> str:
     if not (last := PurePath(file_name).name):
         raise InvalidInput("file_name", shown, "must name a file, such as clip.bvh")
     return last
-
-
-def checked_name(name: str) -> str:
-    """Return the name of a recording.
-
-    Raises:
-        InvalidInput: It has other than 1 to 64 of the characters ``a-z 0-9 -``.
-    """
-    if not _NAME.fullmatch(name):
-        rule = "must have 1 to 64 of the characters a-z 0-9 - and start with a-z or 0-9"
-        raise InvalidInput("name", name[:80], rule)
-    return name
 
 
 def recording_name(file_name: str) -> str:

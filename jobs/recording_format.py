@@ -51,11 +51,7 @@ def detail_of(found: ImportedMotion) -> dict[str, Any]:
     return {
         "artifacts": [asdict(one) for one in found.artifacts],
         "clean_runs": [
-            {
-                "first": first,
-                "last": last,
-                "duration_s": float(run.times[-1]),
-            }
+            {"first": first, "last": last, "duration_s": float(run.times[-1])}
             for run, (first, last) in zip(found.runs, found.spans, strict=True)
         ],
     }
@@ -68,13 +64,7 @@ def packed(
     sha256: str,
     options: ReadOptions = NOTHING_STATED,
 ) -> NewRecording:
-    """Return the stored form of an import.
-
-    Args:
-        name: Name of the recording.
-        sha256: Of its file.
-        options: Options with which the file was read.
-    """
+    """Return the stored form of a file's import; ``name`` is that of the recording."""
     detail = detail_of(found)
     detail["artifacts"] = detail["artifacts"][:MAX_ARTIFACTS]
     detail["recorded"] = {
@@ -105,11 +95,7 @@ def packed(
 
 
 def unpacked(record: StoredRecording, tensors: bytes) -> tuple[Motion, ...]:
-    """Return the runs of a stored recording, arrays read-only.
-
-    Args:
-        record: The recording, with its detail.
-        tensors: Its safetensors bytes.
+    """Return the runs of a stored recording that has its detail, arrays read-only.
 
     Raises:
         InvalidInput: They do not fit this version.

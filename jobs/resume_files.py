@@ -11,10 +11,9 @@ import time
 from contextlib import suppress
 from pathlib import Path
 
-from app.errors import NotFound
 from app.store.attempts import has_resume
 from app.store.engine import Store
-from app.store.jobs import get_job
+from app.store.jobs import find_job
 
 KEEP_UNKNOWN_S = 7 * 24 * 3600.0
 """Time for which the files of an unknown job are kept [s]."""
@@ -47,10 +46,10 @@ def remove_unneeded(store: Store, data_dir: Path) -> None:
 
 
 def _remove_unneeded(store: Store, folder: Path) -> None:
-    try:
-        job = get_job(store, folder.name)
-    except NotFound:
-        _remove_unknown(folder)
+    job = find_job(store, folder.name)
+    if job is None:
+        if is_long_unknown(folder / _MARK):
+            remove(folder)
         return
     (folder / _MARK).unlink(missing_ok=True)
     if job.is_final and not has_resume(store, job.id):
@@ -58,11 +57,6 @@ def _remove_unneeded(store: Store, folder: Path) -> None:
     elif job.is_final:
         for left in (one for kind in _UNFINISHED for one in folder.glob(kind)):
             left.unlink()
-
-
-def _remove_unknown(folder: Path) -> None:
-    if is_long_unknown(folder / _MARK):
-        remove(folder)
 
 
 def is_long_unknown(mark: Path) -> bool:

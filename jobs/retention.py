@@ -16,7 +16,6 @@ from app.store.database.size import shrink
 from app.store.engine import Store
 from app.store.jobs import job_ids
 from jobs import resume_files
-from jobs.resume_files import is_long_unknown
 
 logger = logging.getLogger(__name__)
 
@@ -81,10 +80,7 @@ class Retention:
         self._remove_files(job_id)
 
     def delete_checkpoint(self, reference: str) -> None:
-        """Delete a checkpoint that was uploaded or recalibrated.
-
-        Args:
-            reference: Its SHA-256 or alias.
+        """Delete a checkpoint, by SHA-256 or alias, that was uploaded or recalibrated.
 
         Raises:
             NotFound: There is no such checkpoint.
@@ -114,19 +110,18 @@ class Retention:
             LeaseLost: Another server runs the jobs.
             StorageFull: No room is left.
         """
-        n_jobs = 0
         with self._lock:
-            for job_id, removed in retention.prune(
+            deleted = retention.prune(
                 store,
                 keep_jobs=self.keep_jobs,
                 keep_states=self.keep_states,
                 acting=self.acting(),
-            ):
+            )
+            for n_jobs, (job_id, removed) in enumerate(deleted, 1):
                 self._note(removed)
                 text = "job %s is deleted: the newest %d are kept"
                 logger.info(text, job_id, self.keep_jobs, extra={"job_id": job_id})
                 self._remove_files(job_id)
-                n_jobs += 1
                 if n_jobs == MAX_JOBS_AT_ONCE:
                     return True
         remove_unknown_logs(store, self.logs)
@@ -162,11 +157,8 @@ def remove_unknown_logs(store: Store, folder: Path) -> None:
         with suppress(OSError):
             marks[job_id].unlink()
     for job_id in unknown:
+        log, mark = logs[job_id], logs[job_id].with_suffix(UNKNOWN)
         with suppress(OSError):  # one that cannot be changed keeps no other from its turn
-            _remove_unknown_log(logs[job_id], logs[job_id].with_suffix(UNKNOWN))
-
-
-def _remove_unknown_log(log: Path, mark: Path) -> None:
-    if is_long_unknown(mark):
-        log.unlink()
-        mark.unlink()
+            if resume_files.is_long_unknown(mark):
+                log.unlink()
+                mark.unlink()

@@ -301,7 +301,7 @@ class ReportSpec(_Spec):
 AnySpec = TrainSpec | EvaluateSpec | SweepSpec | ReportSpec
 JobSpec = Annotated[AnySpec, Field(discriminator="kind")]
 _JOB_SPEC: TypeAdapter[AnySpec] = TypeAdapter(JobSpec)
-_TYPES: Mapping[str, type[AnySpec]] = {
+SPEC_TYPES: Mapping[str, type[AnySpec]] = {
     "train": TrainSpec,
     "evaluate": EvaluateSpec,
     "sweep": SweepSpec,
@@ -318,11 +318,6 @@ def parse_spec(body: Mapping[str, Any]) -> AnySpec:
     return _JOB_SPEC.validate_python(body)
 
 
-def spec_type(kind: str) -> type[AnySpec]:
-    """Return the type of a kind's specs."""
-    return _TYPES[kind]
-
-
 def budgets(job: JobRecord) -> dict[str, Any]:
     """Return the budgets of a job that has some."""
     values = {name: getattr(job, name) for name in Budget.model_fields}
@@ -336,7 +331,7 @@ def require_budgeted(job: JobRecord, changes: Mapping[str, Any]) -> None:
         InvalidInput: One is given to an evaluation.
     """
     for name in Budget.model_fields:
-        if name in changes and not issubclass(spec_type(job.kind), Budget):
+        if name in changes and not issubclass(SPEC_TYPES[job.kind], Budget):
             rule = f"must not be given to job {job.number}: of kind {job.kind}, which has none"
             raise InvalidInput(name, changes[name], rule)
 

@@ -23,12 +23,9 @@ def child_command(module: str, *arguments: str) -> tuple[str, ...]:
 
 
 def die_with_parent(parent: int) -> None:
-    """Request the kernel to kill this process when the server ends.
+    """Request the kernel to kill this process when the server, process ``parent``, ends.
 
     Linux only; elsewhere fencing alone prevents writes of a left-over worker.
-
-    Args:
-        parent: Process id of the server.
     """
     if sys.platform == "linux":
         ctypes.CDLL(None, use_errno=True).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)

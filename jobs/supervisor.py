@@ -73,7 +73,6 @@ class _Worker:
     heartbeat_seen: float
     writable_since: float | None = None
     leaving_since: float | None = None
-    ended: Exit | None = None
 
 
 class Supervisor:
@@ -120,7 +119,8 @@ class Supervisor:
         self._workers: dict[Claim, _Worker] = {}
         self._orphans_queued = False
         self._not_before = self._retain_at = -math.inf
-        self._waiting: str | None = None
+        self.waiting: str | None = None
+        """Reason for which no job runs, such as ``"disk full"``; None where the queue runs."""
         self._wake = threading.Event()
         self._stopping = threading.Event()
         self._thread: threading.Thread | None = None
@@ -157,11 +157,6 @@ class Supervisor:
     def wake(self) -> None:
         """Check the queue now, because a job was queued or cancelled."""
         self._wake.set()
-
-    @property
-    def waiting(self) -> str | None:
-        """Reason for which no job runs, such as ``"disk full"``; None where the queue runs."""
-        return self._waiting
 
     @property
     def is_alive(self) -> bool:
@@ -209,7 +204,7 @@ class Supervisor:
     def _abandon(self) -> None:
         """Kill the workers, whose jobs another server has started again."""
         self._holds_lease = False
-        self._waiting = OTHER_SERVER
+        self.waiting = OTHER_SERVER
         for worker in self._workers.values():
             self._executor.stop(worker.handle, force=True)
 
@@ -220,14 +215,13 @@ class Supervisor:
         self._retain()
         waiting = self._watch() or self._lack_of_room()
         goes_on = waiting is None and time.monotonic() >= self._not_before
-        if goes_on and self._waiting is not None:
+        if waiting is not None:
+            self._wait_for(waiting, waiting)
+        elif goes_on and self.waiting is not None:
             self._store.check_writable()
             self._fill_reserve()
-            logger.info("the queue goes on after: %s", self._waiting)
-        if goes_on:
-            self._waiting = None
-        elif waiting is not None:
-            self._wait_for(waiting, waiting)
+            logger.info("the queue goes on after: %s", self.waiting)
+            self.waiting = None
         for one in self.composed:
             one.advance(self._store, goes_on=goes_on)
         while goes_on and len(self._workers) < self._max_running and self._start_next():
@@ -245,15 +239,15 @@ class Supervisor:
         except (StorageFull, StorageUnavailable) as error:
             self._wait_for(error.short, error.message)
         except OSError as error:
-            self._wait_for(_FOR_NOW.get(error.errno or 0, "disk error"), str(error))
+            self._wait_for(_FOR_NOW.get(error.errno or 0, DISK_ERROR), str(error))
         except Exception:
             logger.exception("unexpected error in the supervisor")
 
     def _wait_for(self, short: str, message: str) -> None:
-        if self._waiting != short:
+        if self.waiting != short:
             level = logging.WARNING if short == NO_CPU else logging.ERROR
             logger.log(level, "the queue waits: %s", message)
-        self._waiting = short
+        self.waiting = short
 
     def _lack_of_room(self) -> str | None:
         free = shutil.disk_usage(self._data_dir).free
@@ -291,10 +285,9 @@ class Supervisor:
 
     def _reap(self) -> None:
         for claim, worker in list(self._workers.items()):
-            worker.ended = worker.ended or self._executor.poll(worker.handle)
-            if worker.ended is not None:
-                self._settle(claim, worker, worker.ended)
-                _end(worker.span, worker.ended)
+            if (ended := self._executor.poll(worker.handle)) is not None:
+                self._settle(claim, worker, ended)
+                _end(worker.span, ended)
                 del self._workers[claim]
                 self._retain_at = -math.inf
 

@@ -37,9 +37,6 @@ Runner = Callable[["JobWorker"], Mapping[str, Any] | None]
 class JobWorker:
     """Interface of a runner to its job. Writes are fenced by the attempt.
 
-    Args:
-        access: Access to the job for the attempt of this process.
-
     Raises:
         StaleAttempt: The attempt does not hold the job.
     """
@@ -129,25 +126,27 @@ class JobWorker:
             The process's exit status: 0 when the job's row contains the end, ``EX_TEMPFAIL``
             where the database takes no writes, so that the job is queued again.
         """
-        beat = threading.Thread(target=self._beat, name="beat", daemon=True)
-        beat.start()
+        threading.Thread(target=self._beat, name="beat", daemon=True).start()
         try:
-            result = runner(self)
-            self._settle(result)
+            self._run(runner)
         except StaleAttempt as error:
             logger.warning("%s", error)
         except (StorageFull, StorageUnavailable) as error:
             logger.error("stopped: %s", error.message)
             return os.EX_TEMPFAIL
-        except ServiceError as error:
-            logger.error("the job fails: %s", error.message)
-            return self._fail(error.message)
         finally:
             self._over.set()
         return 0
 
-    def _settle(self, result: Mapping[str, Any] | None) -> None:
-        self.wait_to(lambda: self._record_end(result))
+    def _run(self, runner: Runner) -> None:
+        try:
+            result = runner(self)
+            self.wait_to(lambda: self._record_end(result))
+        except (StaleAttempt, StorageFull, StorageUnavailable):
+            raise
+        except ServiceError as error:
+            logger.error("the job fails: %s", error.message)
+            self.access.end(EndOfAttempt("failed", error=error.message))
 
     def _record_end(self, result: Mapping[str, Any] | None) -> None:
         cancelled = self.access.job().cancel_requested
@@ -162,16 +161,6 @@ class JobWorker:
             end = EndOfAttempt("succeeded", result, ended_by=early_end, run_s=self.run_s)
             self.access.end(end)
             logger.info("succeeded" if early_end is None else f"ended by its {early_end}")
-
-    def _fail(self, message: str) -> int:
-        try:
-            self.access.end(EndOfAttempt("failed", error=message))
-        except StaleAttempt as error:
-            logger.warning("%s", error)
-        except (StorageFull, StorageUnavailable) as error:
-            logger.error("%s", error.message)
-            return os.EX_TEMPFAIL
-        return 0
 
     def wait_to(self, access: Callable[[], None]) -> None:
         """Write or read; while database or disk fail, repeat it until the runner must stop.

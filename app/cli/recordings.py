@@ -97,7 +97,8 @@ def show(name: Name, as_json: Json = False) -> None:
     from jobs.recording_catalog import RecordingCatalog
 
     with opened(settings, NOUN) as store:
-        data = _data(RecordingCatalog(store).record(name))
+        record, _ = RecordingCatalog(store).with_runs(name)
+    data = _data(record)
     print_result(_description(data), data, as_json=as_json)
 
 

@@ -17,11 +17,7 @@ _JOB = TypeAdapter(JobRecord)
 
 
 class ServiceAccess:
-    """Access by the routes of the service; see :class:`jobs.access.JobAccess`.
-
-    Args:
-        service: The connection of the attempt.
-    """
+    """Access by the routes of the service; see :class:`jobs.access.JobAccess`."""
 
     def __init__(self, service: ServiceConnection) -> None:
         self._service = service

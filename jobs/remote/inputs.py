@@ -23,11 +23,7 @@ _RECORDING = TypeAdapter(StoredRecording)
 
 
 class ServiceInputs:
-    """Inputs from the routes of the service; see :class:`jobs.inputs.JobInputs`.
-
-    Args:
-        service: The connection of the attempt.
-    """
+    """Inputs from the routes of the service; see :class:`jobs.inputs.JobInputs`."""
 
     def __init__(self, service: ServiceConnection) -> None:
         self._service = service
@@ -64,11 +60,7 @@ class ServiceInputs:
 
 
 class ServiceFiles:
-    """Files of a replay memory at the service, which deletes what no state lists.
-
-    Args:
-        service: The connection of the attempt.
-    """
+    """Files of a replay memory at the service, which deletes what no state lists."""
 
     def __init__(self, service: ServiceConnection) -> None:
         self._service = service

@@ -90,8 +90,6 @@ class WorkerUploads:
         will list may have been stored since.
 
         Args:
-            claim: The attempt that sends.
-            step: Steps done.
             policy_bytes: Length of the policy's part.
 
         Raises:

@@ -143,7 +143,7 @@ def test_memory_is_given_back_beyond_so_many_frames(
 
 def test_unknown_recording_names_the_known_ones(catalog: RecordingCatalog) -> None:
     catalog.add(CLIP, "nod.csv")
-    for ask in (catalog.get, catalog.record, catalog.remove):
+    for ask in (catalog.get, catalog.with_runs, catalog.remove):
         for name in ("walk", "../nod", "nod\n", ""):
             with pytest.raises(NotFound, match="known: nod"):
                 ask(name)

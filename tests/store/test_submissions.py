@@ -10,7 +10,7 @@ from app.store import job_actions, jobs
 from app.store.database import tables
 from app.store.engine import Store
 from app.store.records import JobRecord
-from jobs.spec import parse_spec, spec_type
+from jobs.spec import SPEC_TYPES, parse_spec
 from tests.jobs.composed.test_sweeps import SWEEP
 
 LABELS: dict[str, Any] = {"name": "second", "notes": "slow", "priority": 3}
@@ -53,7 +53,7 @@ CHANGES: dict[str, dict[str, Any]] = {
 MEMBERS = [
     pytest.param(kind, member, id=f"{kind}-{member}")
     for kind in BODIES
-    for member in spec_type(kind).model_fields
+    for member in SPEC_TYPES[kind].model_fields
     if member != "kind"
 ]
 

@@ -22,7 +22,7 @@ from app.api.services import ServicesDep
 from app.api.validation import validated
 from app.store import job_actions, jobs
 from jobs.job_changes import Budget, JobChanges
-from jobs.spec import budgets, merge, require_budgeted, spec_type
+from jobs.spec import SPEC_TYPES, budgets, merge, require_budgeted
 
 CHANGES = Body(
     description="fields that differ from the job's spec, as a JSON merge patch (RFC 7396): "
@@ -108,7 +108,7 @@ def retry_job(
     spec = known_spec(job)
     if spec.get("checkpoint") is not None:
         spec["checkpoint"] = job.checkpoint or spec["checkpoint"]
-    body = validated(spec_type(job.kind), {**spec, **labels, **budgets(job)})
+    body = validated(SPEC_TYPES[job.kind], {**spec, **labels, **budgets(job)})
     new = replace(checked(body, services), parent=job.id)
     return queued(new, services, response, idempotency_key, {"retry": job.id})
 
@@ -130,7 +130,7 @@ def clone_job(
 
     Name, notes and priority are those of the changes, or the defaults.
     """
-    body = validated(spec_type(job.kind), merge({**known_spec(job), **budgets(job)}, changes))
+    body = validated(SPEC_TYPES[job.kind], merge({**known_spec(job), **budgets(job)}, changes))
     new = replace(checked(body, services), parent=job.id)
     submitted = {"clone": job.id, "changes": changes}
     return queued(new, services, response, idempotency_key, submitted)

@@ -56,7 +56,8 @@ def list_recordings(services: ServicesDep) -> RecordingList:
 @router.get("/{name}", summary="One recording")
 def get_recording(name: str, services: ServicesDep) -> RecordingPublic:
     """Return one recording with its clean runs and the artifacts cut out of it."""
-    return RecordingPublic.from_domain(services.recordings.record(name))
+    record, _ = services.recordings.with_runs(name)
+    return RecordingPublic.from_domain(record)
 
 
 @router.post(

@@ -56,7 +56,7 @@ def cluster() -> Iterator[RayCluster]:
     """A cluster that begins with two nodes."""
     environment = {
         **os.environ,
-        "PYTHONPATH": search_path(os.environ),
+        "PYTHONPATH": search_path(),
         "RAY_USAGE_STATS_ENABLED": "0",
         "RAY_worker_niceness": "0",
     }
