@@ -28,13 +28,10 @@ MAX_RESUME = 256 * 1024 * 1024
 
 
 def claim_next(store: Store) -> tuple[Claim, JobRecord] | None:
-    """Claim the oldest queued job of the highest priority for its next attempt.
+    """Claim the oldest queued job of the highest priority; None: nothing is queued.
 
     Points of the curve and checkpoints beyond the last resume state are deleted, since the new
     attempt repeats those steps.
-
-    Returns:
-        The claim and the job, or None if nothing is queued.
     """
     queued = sa.select(jobs.c.id).where(
         jobs.c.state == "queued", jobs.c.kind.not_in(COMPOSITE_KINDS)

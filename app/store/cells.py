@@ -25,13 +25,7 @@ MAX_CELLS = 200
 
 
 def put_cell(store: Store, name: str, definition: Mapping[str, Any]) -> bool:
-    """Store a cell; the same one again has no effect.
-
-    Args:
-        definition: Its content, JSON data.
-
-    Returns:
-        Whether it is new.
+    """Store a cell; return whether it is new: the same one again has no effect.
 
     Raises:
         WrongState: Another cell has that name.

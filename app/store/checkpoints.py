@@ -18,7 +18,7 @@ from app.store.cursors import MAX_INTEGER, MAX_NUMBER, read_page
 from app.store.database.tables import aliases, checkpoints, job_checkpoints
 from app.store.engine import Store
 from app.store.records import CheckpointRecord, NewCheckpoint, Page
-from app.store.references import to_be_evaluated
+from app.store.references import named_checkpoint, to_be_evaluated
 
 logger = logging.getLogger(__name__)
 
@@ -236,13 +236,11 @@ def drop_job_checkpoints(connection: sa.Connection, job_id: str, *, beyond: int)
 
 
 def _resolve(connection: sa.Connection, reference: str) -> str:
-    if _SHA256.fullmatch(reference):
-        return reference
-    names = _names(connection)
-    for sha256, known in names.items():
-        if reference in known:
-            return sha256
-    raise NotFound("checkpoint", reference, sorted(sum(names.values(), ())))
+    sha256 = named_checkpoint(connection, reference) or reference
+    if sha256 == reference and not _SHA256.fullmatch(reference):
+        names = sum(_names(connection).values(), ())
+        raise NotFound("checkpoint", reference, sorted(names))
+    return sha256
 
 
 def _names(connection: sa.Connection) -> dict[str, tuple[str, ...]]:

@@ -81,8 +81,6 @@ def crash(store: Store, claim: Claim, error: str, *, max_failures: int) -> JobRe
     A job with a requested cancel is cancelled.
 
     Args:
-        claim: The crashed attempt.
-        error: The cause, as far as known.
         max_failures: The job fails with this number of crashes.
 
     Raises:
@@ -115,14 +113,11 @@ def give_back(store: Store, claim: Claim) -> None:
 
 
 def requeue_orphans(store: Store) -> tuple[str, ...]:
-    """Queue the running jobs of an earlier server again; requires the server's lock.
+    """Queue the running jobs of an earlier server again; return their ids.
 
-    The higher attempt number fences off a worker that still runs. A kill is counted, and no
-    failure; the job fails with its kill number MAX_KILLS. A job with a requested cancel is
-    cancelled.
-
-    Returns:
-        The ids of these jobs.
+    It requires the server's lock. The higher attempt number fences off a worker that still
+    runs. A kill is counted, and no failure; the job fails with its kill number MAX_KILLS. A job
+    with a requested cancel is cancelled.
 
     Raises:
         StorageFull: No room is left.

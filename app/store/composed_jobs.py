@@ -51,7 +51,6 @@ def record(store: Store, job_id: str, done: int, values: Mapping[str, float | No
 
     Args:
         done: Number of ended trials or evaluations.
-        values: Named numbers; None where not defined.
     """
     with store.writing() as connection:
         job = read_job(connection, job_id)

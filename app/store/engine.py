@@ -300,11 +300,7 @@ def _create_engine(url: sa.URL) -> sa.Engine:
     arguments = {k: v for k, v in _POSTGRESQL_ARGUMENTS.items() if k not in url.query}
     # Tested before use: a restarted database has ended the pooled connections.
     engine = sa.create_engine(
-        url,
-        **as_json,
-        connect_args=arguments,
-        pool_pre_ping=True,
-        pool_timeout=BUSY_TIMEOUT_S,
+        url, **as_json, connect_args=arguments, pool_pre_ping=True, pool_timeout=BUSY_TIMEOUT_S
     )
     event.listen(engine, "begin", _begin_postgresql)
     return engine

@@ -23,7 +23,6 @@ def list_events(
 
     Args:
         after: Last known id (``Last-Event-ID``), 0 for all.
-        limit: Largest number of events.
     """
     on_step = sa.and_(metrics.c.job_id == events.c.job_id, metrics.c.step == events.c.step)
     query = (

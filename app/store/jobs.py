@@ -139,8 +139,7 @@ def list_evaluations(
     Args:
         protocol: Only of this protocol.
         checkpoint: Only of the checkpoint with this SHA-256.
-        cursor: ``next_cursor`` of the page before; None for the first.
-        limit: Length of the page, 1 to 200.
+        cursor, limit: As for :func:`list_jobs`.
 
     Raises:
         InvalidInput: The cursor or limit is invalid.

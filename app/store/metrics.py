@@ -17,10 +17,6 @@ def list_metrics(
 ) -> tuple[MetricRow, ...]:
     """Return the points of a job's curve beyond ``after_step``, in order of steps.
 
-    Args:
-        after_step: Last known step; -1 for all.
-        limit: Largest number of points.
-
     Raises:
         NotFound: There is no such job.
     """

@@ -31,10 +31,7 @@ _LISTED = [one for one in recordings.c if one.name not in ("digest", "tensors", 
 
 
 def put_recording(store: Store, new: NewRecording) -> bool:
-    """Store a recording; the same file under the same name again has no effect.
-
-    Returns:
-        Whether it is new.
+    """Store a recording; return whether it is new: the same one again has no effect.
 
     Raises:
         InvalidInput: It is too large.
@@ -61,9 +58,6 @@ def put_recording(store: Store, new: NewRecording) -> bool:
 
 def is_stored(store: Store, name: str, sha256: str) -> bool:
     """Return whether a file is stored under a name; otherwise it could be stored now.
-
-    Args:
-        sha256: Of the file.
 
     Raises:
         WrongState: Another file has that name.

@@ -68,8 +68,6 @@ def require_unused(
     """Check that no job that has not ended refers to an object.
 
     Args:
-        field: Kind of the object.
-        name: Its name.
         refers: Whether references are to this object.
 
     Raises:

@@ -29,7 +29,6 @@ def delete_job(store: Store, job_id: str, acting: Mapping[str, str]) -> tuple[st
     Checkpoints with an alias, imported ones and those of other jobs stay.
 
     Args:
-        job_id: The job.
         acting: SHA-256 of each checkpoint that acts, with its place: ``"world main"``.
 
     Returns:
@@ -63,7 +62,6 @@ def delete_checkpoint(store: Store, sha256: str, acting: Mapping[str, str]) -> N
     """Delete a checkpoint that was uploaded or recalibrated.
 
     Args:
-        sha256: Its SHA-256.
         acting: As for :func:`delete_job`.
 
     Raises:

@@ -57,7 +57,6 @@ def write_archive(part: Path, head: Mapping[str, Any], files: Mapping[str, Path]
     """Write an archive and wait until the disk has it.
 
     Args:
-        part: The new file.
         head: Describes the backup; its ``files`` have size and SHA-256 of each member.
         files: The file of each member.
     """

@@ -15,6 +15,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from itertools import takewhile
 from pathlib import Path, PurePath, PurePosixPath
 from typing import Any
 
@@ -75,11 +76,7 @@ class BackupSummary:
 
 
 def write_backup(store: Store, data_dir: Path, path: Path) -> BackupSummary:
-    """Write a backup; the file appears when it is complete.
-
-    Args:
-        store: A SQLite database.
-        path: The new file.
+    """Write a backup of a SQLite database to a new file, which appears when it is complete.
 
     Raises:
         InvalidInput: The file exists, its folder cannot be written to, or the database is no
@@ -123,12 +120,9 @@ def write_backup(store: Store, data_dir: Path, path: Path) -> BackupSummary:
 def restore_backup(
     store: Store, data_dir: Path, path: Path
 ) -> tuple[BackupSummary, Path | None]:
-    """Replace the database by that of a backup; the present one is kept beside it.
+    """Replace a SQLite database, which may be damaged or missing, by that of a backup.
 
-    Nothing changes unless the whole backup is sound.
-
-    Args:
-        store: A SQLite database; it need not exist, or may be damaged.
+    The present one is kept beside it. Nothing changes unless the whole backup is sound.
 
     Returns:
         The content of the backup, and where the database that was there before is kept.
@@ -197,12 +191,7 @@ def _publish(part: Path, path: Path) -> None:
 
 @contextmanager
 def _file_errors(place: Path, database: str) -> Iterator[None]:
-    """Raise the project's error of a file or database error.
-
-    Args:
-        place: The file that is written.
-        database: The database in messages.
-    """
+    """Raise the project's error of a file or database error; ``place`` is written to."""
     try:
         yield
     except sqlite3.OperationalError as error:
@@ -220,9 +209,7 @@ def _file_errors(place: Path, database: str) -> Iterator[None]:
 
 def _without_temporary(path: Path) -> Path:
     """Return the folder in which a backup has its temporary folder, for a path in this one."""
-    places = (n for n, part in enumerate(path.parts) if part.startswith(TEMPORARY))
-    place = next(places, None)
-    return path if place is None else Path(*path.parts[:place])
+    return Path(*takewhile(lambda part: not part.startswith(TEMPORARY), path.parts))
 
 
 def _link_files(folder: Path, held: Path, database: Path) -> None:

@@ -34,10 +34,7 @@ def size_of(store: Store) -> int:
 
 
 def shrink(store: Store) -> bool:
-    """Give free pages of a SQLite file back to the disk, in a short transaction.
-
-    Returns:
-        Whether there are more.
+    """Give free pages of a SQLite file back to the disk; return whether there are more.
 
     Raises:
         StorageFull: No room is left for the moved pages.

@@ -68,9 +68,9 @@ class UtcDateTime(TypeDecorator[datetime]):
         return None if value is None else value.replace(tzinfo=UTC)
 
 
-def _job_key(*, primary: bool) -> Column[str]:
+def _job_key() -> Column[str]:
     target = ForeignKey("jobs.id", ondelete="CASCADE")
-    return Column("job_id", String(36), target, primary_key=primary, nullable=False)
+    return Column("job_id", String(36), target, primary_key=True)
 
 
 jobs = Table(
@@ -123,7 +123,7 @@ jobs = Table(
 metrics = Table(
     "metrics",
     metadata,
-    _job_key(primary=True),
+    _job_key(),
     Column("step", BigInteger, primary_key=True, autoincrement=False),
     Column("values", JSON, nullable=False),
     Column("at", UtcDateTime, nullable=False),
@@ -132,7 +132,7 @@ metrics = Table(
 events = Table(
     "events",
     metadata,
-    _job_key(primary=True),
+    _job_key(),
     Column("id", Integer, primary_key=True, autoincrement=False),
     Column("kind", String(16), nullable=False),
     Column("step", BigInteger),
@@ -156,7 +156,7 @@ checkpoints = Table(
 job_checkpoints = Table(
     "job_checkpoints",
     metadata,
-    _job_key(primary=True),
+    _job_key(),
     Column("step", BigInteger, primary_key=True, autoincrement=False),
     Column("sha256", String(64), ForeignKey("checkpoints.sha256"), nullable=False),
     Index("ix_job_checkpoints_sha256", "sha256"),
@@ -165,7 +165,7 @@ job_checkpoints = Table(
 resume_states = Table(
     "resume_states",
     metadata,
-    _job_key(primary=True),
+    _job_key(),
     Column("step", BigInteger, primary_key=True, autoincrement=False),
     Column("manifest", JSON, nullable=False),
     Column("digest", String(64)),
