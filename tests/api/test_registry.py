@@ -8,13 +8,13 @@ from fastapi.testclient import TestClient
 from app.api.registry import CheckpointNames, PolicyRegistry
 from app.errors import CheckpointMismatch, Damaged, InvalidInput
 from app.policies.checkpoints.upload import join
-from app.store import attempts, checkpoints, completion, jobs, retention
+from app.store import attempts, checkpoints, completion, retention
 from app.store.database import tables
 from app.store.engine import Store
-from app.store.records import NewJob, ResumeState
+from app.store.records import ResumeState
 from tests.api.conftest import services_of
-from tests.store.test_checkpoints import policy
-from tests.support.databases import claimed
+from tests.store.test_attempts import policy
+from tests.support.databases import claimed, started
 from tests.support.idle_service import own_policy
 from tests.support.waiting import wait_until
 
@@ -96,8 +96,7 @@ def test_damaged_checkpoint_that_is_uploaded_again_is_named_no_longer(
 
 
 def test_checkpoint_that_a_repeated_attempt_drops_answers_no_longer(store: Store) -> None:
-    jobs.create_job(store, NewJob(kind="count", spec={"kind": "count"}))
-    claim, _ = claimed(store)
+    claim = started(store)
     kept, dropped = policy(b"1"), policy(b"2")
     state = ResumeState(step=10, manifest={}, tensors=b"state")
     attempts.record_checkpoint(store, claim, 10, kept, state)

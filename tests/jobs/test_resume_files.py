@@ -11,20 +11,20 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.digests import digest
 from app.policies.training import state as states
 from app.policies.training.file_store import FileFolder
 from app.policies.training.memory_files import MemoryFiles
 from app.store import attempts, checkpoints, completion, jobs, metrics
 from app.store.engine import Store
-from app.store.records import NewCheckpoint, NewJob, ResumeState
+from app.store.records import NewJob, ResumeState
 from jobs.access import StoreAccess
 from jobs.resume_files import KEEP_UNKNOWN_S, folder_of, remove_unneeded
 from jobs.retention import MAX_JOBS_AT_ONCE, Retention
 from jobs.run import usable
 from jobs.worker import JobWorker
 from tests.jobs.machinery import wait_for
-from tests.support.databases import claimed
+from tests.store.test_attempts import policy, resume
+from tests.support.databases import claimed, started
 
 
 def with_file(data_dir: Path, job_id: str) -> Path:
@@ -35,13 +35,10 @@ def with_file(data_dir: Path, job_id: str) -> Path:
 
 
 def test_files_go_with_their_job_and_after_its_success(store: Store, tmp_path: Path) -> None:
-    policy = NewCheckpoint(sha256=digest({}, b"p"), manifest={}, tensors=b"p")
     paths = {}
     for name in ("succeeded", "running"):
-        jobs.create_job(store, NewJob(kind="count", spec={}))
-        claim, _ = claimed(store)
-        resume = ResumeState(step=10, manifest={}, tensors=b"r")
-        attempts.record_checkpoint(store, claim, 10, policy, resume)
+        claim = started(store)
+        attempts.record_checkpoint(store, claim, 10, policy(), resume(10))
         if name == "succeeded":
             completion.finish(store, claim, result={})
         paths[name] = with_file(tmp_path, claim.job_id)
@@ -71,13 +68,10 @@ def test_files_of_an_unknown_job_are_kept_for_a_while(store: Store, tmp_path: Pa
 
 
 def test_unfinished_files_of_ended_jobs_are_deleted(store: Store, tmp_path: Path) -> None:
-    policy = NewCheckpoint(sha256=digest({}, b"p"), manifest={}, tensors=b"p")
     left: dict[str, list[str]] = {}
     for name in ("cancelled", "running"):
-        jobs.create_job(store, NewJob(kind="count", spec={}))
-        claim, _ = claimed(store)
-        resume = ResumeState(step=10, manifest={}, tensors=b"r")
-        attempts.record_checkpoint(store, claim, 10, policy, resume)
+        claim = started(store)
+        attempts.record_checkpoint(store, claim, 10, policy(), resume(10))
         path = with_file(tmp_path, claim.job_id)
         for suffix in (".unfinished", ".part"):
             path.with_name(path.name + suffix).touch()
@@ -150,15 +144,14 @@ def test_training_whose_files_cannot_be_read_for_now_waits_and_loses_nothing(
     store: Store, tmp_path: Path, is_read_later: bool
 ) -> None:
     name = sha256(b"rows").hexdigest()
-    job_id = jobs.create_job(store, NewJob(kind="count", spec={})).id
-    claim, _ = claimed(store)
+    claim = started(store)
+    job_id = claim.job_id
     files = FileFolder(folder_of(tmp_path, job_id))
     files.write(name, b"rows")
     for step in (10, 20):
-        tensors = bytes([step])
-        policy = NewCheckpoint(sha256=digest({}, tensors), manifest={}, tensors=tensors)
+        state = state_with_file(step, name)
         attempts.record_progress(store, claim, step, {})
-        attempts.record_checkpoint(store, claim, step, policy, state_with_file(step, name))
+        attempts.record_checkpoint(store, claim, step, policy(bytes([step])), state)
     completion.give_back(store, claim)
     path = files.path(name)
     path.unlink()

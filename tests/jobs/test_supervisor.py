@@ -31,7 +31,7 @@ from tests.jobs.machinery import (
     worker_pids,
 )
 from tests.jobs.supervisor_process import COUNTING
-from tests.store.test_checkpoints import policy
+from tests.store.test_attempts import policy
 from tests.support.databases import POSTGRESQL_ONLY, SQLITE_ONLY, wait_until_lease_expires
 from tests.support.postgresql_server import PostgresqlServer
 

@@ -1,21 +1,11 @@
 import pytest
 
-from app.digests import digest
 from app.errors import InvalidInput, NotFound
-from app.store import attempts, checkpoints, completion, jobs
+from app.store import attempts, checkpoints, completion
 from app.store.engine import Store
-from app.store.records import Claim, NewCheckpoint, NewJob, ResumeState
-from tests.support.databases import claimed
-
-
-def policy(content: bytes) -> NewCheckpoint:
-    manifest = {"preset": "p"}
-    return NewCheckpoint(sha256=digest(manifest, content), manifest=manifest, tensors=content)
-
-
-def second_job(store: Store) -> Claim:
-    jobs.create_job(store, NewJob(kind="count", spec={}))
-    return claimed(store)[0]
+from app.store.records import Claim, NewCheckpoint, ResumeState
+from tests.store.test_attempts import policy
+from tests.support.databases import started
 
 
 def test_checkpoint_of_a_job_is_found_by_its_hash(store: Store, claim: Claim) -> None:
@@ -23,7 +13,7 @@ def test_checkpoint_of_a_job_is_found_by_its_hash(store: Store, claim: Claim) ->
     attempts.record_checkpoint(store, claim, 7, new)
     found = checkpoints.get_checkpoint(store, new.sha256)
     assert (found.job_id, found.step, found.size) == (claim.job_id, 7, 256)
-    assert found.manifest == {"preset": "p"}
+    assert found.manifest == new.manifest != {}
     assert checkpoints.read_checkpoint(store, new.sha256) == (found, new.tensors)
 
 
@@ -32,7 +22,7 @@ def test_newest_checkpoint_of_a_job_may_be_as_old_as_another_job(
 ) -> None:
     shared = policy(b"last")
     attempts.record_checkpoint(store, claim, 30, shared)
-    again = second_job(store)
+    again = started(store)
     for step, one in ((10, policy(b"first")), (20, policy(b"second")), (30, shared)):
         attempts.record_checkpoint(store, again, step, one)
     pages = [checkpoints.list_checkpoints(store, job_id=again.job_id, limit=2)]
@@ -110,7 +100,7 @@ def test_list_shows_every_checkpoint_once_newest_first(store: Store, claim: Clai
 
 
 def test_list_of_a_job_shows_its_own(store: Store, claim: Claim) -> None:
-    other = second_job(store)
+    other = started(store)
     attempts.record_checkpoint(store, claim, 1, policy(b"mine"))
     attempts.record_checkpoint(store, claim, 2, policy(b"shared"))
     attempts.record_checkpoint(store, other, 3, policy(b"shared"))
@@ -123,7 +113,7 @@ def test_list_of_a_job_shows_its_own(store: Store, claim: Claim) -> None:
 
 
 def test_dropped_checkpoint_stays_while_it_is_referenced(store: Store, claim: Claim) -> None:
-    other = second_job(store)
+    other = started(store)
     for step, content in enumerate([b"lost", b"shared", b"named", b"imported"]):
         attempts.record_checkpoint(store, claim, step, policy(content))
     attempts.record_checkpoint(

@@ -15,7 +15,8 @@ from app.store.database.migrate import migrate
 from app.store.database.reserve import fill_reserve
 from app.store.database.size import size_of
 from app.store.engine import Store
-from app.store.records import Claim, NewCheckpoint, NewJob, ResumeState
+from app.store.records import Claim, NewJob
+from tests.store.test_attempts import policy, resume
 from tests.support.databases import POSTGRESQL_ONLY, SQLITE_ONLY
 from tests.support.full_disk import files_up_to
 from tests.support.postgresql_server import PostgresqlServer
@@ -41,8 +42,7 @@ def record_until_full(store: Store, claim: Claim) -> int:
 def test_size_of_the_database_grows_with_its_content(store: Store, claim: Claim) -> None:
     before = size_of(store)
     tensors = os.urandom(3_000_000)
-    policy = NewCheckpoint(sha256="ab" * 32, manifest={}, tensors=tensors)
-    attempts.record_checkpoint(store, claim, 1, policy, None)
+    attempts.record_checkpoint(store, claim, 1, policy(tensors), None)
     assert 0 < before <= size_of(store) - len(tensors)
 
 
@@ -191,13 +191,11 @@ def test_job_can_fail_in_a_full_database_with_room_set_aside(
 @SQLITE_ONLY
 def test_full_database_keeps_the_earlier_resume_state(store: Store, claim: Claim) -> None:
     content = bytes(range(200)) * 2000
-    policy = NewCheckpoint(sha256="0" * 64, manifest={}, tensors=b"p")
-    earlier = ResumeState(step=10, manifest={}, tensors=content)
-    attempts.record_checkpoint(store, claim, 10, policy, earlier)
+    earlier = resume(10, content)
+    attempts.record_checkpoint(store, claim, 10, policy(), earlier)
     fill_up(store, spare_pages=4)
     with pytest.raises(StorageFull):
-        later = ResumeState(step=20, manifest={}, tensors=content * 2)
-        attempts.record_checkpoint(store, claim, 20, policy, later)
+        attempts.record_checkpoint(store, claim, 20, policy(), resume(20, content * 2))
     assert attempts.load_resume(store, claim.job_id) == earlier
 
 

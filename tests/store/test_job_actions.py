@@ -14,7 +14,7 @@ from app.store.records import (
     References,
     ResumeState,
 )
-from tests.store.test_checkpoints import policy
+from tests.store.test_attempts import policy
 
 COUNT = NewJob(kind="count", spec={"kind": "count"})
 

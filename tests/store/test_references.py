@@ -15,11 +15,11 @@ from app.store import attempts, cells, checkpoints, completion, jobs, recordings
 from app.store.engine import Store
 from app.store.records import NewJob, References
 from app.store.references import references_of
+from tests.store.test_attempts import policy
 from tests.store.test_cells import KITCHEN
-from tests.store.test_checkpoints import policy, second_job
 from tests.store.test_recordings import WAVE
 from tests.store.test_retention import save
-from tests.support.databases import claimed
+from tests.support.databases import claimed, started
 
 WAIT_S = 30.0
 Delete = Callable[[Store], object]
@@ -37,7 +37,7 @@ def alias(store: Store) -> tuple[References, Delete]:
 
 
 def trained(store: Store) -> tuple[References, Delete]:
-    claim = second_job(store)
+    claim = started(store)
     sha256 = save(store, claim, 1, b"1")
     completion.finish(store, claim)
     delete = partial(retention.delete_job, job_id=claim.job_id, acting={})
@@ -118,7 +118,7 @@ def test_job_refers_to_the_checkpoint_that_its_alias_named_when_it_was_queued(
 def test_checkpoint_to_be_evaluated_stays_when_its_training_repeats_the_steps(
     store: Store,
 ) -> None:
-    claim = second_job(store)
+    claim = started(store)
     first, second = save(store, claim, 1, b"1"), save(store, claim, 2, b"2")
     queue(store, References(checkpoint=second))
     completion.give_back(store, claim)

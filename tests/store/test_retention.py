@@ -25,8 +25,8 @@ from app.store.database.size import MIN_FREE_BYTES
 from app.store.engine import Store
 from app.store.records import Claim, NewJob, ResumeState
 from jobs.retention import Retention
-from tests.store.test_checkpoints import policy, second_job
-from tests.support.databases import SQLITE_ONLY, claimed
+from tests.store.test_attempts import policy
+from tests.support.databases import SQLITE_ONLY, claimed, started
 
 
 def save(store: Store, claim: Claim, step: int, content: bytes) -> str:
@@ -48,7 +48,7 @@ def test_deleted_job_leaves_nothing_but_shared_and_named_checkpoints(
     attempts.record_progress(store, claim, 4, {"value": 1.0})
     checkpoints.set_alias(store, "best", named)
     completion.finish(store, claim, state="cancelled")
-    other = second_job(store)
+    other = started(store)
     save(store, other, 3, bytes([3]))
     assert retention.delete_job(store, claim.job_id, {}) == (own,)
     assert {c.sha256 for c in checkpoints.list_checkpoints(store).items} == {named, shared}
@@ -92,7 +92,7 @@ def test_deletion_takes_no_longer_with_many_jobs_in_the_queue(
     read: list[str] = []
     ended = []
     for content in (b"1", b"2"):
-        claim = second_job(store)
+        claim = started(store)
         save(store, claim, 1, content)
         completion.finish(store, claim, state="cancelled")
         ended.append(claim.job_id)
@@ -151,11 +151,11 @@ def test_newest_ended_jobs_and_states_are_kept(store: Store, claim: Claim) -> No
     acts = save(store, claim, 1, b"0")
     completion.fail(store, claim, "x")
     for k in range(1, 5):
-        later = second_job(store)
+        later = started(store)
         made[later.job_id] = (save(store, later, 1, bytes([k])),)
         completion.fail(store, later, "x")
         ended.append(later.job_id)
-    active = second_job(store)
+    active = started(store)
     save(store, active, 1, b"active")
     gone = dict(retention.prune(store, keep_jobs=2, keep_states=1, acting={acts: "w"}))
     assert gone == {job_id: made[job_id] for job_id in ended[1:3]}
@@ -172,7 +172,7 @@ def test_pruned_trials_take_no_state_from_other_jobs(store: Store, claim: Claim)
     completion.finish(store, claim, ended_by="time budget")
     pruned = []
     for k in range(1, 4):
-        trial = second_job(store)
+        trial = started(store)
         save(store, trial, 1, bytes([k]))
         composed_jobs.mark_pruned(store, trial.job_id)
         jobs.request_cancel(store, trial.job_id)
@@ -187,7 +187,7 @@ def test_pruned_trials_take_no_state_from_other_jobs(store: Store, claim: Claim)
 def test_job_that_ended_last_is_kept_though_the_clock_stepped_back(
     store: Store, claim: Claim
 ) -> None:
-    later = second_job(store)
+    later = started(store)
     completion.fail(store, later, "x")
     ahead = datetime.now(UTC) + timedelta(hours=1)
     with store.writing() as connection:
@@ -214,7 +214,7 @@ def test_parts_of_a_job_that_has_not_ended_are_kept(store: Store, claim: Claim) 
     completion.finish(store, found[0])
     with pytest.raises(WrongState, match="sweep 2 has not ended and needs it; cancel 2 first"):
         retention.delete_job(store, part.id, {})
-    newest = second_job(store)
+    newest = started(store)
     completion.finish(store, newest)
     gone = dict(retention.prune(store, keep_jobs=1, keep_states=1, acting={}))
     assert tuple(gone) == (claim.job_id,)
@@ -228,7 +228,7 @@ def test_what_was_deleted_before_the_disk_is_full_is_deleted_completely(
 ) -> None:
     made = {}
     for content in (b"1", b"2", b"3"):
-        claim = second_job(store)
+        claim = started(store)
         made[claim.job_id] = save(store, claim, 1, content)
         completion.finish(store, claim, state="cancelled")
         (tmp_path / f"{claim.job_id}.log").touch()

@@ -8,10 +8,10 @@ from pathlib import Path
 import pytest
 import sqlalchemy as sa
 
-from app.store import attempts
+from app.store import attempts, jobs
 from app.store.database.migrate import migrate
 from app.store.engine import Store
-from app.store.records import Claim, JobRecord
+from app.store.records import Claim, JobRecord, NewJob
 from tests.support.postgresql_server import TEMPLATE, PostgresqlServer, postgresql_server
 
 SQLITE_ONLY = pytest.mark.parametrize("database_url", ["sqlite"], indirect=True)
@@ -50,6 +50,12 @@ def store(database_url: str) -> Iterator[Store]:
     opened = Store(database_url)
     yield opened
     opened.close()
+
+
+def started(store: Store) -> Claim:
+    """Queue a job and claim it."""
+    jobs.create_job(store, NewJob(kind="count", spec={"kind": "count"}))
+    return claimed(store)[0]
 
 
 def claimed(store: Store) -> tuple[Claim, JobRecord]:

@@ -15,7 +15,7 @@ from app.store.records import NewJob
 from tests.api.answers import post_json, problem_of
 from tests.api.conftest import services_of
 from tests.sim.recorded_person import csv_text, working
-from tests.support.databases import claimed
+from tests.support.databases import started
 from tests.support.idle_service import idle_service
 
 TINY = {
@@ -273,8 +273,7 @@ def test_training_that_ended_between_two_points_shows_the_last_one(
     store: Store, tmp_path: Path
 ) -> None:
     services = idle_service(store, tmp_path)
-    create_job(store, NewJob(kind="count", spec={}))
-    claim, _ = claimed(store)
+    claim = started(store)
     attempts.record_progress(store, claim, 100, {"success": 0.5})
     completion.finish(store, claim, result={"step": 128}, ended_by="time budget")
     job = shown(get_job(store, claim.job_id), services)

@@ -8,12 +8,12 @@ import pytest
 from app.errors import Damaged, InvalidInput
 from app.policies.checkpoints import pretrained
 from app.policies.checkpoints.checkpoint import Checkpoint
-from app.store import attempts, completion, jobs
+from app.store import attempts, completion
 from app.store.engine import Store
-from app.store.records import NewJob, ResumeState
+from app.store.records import ResumeState
 from jobs.checkpoints import to_store
 from tests.jobs.remote.serving import serving
-from tests.support.databases import claimed
+from tests.support.databases import started
 
 
 def test_checkpoint_that_goes_with_an_old_job_is_forgotten(
@@ -21,8 +21,7 @@ def test_checkpoint_that_goes_with_an_old_job_is_forgotten(
 ) -> None:
     shipped = pretrained.load("pick")
     made = to_store(Checkpoint({**shipped.manifest, "seed": 1000}, shipped.tensors))
-    jobs.create_job(store, NewJob(kind="count", spec={"kind": "count"}))
-    claim, _ = claimed(store)
+    claim = started(store)
     state = ResumeState(step=1, manifest={}, tensors=b"state")
     attempts.record_checkpoint(store, claim, 1, made, state)
     completion.finish(store, claim)

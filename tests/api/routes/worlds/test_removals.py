@@ -20,13 +20,12 @@ from app.main import acting_in
 from app.policies.checkpoints.checkpoint import CHOOSING
 from app.sim.cells.cell import Cell, load_cell
 from app.sim.pick.task_policy import TaskPolicy
-from app.store import attempts, checkpoints, completion, jobs
+from app.store import attempts, checkpoints, completion
 from app.store.database import tables
 from app.store.engine import Store
-from app.store.records import NewJob
 from jobs.checkpoints import shipped
 from tests.support import workshop
-from tests.support.databases import SQLITE_ONLY, claimed
+from tests.support.databases import SQLITE_ONLY, claimed, started
 from tests.support.idle_service import add_world, idle_service, loading, own_policy
 from web.viewer.loop import LiveCell
 
@@ -101,8 +100,7 @@ def test_world_does_not_start_with_a_policy_that_is_deleted_meanwhile(
 def test_policy_that_acts_is_named_once_its_training_has_dropped_it(
     services: Services, store: Store
 ) -> None:
-    jobs.create_job(store, NewJob(kind="count", spec={}))
-    claim, _ = claimed(store)
+    claim = started(store)
     made = own_policy()
     attempts.record_checkpoint(store, claim, 20, made)
     choose(services, made.sha256)
