@@ -199,8 +199,7 @@ def curves_as_csv(store: Store, job_ids: Sequence[str]) -> str:
     """Return every point of several jobs as CSV, one row per job and step.
 
     Raises:
-        NotFound: There is no such job.
-        InvalidInput: None, too many jobs, or one twice.
+        NotFound, InvalidInput: As for :func:`read_jobs`.
     """
     found = read_jobs(store, job_ids)
     curves = {job.id: whole_curve(store, job.id) for job in found}

@@ -127,11 +127,7 @@ def unpacked(record: StoredRecording, tensors: bytes) -> tuple[Motion, ...]:
 
 
 def _arrays(tensors: bytes, n_runs: int) -> dict[str, NDArray[Any]]:
-    """Return the arrays of a stored recording.
-
-    Raises:
-        ValueError: A shape or type is wrong, or a number is not finite.
-    """
+    """Return the arrays of a stored recording; ValueError: wrong shape, type or number."""
     arrays = load_tensors(tensors)
     n = len(arrays["times"])
     expected: dict[str, tuple[tuple[int, ...], type]] = {

@@ -261,11 +261,7 @@ def _is_last(
     policy: NewCheckpoint,
     resume: ResumeState | None,
 ) -> bool:
-    """Return whether a checkpoint and its state are the last ones that a job has stored.
-
-    Raises:
-        InvalidInput: The last one is of a later step: this one was delayed.
-    """
+    """Return whether a checkpoint and its state are a job's last ones; refuse a delayed one."""
     mine = sa.select(job_checkpoints).where(job_checkpoints.c.job_id == job_id)
     last = connection.execute(mine.order_by(job_checkpoints.c.step.desc()).limit(1)).first()
     if last is not None and step < last.step:

@@ -271,11 +271,7 @@ def _checked_url(database_url: str) -> sa.URL:
 
 
 def _longest_wait(url: sa.URL) -> float:
-    """Return the time for which a writer of a SQLite file waits [s].
-
-    Raises:
-        InvalidInput: The URL has another time than a number of seconds in (0, MAX_TIMEOUT_S].
-    """
+    """Return the time for which a writer of a SQLite file waits, in (0, MAX_TIMEOUT_S] [s]."""
     given = str(url.query.get("timeout", BUSY_TIMEOUT_S))
     try:
         longest = float(given)

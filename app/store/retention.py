@@ -145,8 +145,7 @@ def _require_unused(
 ) -> None:
     """Check that no checkpoint that would go acts or is to be evaluated.
 
-    Args:
-        whose: Words behind its name in the problem, such as ``"of job 5 "``.
+    The problem has ``whose``, such as ``"of job 5 "``, behind its name.
     """
     for sha256 in removed:
         if sha256 in acting:

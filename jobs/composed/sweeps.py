@@ -238,11 +238,7 @@ def _queue(store: Store, job: JobRecord, number: int, body: Mapping[str, Any]) -
 
 
 def _drawn(spec: SweepSpec, trials: Sequence[SweepTrial], number: int) -> dict[str, Any]:
-    """Return the overrides of a new trial.
-
-    Raises:
-        InvalidInput: The drawn fields contradict each other in every draw.
-    """
+    """Return the overrides of a new trial; refuse fields that contradict in every draw."""
     study = _study(spec, spec.seed + number)
     for one in trials:
         study.add_trial(_frozen(spec, one, {}))

@@ -161,11 +161,7 @@ def _require_origin(manifest: Mapping[str, Any], job: JobRecord) -> None:
 
 
 def _listed(manifest: Mapping[str, Any]) -> list[str]:
-    """Return the files that the manifest of a state lists.
-
-    Raises:
-        InvalidInput: It is no list, or an entry names no SHA-256.
-    """
+    """Return the files that the manifest of a state lists, each by its SHA-256."""
     entries = manifest.get("memory", [])
     if not isinstance(entries, list):
         raise InvalidInput("state.manifest.memory", type(entries).__name__, "must be a list")
