@@ -15,7 +15,7 @@ import numpy as np
 from app.errors import Fault, digits, interval
 from app.sim.cell_validation.places import FaultlessParts, places
 from app.sim.cell_validation.reachability import ContactPair, Reach
-from app.sim.cell_validation.units import numbers, shown
+from app.sim.cell_validation.units import fault, numbers, shown
 from app.sim.cells.cell import LIMITS, MAX_TARGETS, Cell
 from app.sim.cells.parts import GoalRegion, RobotMount, Station
 from app.sim.cells.people import Worker
@@ -62,10 +62,10 @@ def _counts(cell: Cell, known: Sequence[Fault]) -> Iterator[Fault]:
     for name, most in LIMITS.items():
         n = len(getattr(cell, name))
         if n > most:
-            yield Fault(place=name, value=f"<{n} of them>", rule=f"must be at most {most}")
+            yield fault(name, f"<{n} of them>", f"must be at most {most}")
     if not cell.stations and cell.goal_region is None and not known:
         rule = "must hold at least one station, or the cell a goal_region"
-        yield Fault(place="stations", value="[]", rule=rule)
+        yield fault("stations", "[]", rule)
 
 
 def _ids(cell: Cell) -> Iterator[Fault]:
@@ -74,17 +74,13 @@ def _ids(cell: Cell) -> Iterator[Fault]:
         for name, count in ids.items():
             if count > 1:
                 rule = f"must be given once, not {count} times"
-                yield Fault(place=f"{group}.{name}.id", value=name, rule=rule)
+                yield fault(f"{group}.{name}.id", name, rule)
 
 
 def _in_order(place: str, low: float, high: float, names: tuple[str, str]) -> Iterator[Fault]:
     if low >= high:
-        yield Fault(
-            place=f"{place}.{names[0]}",
-            value=shown(low),
-            rule=f"must be less than {names[1]} = {digits(high)}",
-            hint="the two may have changed places",
-        )
+        rule = f"must be less than {names[1]} = {digits(high)}"
+        yield fault(f"{place}.{names[0]}", low, rule, "the two may have changed places")
 
 
 def _table(cell: Cell) -> Iterator[Fault]:
@@ -94,36 +90,24 @@ def _table(cell: Cell) -> Iterator[Fault]:
         yield from _in_order("table", getattr(table, names[0]), getattr(table, names[1]), names)
     if table.thickness >= table.height:
         rule = f"must be less than the table's height = {digits(table.height)} m"
-        yield Fault(place="table.thickness", value=shown(table.thickness), rule=rule)
+        yield fault("table.thickness", table.thickness, rule)
 
 
 def _robot(robot: RobotMount) -> Iterator[Fault]:
     limits = zip(robot.q_min, robot.home_q, robot.q_max, strict=True)
     for joint, (low, home, high) in enumerate(limits):
-        if low >= high:
-            yield Fault(
-                place=f"robot.q_min[{joint}]",
-                value=shown(low),
-                rule=f"must be less than q_max[{joint}] = {digits(high)}",
-                hint="the two may have changed places",
-            )
-        elif not low < home < high:
-            yield Fault(
-                place=f"robot.home_q[{joint}]",
-                value=shown(home),
-                rule=f"must lie inside the joint's limits ({digits(low)}, {digits(high)}) rad",
-            )
+        yield from _in_order("robot", low, high, (f"q_min[{joint}]", f"q_max[{joint}]"))
+        if low < high and not low < home < high:
+            rule = f"must lie inside the joint's limits ({digits(low)}, {digits(high)}) rad"
+            yield fault(f"robot.home_q[{joint}]", home, rule)
     for name, limit in (("q_min", robot.q_min[2]), ("q_max", robot.q_max[2])):
         if abs(limit) > MOST_ELBOW + 1e-9:
-            yield Fault(
-                place=f"robot.{name}[2]",
-                value=shown(limit),
-                rule=f"must lie in [-{MOST_ELBOW}, {MOST_ELBOW}] rad",
-                hint="an elbow that bends more folds the arm into itself",
-            )
+            rule = f"must lie in [-{MOST_ELBOW}, {MOST_ELBOW}] rad"
+            hint = "an elbow that bends more folds the arm into itself"
+            yield fault(f"robot.{name}[2]", limit, rule, hint)
     if robot.tool_radius > robot.tool_length:
         rule = f"must not exceed tool_length = {digits(robot.tool_length)} m"
-        yield Fault(place="robot.tool_radius", value=shown(robot.tool_radius), rule=rule)
+        yield fault("robot.tool_radius", robot.tool_radius, rule)
 
 
 def _kinds(cell: Cell) -> Iterator[Fault]:
@@ -133,16 +117,16 @@ def _kinds(cell: Cell) -> Iterator[Fault]:
             value, place = getattr(station, name), f"stations.{station.id}.{name}"
             if station.kind == owner and value is None:
                 rule = f"is missing: a station of kind {owner} needs it"
-                yield Fault(place=place, value="", rule=rule)
+                yield fault(place, "", rule)
             elif station.kind != owner and value is not None:
                 rule = f"belongs to a station of kind {owner}; this one is a {station.kind}"
-                yield Fault(place=place, value=shown(value), rule=rule)
-    colours = [s.colour for s in cell.stations_of("cluster")]
-    for station in cell.stations_of("cluster"):
-        if station.colour is not None and colours.count(station.colour) > 1:
+                yield fault(place, value, rule)
+    clusters = cell.stations_of("cluster")
+    colours = Counter(station.colour for station in clusters)
+    for station in clusters:
+        if station.colour is not None and colours[station.colour] > 1:
             rule = "must be that of one cluster only"
-            place = f"stations.{station.id}.colour"
-            yield Fault(place=place, value=station.colour, rule=rule)
+            yield fault(f"stations.{station.id}.colour", station.colour, rule)
 
 
 def _people(parts: FaultlessParts) -> Iterator[Fault]:
@@ -163,46 +147,34 @@ def _people(parts: FaultlessParts) -> Iterator[Fault]:
                 f"must lie inside the walking area, x in [{digits(person.x_min)}, "
                 f"{digits(person.x_max)}] m and y in {interval(person.y_min, person.y_max)} m"
             )
-            yield Fault(place=f"{place}.home", value=shown(person.home), rule=rule)
+            yield fault(f"{place}.home", person.home, rule)
 
 
-def _grid(region: GoalRegion) -> list[Fault]:
+def _grid(region: GoalRegion) -> Iterator[Fault]:
     if region.spacing <= 0.0:
-        return []
-    faults = []
+        return
     for axis, side in enumerate(region.size):
         if abs(side - round(side / region.spacing) * region.spacing) > 1e-6:
             rule = f"must be a multiple of spacing = {digits(region.spacing)} m"
-            faults.append(
-                Fault(place=f"goal_region.size[{axis}]", value=shown(side), rule=rule)
-            )
+            yield fault(f"goal_region.size[{axis}]", side, rule)
     n = math.prod(round(abs(side) / region.spacing) + 1 for side in region.size)
     if n > MAX_TARGETS:
         rule = f"gives {n} grid targets; at most {MAX_TARGETS} are taken"
-        faults.append(
-            Fault(place="goal_region.spacing", value=shown(region.spacing), rule=rule)
-        )
-    return faults
+        yield fault("goal_region.spacing", region.spacing, rule)
 
 
 def _overlaps(parts: FaultlessParts) -> Iterator[Fault]:
     for a, b in combinations(parts.stations, 2):
         if (distance := station_distance(a, b)) < MIN_SPACING:
-            yield Fault(
-                place=f"stations.{b.id}.position",
-                value=shown(b.position),
-                rule=f"must be at least {digits(MIN_SPACING)} m from every other station",
-                hint=f"{a.id} is {distance:.3g} m away",
-            )
+            rule = f"must be at least {digits(MIN_SPACING)} m from every other station"
+            hint = f"{a.id} is {distance:.3g} m away"
+            yield fault(f"stations.{b.id}.position", b.position, rule, hint)
     for one, other in combinations(parts.obstacles, 2):
         pair = [obstacle_box(box, 0.5 * MAX_OVERLAP) for box in (one, other)]
         if touch(*pair):
-            yield Fault(
-                place=f"obstacles.{other.id}.center",
-                value=shown(other.center),
-                rule=f"must not overlap another obstacle by more than {digits(MAX_OVERLAP)} m",
-                hint=f"it overlaps {one.id}",
-            )
+            rule = f"must not overlap another obstacle by more than {digits(MAX_OVERLAP)} m"
+            hint = f"it overlaps {one.id}"
+            yield fault(f"obstacles.{other.id}.center", other.center, rule, hint)
 
 
 def station_distance(a: Station, b: Station) -> float:
@@ -231,50 +203,30 @@ def _home_contacts(cell: Cell, found: list[ContactPair]) -> Iterator[Fault]:
     for box in cell.obstacles:
         touching = [one.text for one in found if (one.kind, one.other) == ("obstacle", box.id)]
         if touching:
-            yield Fault(
-                place=f"obstacles.{box.id}.center",
-                value=shown(box.center),
-                rule="must not touch the robot in its home configuration",
-                hint=touching[0],
-            )
+            rule = "must not touch the robot in its home configuration"
+            yield fault(f"obstacles.{box.id}.center", box.center, rule, touching[0])
     own = [one.text for one in found if one.kind != "obstacle"]
     if own:
-        yield Fault(
-            place="robot.home_q",
-            value=shown(cell.robot.home_q),
-            rule="must be a collision-free configuration",
-            hint=own[0],
-        )
+        rule = "must be a collision-free configuration"
+        yield fault("robot.home_q", cell.robot.home_q, rule, own[0])
 
 
 def _station_reach(reach: Reach, station: Station) -> Iterator[Fault]:
     tries = [reach.tool_down(point) for point in station.points()]
     missed = [(level, one.reason) for level, one in enumerate(tries) if one.q is None]
     place = f"stations.{station.id}.position"
-    if not missed:
-        yield from _pick_reach(reach, station, place)
-        return
     rule = "must be reachable by the robot with its tool pointing down"
-    hint = missed[0][1]
-    if station.kind == "cluster" and len(missed) < len(tries):
+    if missed and station.kind == "cluster" and len(missed) < len(tries):
         levels = f"{len(missed)} of {len(tries)} levels, the first one {missed[0][0]}"
-        place, rule = (
-            f"stations.{station.id}.levels",
-            f"{rule} at every level: {levels}, are not",
-        )
-        yield Fault(place=place, value=shown(station.levels), rule=rule, hint=hint)
-        return
-    yield Fault(place=place, value=shown(station.position), rule=rule, hint=hint)
-
-
-def _pick_reach(reach: Reach, station: Station, place: str) -> Iterator[Fault]:
-    """Check that the gripper gets down to the object at a cube or dock."""
-    if station.kind not in ("cube", "dock"):
-        return
-    found = reach.tool_down(np.array(station.position) - (0.0, 0.0, PICK_DEPTH_M))
-    if found.q is None:
-        rule = f"must leave room to grasp: the tool goes down by {digits(PICK_DEPTH_M)} m"
-        yield Fault(place=place, value=shown(station.position), rule=rule, hint=found.reason)
+        rule = f"{rule} at every level: {levels}, are not"
+        yield fault(f"stations.{station.id}.levels", station.levels, rule, missed[0][1])
+    elif missed:
+        yield fault(place, station.position, rule, missed[0][1])
+    elif station.kind in ("cube", "dock"):  # the gripper must get down to the object
+        found = reach.tool_down(np.array(station.position) - (0.0, 0.0, PICK_DEPTH_M))
+        if found.q is None:
+            rule = f"must leave room to grasp: the tool goes down by {digits(PICK_DEPTH_M)} m"
+            yield fault(place, station.position, rule, found.reason)
 
 
 def _region_reach(reach: Reach, region: GoalRegion) -> Iterator[Fault]:
@@ -287,11 +239,7 @@ def _region_reach(reach: Reach, region: GoalRegion) -> Iterator[Fault]:
             break
     if missed:
         least = "at least " if len(missed) == MAX_MISSED else ""
-        point = shown(missed[0][0].round(3).tolist())
-        yield Fault(
-            place="goal_region.center",
-            value=shown(region.center),
-            rule="must have grid targets in reach only: "
-            f"{least}{len(missed)} of {len(targets)} are not",
-            hint=f"at {point}, {missed[0][1]}",
-        )
+        n = f"{least}{len(missed)} of {len(targets)}"
+        rule = f"must have grid targets in reach only: {n} are not"
+        hint = f"at {shown(missed[0][0].round(3).tolist())}, {missed[0][1]}"
+        yield fault("goal_region.center", region.center, rule, hint)

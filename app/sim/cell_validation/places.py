@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterator, Sequence
 
 from app.errors import Fault, digits
-from app.sim.cell_validation.units import shown
+from app.sim.cell_validation.units import fault
 from app.sim.cells.cell import Cell
 from app.sim.cells.parts import Obstacle, Station
 from app.sim.cells.people import Worker
@@ -40,38 +40,29 @@ class FaultlessParts:
 def places(parts: FaultlessParts) -> Iterator[Fault]:
     """Check that stations are supported and free, and people clear of table and obstacles."""
     for station in parts.stations:
-        place, value = f"stations.{station.id}.position", shown(station.position)
+        place, value = f"stations.{station.id}.position", station.position
         under = [box for box in parts.obstacles if is_over(box, station.position)]
         inside = [
             box
             for box in under
-            if any(_in_height(box, float(z)) for z in station.points()[:, 2])
+            if (abs(station.points()[:, 2] - box.center[2]) < box.half_size[2]).any()
         ]
         if inside:
             rule = f"must not lie inside the obstacle {inside[0].id}"
-            yield Fault(place=place, value=value, rule=rule)
+            yield fault(place, value, rule)
         elif station.position[2] < 0.0:
-            yield Fault(
-                place=place, value=value, rule="must not lie below the table top, z = 0"
-            )
-        elif (
-            parts.table and not under and not is_over_table(parts.cell.table, station.position)
-        ):
-            yield Fault(
-                place=place,
-                value=value,
-                rule="must lie over the table or over an obstacle that carries it",
-                hint=_table_text(parts.cell),
-            )
+            yield fault(place, value, "must not lie below the table top, z = 0")
+        elif parts.table and not under and not is_over_table(parts.cell.table, value):
+            rule = "must lie over the table or over an obstacle that carries it"
+            yield fault(place, value, rule, _table_text(parts.cell))
         elif parts.table and (hint := _hangs(parts.cell, station, under)):
-            rule = (
-                f"must be carried by the table or an obstacle at most {HIGHEST_PART:g} m below"
-            )
-            yield Fault(place=place, value=value, rule=rule, hint=hint)
+            most = f"{HIGHEST_PART:g} m"
+            rule = f"must be carried by the table or an obstacle at most {most} below"
+            yield fault(place, value, rule, hint)
     region = parts.goal_region
     if region is not None and region.center[2] - 0.5 * region.size[2] < 0.0:
         rule = "must keep the whole region over the table top, z = 0"
-        yield Fault(place="goal_region.center", value=shown(region.center), rule=rule)
+        yield fault("goal_region.center", region.center, rule)
     yield from _standing(parts)
 
 
@@ -85,11 +76,6 @@ def _hangs(cell: Cell, station: Station, under: Sequence[Obstacle]) -> str:
         return f"{tops[0][1]} lies above it"
     top, name = max(carrying)
     return f"{name} ends {z - top:.3g} m below it" if z - top > HIGHEST_PART else ""
-
-
-def _in_height(box: Obstacle, z: float) -> bool:
-    """Return whether a height lies between bottom and top of an obstacle."""
-    return abs(z - box.center[2]) < box.half_size[2]
 
 
 def _table_text(cell: Cell) -> str:
@@ -111,29 +97,23 @@ def _standing(parts: FaultlessParts) -> Iterator[Fault]:
             or person.y_max <= table.y_min + 1e-9
         )
         if parts.table and apart and person.y_min < table.y_max - 1e-9:
-            yield Fault(
-                place=f"{place}.y_min",
-                value=shown(person.y_min),
-                rule="must keep a worker beside the edge of the table with the greatest y: at "
-                f"least y_max = {digits(table.y_max)} m",
-                hint="turn the cell: x to the right, y from the robot toward the person",
+            rule = (
+                "must keep a worker beside the edge of the table with the greatest y: at "
+                f"least y_max = {digits(table.y_max)} m"
             )
+            hint = "turn the cell: x to the right, y from the robot toward the person"
+            yield fault(f"{place}.y_min", person.y_min, rule, hint)
         if parts.table and not apart:
-            yield Fault(
-                place=f"{place}.y_min",
-                value=shown(person.y_min),
-                rule="must keep a worker's walking area off the table",
-                hint=_table_text(parts.cell),
-            )
+            rule = "must keep a worker's walking area off the table"
+            yield fault(f"{place}.y_min", person.y_min, rule, _table_text(parts.cell))
         if parts.table and apart:
             yield from _facing(parts.cell, person, place)
+        pelvis_z = person.pelvis_height + parts.cell.floor_z
         for box in parts.obstacles:
-            on_floor = (
-                box.center[2] - box.half_size[2] < person.pelvis_height + parts.cell.floor_z
-            )
-            if on_floor and is_over(box, person.home):
+            low = box.center[2] - box.half_size[2] < pelvis_z
+            if low and is_over(box, person.home):
                 rule = f"must not lie inside the obstacle {box.id}"
-                yield Fault(place=f"{place}.home", value=shown(person.home), rule=rule)
+                yield fault(f"{place}.home", person.home, rule)
 
 
 def _facing(cell: Cell, worker: Worker, place: str) -> Iterator[Fault]:
@@ -143,9 +123,5 @@ def _facing(cell: Cell, worker: Worker, place: str) -> Iterator[Fault]:
     to_y = min(table.y_max, max(table.y_min, y)) - y
     toward = math.atan2(to_y, to_x)
     if math.hypot(to_x, to_y) > 0.0 and abs(math.remainder(yaw - toward, math.tau)) > FACING:
-        yield Fault(
-            place=f"{place}.home[2]",
-            value=shown(yaw),
-            rule=f"must look at the table, at most {FACING:g} rad past it",
-            hint=f"the table is at {toward:.3g} rad",
-        )
+        rule = f"must look at the table, at most {FACING:g} rad past it"
+        yield fault(f"{place}.home[2]", yaw, rule, f"the table is at {toward:.3g} rad")

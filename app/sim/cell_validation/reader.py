@@ -19,7 +19,7 @@ from pydantic import BaseModel, ValidationError
 from app.errors import BadCell, Fault
 from app.one_line import ONE_LINE
 from app.sim.cell_validation.checks import check_cell
-from app.sim.cell_validation.units import MAX_SHOWN, cut
+from app.sim.cell_validation.units import MAX_SHOWN, cut, fault
 from app.sim.cells.cell import LIMITS, Cell, load_cell
 from app.sim.cells.parts import (
     CellSafety,
@@ -95,11 +95,11 @@ def read_cell(content: bytes) -> Cell:
 
 def _parse(content: bytes) -> dict[str, Any]:
     def refuse(value: str, rule: str, hint: str = "") -> BadCell:
-        return BadCell([Fault(place="file", value=value, rule=rule, hint=hint)])
+        return BadCell([fault("file", value, rule, hint)])
 
     if len(content) > MAX_BYTES:
-        value, rule = f"<{len(content)} bytes>", f"must have at most {MAX_BYTES} bytes (256 kB)"
-        raise refuse(value, rule)
+        rule = f"must have at most {MAX_BYTES} bytes (256 kB)"
+        raise refuse(f"<{len(content)} bytes>", rule)
     try:
         text = content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -137,8 +137,7 @@ def _cut(raw: dict[str, Any]) -> Iterator[Fault]:
     for name, most in LIMITS.items():
         items = raw.get(name)
         if isinstance(items, list) and len(items) > most:
-            value, rule = f"<{len(items)} of them>", f"must be at most {most}"
-            yield Fault(place=name, value=value, rule=rule)
+            yield fault(name, f"<{len(items)} of them>", f"must be at most {most}")
             raw[name] = items[:most]
 
 
@@ -153,12 +152,12 @@ def _pairs(pairs: list[tuple[str, Any]]) -> _Object:
 def _tree_faults(node: object, place: str) -> Iterator[Fault]:
     """Return the faults of repeated keys and of invalid text."""
     if isinstance(node, str) and not _is_text(node):
-        yield Fault(place=place, value=ascii(node)[:MAX_SHOWN], rule=_TEXT_RULE)
+        yield fault(place, ascii(node)[:MAX_SHOWN], _TEXT_RULE)
     if isinstance(node, _Object):
         for name in node.repeated_keys:
             path = f"{place}.{name}".lstrip(".")[:MAX_PLACE]
             hint = "only the last one would count"
-            yield Fault(place=path, value="", rule="is given twice in one object", hint=hint)
+            yield fault(path, "", "is given twice in one object", hint)
         for name, value in node.items():
             yield from _tree_faults(value, f"{place}.{name}".lstrip(".")[:MAX_PLACE])
     elif isinstance(node, list):
@@ -239,18 +238,18 @@ def _fault(raw: dict[str, Any], error: Any) -> Fault:
     place, loc = _place(raw, error["loc"])
     kind, context, value = error["type"], error.get("ctx", {}), _shown(error.get("input"))
     if kind == "json_invalid":
-        return Fault(place="file", value="", rule=f"must be JSON: {context.get('error')}")
+        return fault("file", "", f"must be JSON: {context.get('error')}")
     if kind == "missing":
-        return Fault(place=place, value="", rule="is missing", hint=_description(raw, loc))
+        return fault(place, "", "is missing", _description(raw, loc))
     if kind == "extra_forbidden":
         rule = "is no known field"
-        return Fault(place=place, value=value, rule=rule, hint=_known(raw, loc))
+        return fault(place, value, rule, _known(raw, loc))
     if kind == "union_tag_not_found":
-        return Fault(place=f"{place}.kind", value="", rule=f"is missing: {_kinds()}")
+        return fault(f"{place}.kind", "", f"is missing: {', '.join(_PEOPLE)}")
     if kind == "union_tag_invalid":
-        rule = f"must be one of {_kinds()}"
-        return Fault(place=f"{place}.kind", value=repr(context["tag"])[:MAX_SHOWN], rule=rule)
-    return Fault(place=place, value=value, rule=_rule(kind, context, str(error["msg"])))
+        rule = f"must be one of {', '.join(_PEOPLE)}"
+        return fault(f"{place}.kind", repr(context["tag"])[:MAX_SHOWN], rule)
+    return fault(place, value, _rule(kind, context, str(error["msg"])))
 
 
 def _rule(kind: str, context: Mapping[str, Any], message: str) -> str:
@@ -267,10 +266,6 @@ def _rule(kind: str, context: Mapping[str, Any], message: str) -> str:
     if kind == "too_long":
         return f"must hold {context['max_length']} numbers, not {context['actual_length']}"
     return message.replace("Input should be ", "must be ")
-
-
-def _kinds() -> str:
-    return ", ".join(_PEOPLE)
 
 
 def _place(raw: object, loc: Sequence[Any]) -> tuple[str, tuple[Any, ...]]:

@@ -30,6 +30,11 @@ def cut(text: str) -> str:
     return text if len(text) <= MAX_SHOWN else f"{text[: MAX_SHOWN - 3]}..."
 
 
+def fault(place: str, value: object, rule: str, hint: str = "") -> Fault:
+    """Return a fault with the value as :func:`shown` writes it."""
+    return Fault(place=place, value=shown(value), rule=rule, hint=hint)
+
+
 def unit_hint(value: float, within: Within) -> str:
     """Return a hint about the unit of a number outside its bounds; empty if unclear."""
     if within.unit.startswith("rad") and within.low <= math.radians(value) <= within.high:
@@ -74,9 +79,5 @@ def _against(rule: object, value: object, path: str) -> Iterator[Fault]:
             yield from _against(rule, one, f"{path}[{index}]")
     elif isinstance(rule, Within) and isinstance(value, int | float):
         if not rule.low <= value <= rule.high:
-            yield Fault(
-                place=path,
-                value=shown(value),
-                rule=f"must lie in {interval(rule.low, rule.high)} {rule.unit}".rstrip(),
-                hint=unit_hint(value, rule),
-            )
+            text = f"must lie in {interval(rule.low, rule.high)} {rule.unit}".rstrip()
+            yield fault(path, value, text, unit_hint(value, rule))
