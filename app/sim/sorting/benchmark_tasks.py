@@ -182,8 +182,9 @@ def _add_below(state: SortingState, shape: SortingShape, rng: Generator) -> Sort
     """
     tops = []
     for colour, height in enumerate(state.heights.tolist()):
-        if height and shape.size_of(int(state.towers[colour, height - 1])) < shape.n_sizes - 1:
-            tops.append((colour, shape.size_of(int(state.towers[colour, height - 1]))))
+        size = shape.size_of(int(state.towers[colour, height - 1]))
+        if height and size < shape.n_sizes - 1:
+            tops.append((colour, size))
     if not tops:
         rule = "must end in an object that is not of the largest size"
         raise InvalidInput("towers", state.towers.tolist(), rule)
@@ -208,18 +209,13 @@ def _add_alternative(state: SortingState, shape: SortingShape, rng: Generator) -
     return add_to_clutter(state, int(rng.choice(asked)), rng)
 
 
-def _touches_sorted(towers: Codes, goal: Codes) -> bool:
-    """Return whether an object that is on a tower must leave it for a goal."""
-    return bool(((towers != NULL) & (towers != goal)).any())
-
-
 def _change_goal(state: SortingState, shape: SortingShape, rng: Generator) -> SortingState:
     """Change the goal so that some sorted objects must move again."""
     there = np.concatenate([_objects(state.clutter), _objects(state.towers)])
     n_goal = len(_objects(state.goal))
     for _ in range(DRAWS):
         goal = sorted_goal(rng.permutation(there)[:n_goal], shape)
-        if _touches_sorted(state.towers, goal):
+        if ((state.towers != NULL) & (state.towers != goal)).any():
             return replace(state, goal=goal)
     return replace(state, goal=sorted_goal(_objects(state.goal)[1:], shape))
 

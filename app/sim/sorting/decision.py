@@ -13,9 +13,8 @@ from app.sim.core.arrays import Vec
 from app.sim.sorting.batch import apply, observe, valid_moves
 from app.sim.sorting.decision_types import OutsideGoal, RankedMove, SortingDecision, Why
 from app.sim.sorting.kernels.action_costs import attempts_by_move
-from app.sim.sorting.kernels.planner import Objects, Task, new_work
 from app.sim.sorting.kernels.shortest_paths import most_states
-from app.sim.sorting.planner import Plan, solve
+from app.sim.sorting.planner import Plan, planner_arguments, solve
 from app.sim.sorting.progress_monitor import (
     ProgressMonitor,
     expect_state,
@@ -65,7 +64,9 @@ def decide(
             else rank_by_policy(trusted, state, shape, plan)
         )
     if noted is not None:
-        noted = _noted_move(noted, state, shape, ranked[0].move)
+        expected = state_key(apply(state, shape, ranked[0].move))
+        risk = failure_of(state, ranked[0].move)
+        noted = expect_state(noted, expected, can_fail=risk > 0.0)
     return SortingDecision(
         solved=plan.best is None,
         action=ranked[0].action if ranked else None,
@@ -83,23 +84,18 @@ def decide(
 
 
 def outside_goal(goal: Codes, shape: SortingShape) -> tuple[OutsideGoal, ...]:
-    """Return the objects of a goal that no goal of the training contains.
-
-    Args:
-        goal: Goal of the towers, shape (C, K).
-        shape: Shape of the task.
-    """
-    towers, levels = np.nonzero(goal)
+    """Return the objects of a goal, shape (C, K), that no goal of the training contains."""
     found = []
-    for tower, level in zip(towers.tolist(), levels.tolist(), strict=True):
+    for tower, level in np.argwhere(goal != NULL).tolist():
         code = int(goal[tower, level])
         below = int(goal[tower, level - 1]) if level else NULL
         if shape.colour_of(code) != tower:
             rule = "must be of the tower's own colour"
-            found.append(OutsideGoal(tower=tower, level=level, rule=rule))
         elif below != NULL and shape.size_of(code) > shape.size_of(below):
             rule = "must not be larger than the object below it"
-            found.append(OutsideGoal(tower=tower, level=level, rule=rule))
+        else:
+            continue
+        found.append(OutsideGoal(tower=tower, level=level, rule=rule))
     return tuple(found)
 
 
@@ -147,22 +143,15 @@ def attempts_by_action(
 
     Args:
         state: A state that ``check_state`` accepts.
-        shape: Its shape.
-        actions: Valid moves by their numbers.
+        actions: Numbers of n valid moves.
 
     Returns:
         Expected attempts, shape (n,); None where finding them would take too long.
     """
-    moves = [shape.move_of(action) for action in actions]
-    attempts = np.zeros(len(actions))
-    written = attempts_by_move(
-        Objects(state.clutter.copy(), state.towers.copy(), state.heights),
-        Task(state.goal, np.count_nonzero(state.goal, axis=1), state.fail),
-        np.array([(move.pick, move.place) for move in moves], dtype=np.int64).reshape(-1, 2),
-        MAX_PLANNED,
-        new_work(shape.n_cells, shape.n_colours, shape.n_sizes),
-        attempts,
-    )
+    moves = [(move.pick, move.place) for move in map(shape.move_of, actions)]
+    pairs, attempts = np.array(moves, dtype=np.int64).reshape(-1, 2), np.zeros(len(actions))
+    objects, task, work = planner_arguments(state, shape)
+    written = attempts_by_move(objects, task, pairs, MAX_PLANNED, work, attempts)
     return attempts if written else None
 
 
@@ -219,10 +208,3 @@ def _ranked(
         )
         for action in order
     )
-
-
-def _noted_move(
-    monitor: ProgressMonitor, state: SortingState, shape: SortingShape, move: Move
-) -> ProgressMonitor:
-    expected = state_key(apply(state, shape, move))
-    return expect_state(monitor, expected, can_fail=failure_of(state, move) > 0.0)

@@ -90,14 +90,8 @@ def reaching_cell(cell: Cell) -> Cell:
     def seen(station: Station) -> Station:
         x, y, z = station.position
         kind = {"clutter": "cube", "cluster": "dock"}.get(station.kind, station.kind)
-        return Station.model_validate(
-            {
-                "id": station.id,
-                "kind": kind,
-                "label": station.label,
-                "position": (x, y, z + APPROACH_M),
-            }
-        )
+        kept = {"id": station.id, "label": station.label, "kind": kind}
+        return Station.model_validate({**kept, "position": (x, y, z + APPROACH_M)})
 
     return cell.model_copy(update={"stations": tuple(seen(one) for one in cell.stations)})
 
@@ -113,12 +107,7 @@ def block_height(cell: Cell) -> float:
 
 
 def half_size(cell: Cell, size: int, n_sizes: int) -> Vec:
-    """Return half of a block's length, width and height [m], shape (3,).
-
-    Args:
-        cell: Sorting cell.
-        size: 0 the smallest.
-    """
+    """Return half of a block's length, width and height [m], (3,); size 0 is the smallest."""
     share = size / (n_sizes - 1) if n_sizes > 1 else 0.5
     width = HALF_WIDTHS[0] + share * (HALF_WIDTHS[-1] - HALF_WIDTHS[0])
     return np.array([width, width, 0.5 * block_height(cell)])

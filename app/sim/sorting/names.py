@@ -146,12 +146,7 @@ def state_from_names(
 
 
 def fail_with(names: SortingNames, own: Vec, changes: Mapping[str, float]) -> Vec:
-    """Return the failure probabilities of a cell, replaced by stated ones.
-
-    Args:
-        names: The words of the task.
-        own: The cell's own, shape (K,).
-        changes: By clutter slot.
+    """Return the failure probabilities of a cell, shape (K,), with changes by clutter slot.
 
     Raises:
         InvalidInput: No such clutter slot, or no probability below 1.

@@ -48,15 +48,11 @@ def near_optimal_moves(
 ) -> NearOptimalMoves:
     """Return moves of shortest plans whose expected attempts are within a margin of the plan's.
 
-    In tasks too large for the attempts of every move it is the planner's own alone.
+    In tasks too large for the attempts of every move it is the planner's own alone. States and
+    errors are those of :func:`~app.sim.sorting.planner.solve`.
 
     Args:
-        state: A state that ``check_state`` accepts.
-        shape: Its shape.
         margin: Margin [attempts].
-
-    Raises:
-        InvalidInput: Objects that the goal asks for are missing, or there are too many.
     """
     plan = solve(state, shape)
     if plan.best is None:

@@ -15,9 +15,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from app.errors import InvalidInput
 from app.sim.sorting.kernels.planner import Objects, PlannerWork, Task, new_work, plan_state
-from app.sim.sorting.state import Move, SortingShape, SortingState, missing
+from app.sim.sorting.state import Move, SortingShape, SortingState, check_state
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -34,14 +33,24 @@ class Plan:
     """First action of the selected plan; None at the goal."""
 
 
+def planner_arguments(
+    state: SortingState, shape: SortingShape
+) -> tuple[Objects, Task, PlannerWork]:
+    """Return a state as the planner's kernels take it, and their work space."""
+    return (
+        Objects(state.clutter.copy(), state.towers.copy(), state.heights),
+        Task(state.goal, np.count_nonzero(state.goal, axis=1), state.fail),
+        new_work(shape.n_cells, shape.n_colours, shape.n_sizes),
+    )
+
+
 def _solve(state: SortingState, shape: SortingShape) -> tuple[Plan, PlannerWork]:
     """Return the plan of a state, and the work space that holds it."""
-    work = new_work(shape.n_cells, shape.n_colours, shape.n_sizes)
-    task = Task(state.goal, np.count_nonzero(state.goal, axis=1), state.fail)
-    objects = Objects(state.clutter, state.towers, state.heights)
+    objects, task, work = planner_arguments(state, shape)
     moves, attempts = plan_state(objects, task, work)
     if moves < 0:
-        raise _cannot_be_met(state, shape)
+        check_state(state, shape)
+    assert moves >= 0  # every valid state has a plan
     best = int(work.actions[0])
     plan = Plan(
         moves=moves,
@@ -52,21 +61,8 @@ def _solve(state: SortingState, shape: SortingShape) -> tuple[Plan, PlannerWork]
     return plan, work
 
 
-def _cannot_be_met(state: SortingState, shape: SortingShape) -> InvalidInput:
-    """Return the error of a goal without a plan."""
-    lack = missing(state, shape)
-    if not lack.any():
-        return InvalidInput("objects", state.n_objects, f"must be at most {shape.n_cells}")
-    codes = np.flatnonzero(lack).tolist()
-    return InvalidInput("goal", codes, "must be met by the objects: these codes are missing")
-
-
 def solve(state: SortingState, shape: SortingShape) -> Plan:
-    """Plan from a state.
-
-    Args:
-        state: A state that ``check_state`` accepts.
-        shape: Its shape.
+    """Plan from a state that ``check_state`` accepts.
 
     Raises:
         InvalidInput: Objects that the goal asks for are missing, or there are too many.
@@ -75,14 +71,6 @@ def solve(state: SortingState, shape: SortingShape) -> Plan:
 
 
 def follow(state: SortingState, shape: SortingShape) -> list[Move]:
-    """Return the whole plan from a state, as if no pick failed.
-
-    Args:
-        state: A state that ``check_state`` accepts.
-        shape: Its shape.
-
-    Raises:
-        InvalidInput: Objects that the goal asks for are missing, or there are too many.
-    """
+    """Return the moves of :func:`solve`'s plan, as if no pick failed."""
     plan, work = _solve(state, shape)
     return [shape.move_of(action) for action in work.actions[: plan.moves].tolist()]

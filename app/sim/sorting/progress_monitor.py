@@ -70,13 +70,7 @@ def state_key(state: SortingState) -> str:
 
 
 def begin_monitor(key: str, expected_attempts: float, checkpoint: str) -> ProgressMonitor:
-    """Return the monitor of a task that starts now.
-
-    Args:
-        key: Key of the present state.
-        expected_attempts: Expected attempts of the exact planner from here.
-        checkpoint: SHA-256 of the policy.
-    """
+    """Return the monitor of a task that starts now; arguments as :func:`observe_transition`."""
     return ProgressMonitor(
         checkpoint=checkpoint,
         last=key,
@@ -96,6 +90,7 @@ def observe_transition(
 
     Args:
         monitor: Result of :func:`expect_state` at the last decision; None at the first.
+        key: Key of the present state.
         expected_attempts: Expected attempts of the exact planner from here.
         checkpoint: SHA-256 of the policy.
     """
@@ -116,13 +111,7 @@ def observe_transition(
 
 
 def expect_state(monitor: ProgressMonitor, expected: str, *, can_fail: bool) -> ProgressMonitor:
-    """Return the monitor with the expected effect of the chosen move.
-
-    Args:
-        monitor: Result of :func:`observe_transition`.
-        expected: Key of the state that the move leads to.
-        can_fail: Whether its pick can fail.
-    """
+    """Return the monitor with the chosen move's next state, by its key, and if it can fail."""
     return replace(monitor, expected=expected, can_fail=can_fail)
 
 
