@@ -85,7 +85,7 @@ def states(seed: int) -> list[State]:
 
 def candidates(n: int, seed: int) -> list[Candidate]:
     """Return ``n`` candidates, drawn evenly from the box that spans the cell's stations."""
-    corners = load_cell().positions()
+    corners = np.array([station.position for station in load_cell().stations])
     rng = np.random.default_rng(seed)
     places = rng.uniform(corners.min(axis=0), corners.max(axis=0), (n, 3))
     return [Candidate(id=f"c{k}", position=place) for k, place in enumerate(places)]

@@ -98,7 +98,6 @@ def rows(case: Period, dt: float) -> Trajectory:
     return Trajectory(
         q_robot=case.q + case.qd * x + case.c * x**2,
         q_human=case.before + (case.after - case.before) * x / dt,
-        dt=dt / SUBSTEPS,
     )
 
 
@@ -124,7 +123,7 @@ def passes(cell: Cell, n: int, seed: int) -> Iterator[Pass]:
         yield Pass(
             speed=palm_speed(cell, case),
             reported=None if found.kind == "none" else found.time_s,
-            touching=None if touching is None else touching.time_s,
+            touching=None if touching is None else touching.index * arm.dt / SUBSTEPS,
             clear_at_ends=all(
                 clearance(arm, people, q, human_q[None], NO_CYLINDERS).people_m > 0.0
                 for q, human_q in zip(path.q_robot[[0, -1]], path.q_human[[0, -1]], strict=True)

@@ -10,7 +10,7 @@ import numpy as np
 
 from app.policies.evaluation.statistics import Index
 from app.sim.cells.cell import Cell
-from app.sim.collision.fcl_recheck import Trajectory, recheck_trajectories
+from app.sim.collision.fcl_recheck import Recheck, Trajectory
 from app.sim.core.arrays import Vec
 from app.sim.human import model as human
 from app.sim.pick.batch import PickBatch
@@ -78,7 +78,6 @@ class Trace:
                         q_human=joints[:, w],
                         sizes=sizes[:, w] if sized else None,
                         cylinders=cylinders if w == 0 else None,
-                        dt=self._batch.arm.dt / self._parts,
                     )
                 )
         return tuple(found)
@@ -86,7 +85,8 @@ class Trace:
 
 def recheck(cell: Cell, trajectories: Sequence[Trajectory]) -> dict[str, int]:
     """Check every recorded pose without a reported contact with FCL on the raw meshes."""
-    found = recheck_trajectories(cell, trajectories)
+    meshes = Recheck(cell)
+    found = [meshes.first_contact(trajectory) for trajectory in trajectories]
     return {
         "episodes": len(trajectories),
         "poses": sum(len(trajectory.q_robot) for trajectory in trajectories),

@@ -5,7 +5,6 @@ the kernels under test) exclude distant pairs; pairs nearer than ``MARGIN`` are 
 meshes, which is fast enough for hundreds of episodes.
 """
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -34,15 +33,13 @@ Pairs = NDArray[np.bool_]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Trajectory:
-    """Robot and person at equal steps of time."""
+    """Robot and person at several times."""
 
     q_robot: Vec
     """Robot joint positions [rad], shape (n_steps, 6)."""
     q_human: Vec
     """Joint positions of the person [m, rad], shape (n_steps, 18); far away where there is
     none with joints."""
-    dt: float
-    """Time between two rows [s]."""
     sizes: Vec | None = None
     """The person's size in each row [m], shape (n_steps, 12); None: the cell's person."""
     cylinders: Vec | None = None
@@ -65,8 +62,6 @@ class FirstContact:
 
     index: int
     """Row of the trajectory."""
-    time_s: float
-    """Time since the first row [s]."""
     contacts: tuple[MeshContact, ...]
     """All contacts in that row."""
 
@@ -141,9 +136,7 @@ class Recheck:
             pairs = self._suspects(_Near(*(part[index] for part in near)))
             contacts = self._ask(trajectory, index, pairs)
             if contacts:
-                return FirstContact(
-                    index=index, time_s=index * trajectory.dt, contacts=contacts
-                )
+                return FirstContact(index=index, contacts=contacts)
         return None
 
     def _near(self, trajectory: Trajectory) -> _Near:
@@ -211,11 +204,3 @@ class Recheck:
             for link, body, kind in order
             if self._reference.touching(link, body)
         )
-
-
-def recheck_trajectories(
-    cell: Cell, trajectories: Iterable[Trajectory]
-) -> list[FirstContact | None]:
-    """Return each trajectory's first contact by FCL on the raw meshes, None without one."""
-    recheck = Recheck(cell)
-    return [recheck.first_contact(trajectory) for trajectory in trajectories]

@@ -1,15 +1,11 @@
 """Reference collision checker: python-fcl on the UR10's collision meshes.
 
 Slow and exact, where the kernels are fast and conservative. Tests, the rechecks of evaluations
-(``fcl_recheck.py``) and the validation of work cells use it. The robot has two accuracies:
-``raw`` (triangles in a bounding volume tree) for contacts, and ``hull`` (convex hull of each
-link) for distances, which take tens of milliseconds on raw meshes.
-
-Raw meshes are surfaces: only ``hull`` finds a body wholly inside a link.
+(``fcl_recheck.py``) and the validation of work cells use it. Meshes are triangles in a bounding
+volume tree: surfaces, so that a body wholly inside a link is not found.
 """
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, Literal
@@ -28,21 +24,10 @@ from app.sim.robot.ur10 import LINK_NAMES, Robot, package_dir, urdf_path
 if TYPE_CHECKING:
     import trimesh
 
-Mesh = Literal["raw", "hull"]
 Kind = Literal["human", "cell", "self"]
 
 BODY_NAMES = (*LINK_NAMES, TOOL)
 """The robot's bodies: base, six links and the tool."""
-
-SELF_BODY_PAIRS = (
-    ("base_link", ("forearm_link", "wrist_1_link", "wrist_2_link", "wrist_3_link", TOOL)),
-    ("shoulder_link", ("forearm_link", "wrist_1_link", "wrist_2_link", "wrist_3_link", TOOL)),
-    ("upper_arm_link", ("wrist_1_link", "wrist_2_link", "wrist_3_link", TOOL)),
-    ("forearm_link", ("wrist_2_link", "wrist_3_link", TOOL)),
-)
-"""Bodies that may not touch. Left out: neighbours, which always overlap at their joint; base
-and upper arm, which cannot meet; the wrists and the tool among themselves, three joints on one
-column."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -56,18 +41,6 @@ class MeshContact:
     body: str
     """The other one: a capsule of the person, ``walker`` and the number of a cylinder,
     ``table``, ``floor``, ``obstacle`` and its id, or a body of the robot."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Distance:
-    """The nearest pair of robot and person."""
-
-    value: float
-    """Distance [m]; 0 in contact."""
-    link: str
-    """Body of the robot."""
-    body: str
-    """Capsule of the person."""
 
 
 def collision_mesh(link: str) -> "trimesh.Trimesh":
@@ -94,13 +67,6 @@ def tree_of(mesh: "trimesh.Trimesh") -> Any:
     tree.addSubModel(mesh.vertices, mesh.faces)
     tree.endModel()
     return tree
-
-
-def hull_of(mesh: "trimesh.Trimesh") -> Any:
-    """Return the mesh's convex hull as fcl's convex body."""
-    hull = mesh.convex_hull
-    faces = np.column_stack([np.full(len(hull.faces), 3), hull.faces]).ravel()
-    return fcl.Convex(np.asarray(hull.vertices), len(hull.faces), faces)
 
 
 def place_capsule(body: Any, p0: Vec, p1: Vec) -> None:
@@ -154,18 +120,13 @@ def touch(a: Any, b: Any) -> bool:
 
 
 class CollisionReference:
-    """Robot, person and cell as fcl bodies; keeps the last pose, so one per thread.
+    """Robot, person and cell as fcl bodies; keeps the last pose, so one per thread."""
 
-    Args:
-        mesh: ``raw`` triangles for verdicts, ``hull`` for distances and solid bodies.
-    """
-
-    def __init__(self, cell: Cell, mesh: Mesh = "raw") -> None:
+    def __init__(self, cell: Cell) -> None:
         self._cell = cell
         self._robot = Robot(cell.robot.tool_length)
-        shape = tree_of if mesh == "raw" else hull_of
         self._bodies = {
-            name: fcl.CollisionObject(shape(collision_mesh(name))) for name in LINK_NAMES
+            name: fcl.CollisionObject(tree_of(collision_mesh(name))) for name in LINK_NAMES
         }
         self._tool = tool_capsule(cell.robot.tool_length, cell.robot.tool_radius)
         self._bodies[TOOL] = make_capsule(cell.robot.tool_radius, *self._tool)
@@ -215,65 +176,12 @@ class CollisionReference:
             for k, (x, y, r) in enumerate(cylinders.tolist())
         }
 
-    def contacts(self, q: Vec, human_q: Vec | None = None) -> list[MeshContact]:
-        """Return everything the robot touches, itself included.
-
-        Args:
-            q: The robot's joint positions [rad], shape (6,).
-            human_q: The person's joint positions [m, rad], shape (18,); None without a person.
-        """
-        self.place_robot(q)
-        if human_q is not None:
-            self.place_person(human_q)
-        pairs = [*self._self_pairs(), *self._cell_pairs()]
-        if human_q is not None:
-            pairs += [(link, body, "human") for link in BODY_NAMES for body in self._person]
-        return [
-            MeshContact(kind=kind, link=link, body=body)
-            for link, body, kind in pairs
-            if self.touching(link, body)
-        ]
-
-    def distance(self, q: Vec, human_q: Vec) -> Distance:
-        """Return the least distance between robot and person [m]; use it with hulls.
-
-        Args:
-            q: Joint positions of the robot [rad], shape (6,).
-            human_q: Joint positions of the person [m, rad], shape (18,).
-        """
-        self.place_robot(q)
-        self.place_person(human_q)
-        best = Distance(value=np.inf, link="", body="")
-        for link in BODY_NAMES:
-            for body, other in self._person.items():
-                value = max(fcl.distance(self._bodies[link], other), 0.0)
-                if value < best.value:
-                    best = Distance(value=value, link=link, body=body)
-        return best
-
     def touching(self, link: str, body: str) -> bool:
-        """Return whether two bodies touch at their last placement.
-
-        Args:
-            link: A body of the robot, one of BODY_NAMES.
-            body: A capsule of the person, a walking cylinder, ``table``, ``floor`` or a body of
-                the robot.
-        """
+        """Return whether two bodies, as :class:`MeshContact` names them, touch where placed."""
         for group in (self._person, self._walkers, self._obstacles, self._bodies):
             if body in group:
                 return touch(self._bodies[link], group[body])
         raise KeyError(body)
-
-    def _self_pairs(self) -> Iterator[tuple[str, str, Kind]]:
-        for link, partners in SELF_BODY_PAIRS:
-            for body in partners:
-                yield link, body, "self"
-
-    def _cell_pairs(self) -> Iterator[tuple[str, str, Kind]]:
-        # The base stands on the table.
-        for link in BODY_NAMES[1:]:
-            for body in self._obstacles:
-                yield link, body, "cell"
 
 
 def _obstacles(cell: Cell) -> dict[str, Any]:

@@ -31,7 +31,8 @@ def test_the_palms_come_to_cubes_and_docks() -> None:
     for k in range(2400):
         points = human.joint_points(cycle.at(0.05 * k)[0], vector)
         palms += [points["hand_r"], points["hand_l"]]
-    gaps = np.linalg.norm(np.array(palms)[:, None] - CELL.positions(), axis=2)
+    stations = [station.position for station in CELL.stations]
+    gaps = np.linalg.norm(np.array(palms)[:, None] - stations, axis=2)
     assert (gaps.min(axis=0) < 0.1).sum() >= len(CELL.stations) - 2
 
 

@@ -4,8 +4,8 @@ import pytest
 from app.sim.cell_validation.reachability import Reach
 from app.sim.cells.cell import Cell, load_cell
 from app.sim.cells.parts import Obstacle
-from app.sim.collision.fcl_reference import CollisionReference
 from app.sim.robot.ur10 import Robot
+from tests.sim.mesh_reference import MeshReference
 
 
 @pytest.fixture
@@ -19,7 +19,7 @@ def box(center: tuple[float, float, float], half: float = 0.1, yaw: float = 0.0)
 
 def test_contact_of_the_meshes_is_contact_of_the_capsules(cell: Cell) -> None:
     with_box = cell.model_copy(update={"obstacles": (box((0.4, 0.5, 0.4), yaw=0.5),)})
-    reach, meshes = Reach(with_box), CollisionReference(with_box)
+    reach, meshes = Reach(with_box), MeshReference(with_box)
     rng, kinds = np.random.default_rng(3), set()
     for q in rng.uniform(cell.robot.q_min, cell.robot.q_max, (400, 6)):
         found = {one.kind for one in meshes.contacts(q)}

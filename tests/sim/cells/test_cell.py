@@ -15,8 +15,8 @@ from app.sim.cells.cell import (
     parse_definition,
 )
 from app.sim.cells.parts import Each, Obstacle, Within
-from app.sim.collision.fcl_reference import CollisionReference
 from app.sim.human.kernels.kinematics import PELVIS_Z
+from tests.sim.mesh_reference import MeshReference
 
 SORTING = {"sorting-e0": (10, 2, 10), "sorting-e1": (20, 3, 20)}
 
@@ -106,7 +106,7 @@ def tower(station) -> Obstacle:
 @pytest.mark.parametrize("name", SORTING)
 def test_every_clutter_cell_and_level_is_reached_beside_full_towers(name: str) -> None:
     cell = load_cell(name)
-    meshes = CollisionReference(cell)
+    meshes = MeshReference(cell)
     for station in cell.stations:
         others = tuple(tower(one) for one in cell.stations_of("cluster") if one != station)
         reach = Reach(cell.model_copy(update={"obstacles": others}))

@@ -9,32 +9,32 @@ from app.sim.cells.cell import Cell, load_cell
 from app.sim.collision.fcl_recheck import (
     Recheck,
     Trajectory,
-    recheck_trajectories,
     segment_distances,
 )
-from app.sim.collision.fcl_reference import BODY_NAMES, CollisionReference, make_capsule
+from app.sim.collision.fcl_reference import BODY_NAMES, make_capsule
 from app.sim.human import model as human
 from app.sim.human.anthropometry import percentile_body
 from app.sim.robot.ur10 import Robot
+from tests.sim.mesh_reference import MeshReference
 
 
 def random_trajectory(cell: Cell, rng: np.random.Generator, n_steps: int) -> Trajectory:
     """A straight joint move between two stations while the person moves between two reaches."""
     limits = np.array(cell.robot.q_min), np.array(cell.robot.q_max)
     stations = rng.choice(len(cell.stations), 4)
-    start, end, *reaches = (cell.positions()[station] for station in stations)
+    start, end, *reaches = (np.array(cell.stations[one].position) for one in stations)
     robot, rest = Robot(), human.rest_posture(*cell.human.home)
     q0, q1 = robot.ik_vertical(start, *limits), robot.ik_vertical(end, *limits)
     assert q0 is not None and q1 is not None
     h0, h1 = (human.reach("r", p + [0, 0.1, 0.1], rest, cell.body).q for p in reaches)
     w = np.linspace(0.0, 1.0, n_steps)[:, None]
-    return Trajectory(q_robot=q0 + w * (q1 - q0), q_human=h0 + w * (h1 - h0), dt=0.01)
+    return Trajectory(q_robot=q0 + w * (q1 - q0), q_human=h0 + w * (h1 - h0))
 
 
 def test_first_contact_is_that_of_asking_the_meshes_in_every_row() -> None:
     cell, rng = load_cell(), np.random.default_rng(21)
     trajectories = [random_trajectory(cell, rng, 60) for _ in range(12)]
-    reference, expected = CollisionReference(cell), []
+    reference, expected = MeshReference(cell), []
     for path in trajectories:
         touching = (
             index
@@ -42,7 +42,8 @@ def test_first_contact_is_that_of_asking_the_meshes_in_every_row() -> None:
             if reference.contacts(q, human_q)
         )
         expected.append(next(touching, None))
-    found = recheck_trajectories(cell, trajectories)
+    recheck = Recheck(cell)
+    found = [recheck.first_contact(path) for path in trajectories]
     assert [hit.index if hit else None for hit in found] == expected
     assert None in expected and any(expected)
 
@@ -51,9 +52,9 @@ def test_contact_with_table_and_self_are_found_without_a_person_nearby() -> None
     cell = load_cell()
     away = np.tile(human.rest_posture(0.0, 1.6, -1.57), (2, 1))
     home, flat = np.array(cell.robot.home_q), np.array([1.5, 0.1, 0.0, 0.0, 0.0, 0.0])
-    path = Trajectory(q_robot=np.array([home, flat]), q_human=away, dt=0.01)
+    path = Trajectory(q_robot=np.array([home, flat]), q_human=away)
     hit = Recheck(cell).first_contact(path)
-    assert hit is not None and hit.index == 1 and hit.time_s == 0.01
+    assert hit is not None and hit.index == 1
     assert {contact.kind for contact in hit.contacts} >= {"cell"}
 
 
@@ -62,7 +63,7 @@ def test_contact_of_a_person_of_another_size_is_found() -> None:
     home, tall = np.array(cell.robot.home_q), percentile_body(99.0, 90.0).vector(cell.floor_z)
     at_tool = np.array([0.0, 0.34, 0.58])
     q = human.reach("r", at_tool, human.rest_posture(*cell.human.home), tall).q
-    path = Trajectory(q_robot=np.tile(home, (3, 1)), q_human=np.tile(q, (3, 1)), dt=0.01)
+    path = Trajectory(q_robot=np.tile(home, (3, 1)), q_human=np.tile(q, (3, 1)))
     recheck = Recheck(cell)
     assert recheck.first_contact(path) is None
     sizes = np.stack([cell.body, tall, tall])
@@ -91,14 +92,13 @@ def walked_into(x: np.ndarray, radius: float) -> Trajectory:
         q_robot=np.tile(home, (len(x), 1)),
         q_human=np.tile(human.rest_posture(0.0, 4.0, -1.57), (len(x), 1)),
         cylinders=cylinders,
-        dt=0.01,
     )
 
 
 def test_first_contact_of_a_cylinder_is_that_of_asking_the_meshes_in_every_row() -> None:
     cell = load_cell("shared-workspace")
     path = walked_into(np.linspace(1.6, 0.1, 60), 0.3)
-    reference, touching = CollisionReference(cell), []
+    reference, touching = MeshReference(cell), []
     reference.place_robot(path.q_robot[0])
     for row in path.walkers:
         reference.place_walkers(row)

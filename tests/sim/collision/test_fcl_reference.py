@@ -4,15 +4,10 @@ import numpy as np
 import pytest
 
 from app.sim.cells.cell import Cell, load_cell
-from app.sim.collision.fcl_reference import (
-    SELF_BODY_PAIRS,
-    CollisionReference,
-    MeshContact,
-    collision_mesh,
-    make_capsule,
-)
+from app.sim.collision.fcl_reference import MeshContact, collision_mesh, make_capsule
 from app.sim.human import model as human
 from app.sim.robot.ur10 import LINK_NAMES, Robot
+from tests.sim.mesh_reference import SELF_BODY_PAIRS, MeshReference
 
 
 @pytest.fixture(scope="module")
@@ -21,13 +16,13 @@ def cell() -> Cell:
 
 
 @pytest.fixture(scope="module")
-def raw(cell: Cell) -> CollisionReference:
-    return CollisionReference(cell)
+def raw(cell: Cell) -> MeshReference:
+    return MeshReference(cell)
 
 
 @pytest.fixture(scope="module")
-def hull(cell: Cell) -> CollisionReference:
-    return CollisionReference(cell, "hull")
+def hull(cell: Cell) -> MeshReference:
+    return MeshReference(cell, "hull")
 
 
 def random_pair(cell: Cell, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
@@ -37,16 +32,12 @@ def random_pair(cell: Cell, rng: np.random.Generator) -> tuple[np.ndarray, np.nd
     return q, human_q
 
 
-def test_home_beside_a_resting_person_touches_nothing(
-    cell: Cell, raw: CollisionReference
-) -> None:
+def test_home_beside_a_resting_person_touches_nothing(cell: Cell, raw: MeshReference) -> None:
     human_q = human.rest_posture(*cell.human.home)
     assert raw.contacts(np.array(cell.robot.home_q), human_q) == []
 
 
-def test_hand_at_the_tool_is_reported_with_both_names(
-    cell: Cell, raw: CollisionReference
-) -> None:
+def test_hand_at_the_tool_is_reported_with_both_names(cell: Cell, raw: MeshReference) -> None:
     limits = np.array(cell.robot.q_min), np.array(cell.robot.q_max)
     q = Robot().ik_vertical(np.array([0.1, 0.7, 0.12]), *limits)
     assert q is not None
@@ -55,20 +46,20 @@ def test_hand_at_the_tool_is_reported_with_both_names(
     assert MeshContact(kind="human", link="tool", body="hand_r") in raw.contacts(q, posture.q)
 
 
-def test_arm_stretched_flat_down_hits_the_table(raw: CollisionReference) -> None:
+def test_arm_stretched_flat_down_hits_the_table(raw: MeshReference) -> None:
     contacts = raw.contacts(np.array([1.5, 0.1, 0.0, 0.0, 0.0, 0.0]))
     assert MeshContact(kind="cell", link="forearm_link", body="table") in contacts
     assert all(contact.link != "base_link" for contact in contacts)
 
 
-def test_folded_wrist_brings_the_tool_into_the_forearm(raw: CollisionReference) -> None:
+def test_folded_wrist_brings_the_tool_into_the_forearm(raw: MeshReference) -> None:
     q = np.array([0.0, -1.5, 1.0, -1.5, 3.1, 0.0])
     found = [raw.contacts(q) for q[3] in np.linspace(-3.1, 3.1, 60)]
     assert any(one.kind == "self" for contacts in found for one in contacts)
 
 
 def test_hulls_report_every_contact_of_the_raw_meshes(
-    cell: Cell, raw: CollisionReference, hull: CollisionReference
+    cell: Cell, raw: MeshReference, hull: MeshReference
 ) -> None:
     rng = np.random.default_rng(11)
     for _ in range(300):
@@ -76,12 +67,12 @@ def test_hulls_report_every_contact_of_the_raw_meshes(
         assert set(raw.contacts(q, human_q)) <= set(hull.contacts(q, human_q))
 
 
-def test_hull_distance_is_zero_exactly_in_contact(cell: Cell, hull: CollisionReference) -> None:
+def test_hull_distance_is_zero_exactly_in_contact(cell: Cell, hull: MeshReference) -> None:
     rng = np.random.default_rng(12)
     for _ in range(60):
         q, human_q = random_pair(cell, rng)
         touches = any(contact.kind == "human" for contact in hull.contacts(q, human_q))
-        assert (hull.distance(q, human_q).value < 1e-6) == touches
+        assert (hull.distance(q, human_q) < 1e-6) == touches
 
 
 def test_adjacent_bodies_are_never_asked_about() -> None:

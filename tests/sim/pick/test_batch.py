@@ -205,7 +205,7 @@ def test_meshes_find_no_contact_that_the_kernels_missed(cell: Cell) -> None:
         q_robot = np.concatenate([*q, state.q[e : e + 1]])
         q_human = np.concatenate([*person, state.people.q[e]])
         sizes = np.repeat(state.people.size[e], len(q_human), axis=0)
-        path = Trajectory(q_robot=q_robot, q_human=q_human, dt=0.01, sizes=sizes)
+        path = Trajectory(q_robot=q_robot, q_human=q_human, sizes=sizes)
         hit = recheck.first_contact(path)
         assert hit is None or OUTCOMES[state.outcome[e]] == "collision"
     assert {OUTCOMES[outcome] for outcome in state.outcome} >= {"success", "collision"}
@@ -286,7 +286,8 @@ def test_hands_are_fast_enough_to_be_a_problem(cell: Cell) -> None:
 def test_read_only_integer_and_strided_inputs_compile_nothing_again(cell: Cell) -> None:
     arm, people = arm_of(cell), people_of(cell)
     person = human.rest_posture(*cell.human.home)
-    q, zero, goals = arm.home.copy(), np.zeros(6), cell.positions()
+    q, zero = arm.home.copy(), np.zeros(6)
+    goals = np.array([station.position for station in cell.stations])
     observer = CandidateObserver(cell)
 
     def use() -> None:

@@ -8,7 +8,6 @@ import pytest
 from app.errors import InvalidInput, MissingPackage
 from app.sim.cells.cell import load_cell
 from app.sim.collision.checker import Checker, Shapes, no_people, shapes_of
-from app.sim.collision.fcl_reference import CollisionReference
 from app.sim.core.arrays import Vec
 from app.sim.human import model as human
 from app.sim.planning import ompl_planners as planners
@@ -17,6 +16,7 @@ from app.sim.planning.ompl_planners import PLANNERS, PlanSettings, path_length, 
 from app.sim.planning.time_parameterization import TimingLimits, time_free_path
 from app.sim.scene.scene import arm_of
 from tests.sim.configurations import vertical_configuration
+from tests.sim.mesh_reference import MeshReference
 
 CELL = load_cell()
 ARM = arm_of(CELL)
@@ -74,14 +74,14 @@ def test_a_path_round_a_person_is_free_for_the_reference_on_raw_meshes(planner: 
     answer = ask(blocking_people(), PlanSettings(planner=planner, max_poses=20_000))
     assert answer.solved and answer.goal == 0
     np.testing.assert_array_equal(answer.path[[0, -1]], [station("cube5"), station("cube0")])
-    reference, human_q = CollisionReference(CELL), reaching_person()
+    reference, human_q = MeshReference(CELL), reaching_person()
     for a, b in zip(answer.path[:-1], answer.path[1:], strict=True):
         for s in np.arange(0.0, 1.0, 0.02 / max(0.02, np.abs(b - a).max())):
             assert reference.contacts(a + s * (b - a), human_q) == []
 
 
 def test_the_reference_sees_the_contact_that_the_path_avoids() -> None:
-    reference, human_q = CollisionReference(CELL), reaching_person()
+    reference, human_q = MeshReference(CELL), reaching_person()
     a, b = station("cube5"), station("cube0")
     straight = [a + s * (b - a) for s in np.linspace(0.0, 1.0, 60)]
     kinds = {c.kind for q in straight for c in reference.contacts(q, human_q)}

@@ -10,7 +10,6 @@ import pytest
 from app.errors import InvalidInput
 from app.sim.cells.cell import load_cell
 from app.sim.collision.checker import Checker, Shapes, no_people, shapes_of
-from app.sim.collision.fcl_reference import CollisionReference
 from app.sim.core.arrays import Vec
 from app.sim.human import model as human
 from app.sim.planning.ompl_planners import PLANNERS, PlanSettings
@@ -19,6 +18,7 @@ from app.sim.robot.kernels import acceleration_bounds
 from app.sim.robot.kernels.joints import JointState
 from app.sim.scene.scene import arm_of
 from tests.sim.configurations import vertical_configuration
+from tests.sim.mesh_reference import MeshReference
 
 CELL = load_cell()
 ARM = arm_of(CELL)
@@ -118,7 +118,7 @@ def test_replanning_roles_go_round_a_person_who_comes(role: str, planner: str) -
 
 @pytest.mark.parametrize("role", REPLANNING)
 def test_the_motion_driven_is_free_for_the_reference_on_raw_meshes(role: str) -> None:
-    run, reference = drive(role, from_time(0.3, BLOCKING)), CollisionReference(CELL)
+    run, reference = drive(role, from_time(0.3, BLOCKING)), MeshReference(CELL)
     human_q = posture_at((-0.1, 0.7, 0.2))
     for before, after in itertools.pairwise(run.visited):
         for s in (0.0, 0.25, 0.5, 0.75):

@@ -5,9 +5,10 @@ import pytest
 
 from app.sim.cells.cell import load_cell
 from app.sim.collision.fcl_recheck import robot_ends, segment_distances
-from app.sim.collision.fcl_reference import CollisionReference, collision_mesh
+from app.sim.collision.fcl_reference import collision_mesh
 from app.sim.robot import capsules as shapes
 from app.sim.robot.ur10 import LINK_NAMES, Robot
+from tests.sim.mesh_reference import MeshReference
 from tools.fit_capsules import clip_slab, fit_capsule, segment_distance
 
 
@@ -89,7 +90,7 @@ def test_capsule_pairs_report_every_self_collision_of_the_meshes(
     cell = load_cell()
     mount = cell.robot.model_copy(update={"tool_length": tool[0], "tool_radius": tool[1]})
     cell = cell.model_copy(update={"robot": mount})
-    reference, robot = CollisionReference(cell), Robot(tool[0])
+    reference, robot = MeshReference(cell), Robot(tool[0])
     capsules = shapes.load_robot_capsules(*tool)
     n = 6000 if tool == shapes.SMALL_TOOL else 2000
     q = np.random.default_rng(7).uniform(cell.robot.q_min, cell.robot.q_max, (n, 6))

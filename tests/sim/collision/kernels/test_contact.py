@@ -6,11 +6,11 @@ import pytest
 from app.sim.cells.cell import Cell, load_cell
 from app.sim.collision.contact import clearance, contact
 from app.sim.collision.fcl_recheck import Recheck, Trajectory
-from app.sim.collision.fcl_reference import CollisionReference
 from app.sim.human import model as human
 from app.sim.robot.kernels.joints import JointPath
 from app.sim.robot.ur10 import Robot
 from app.sim.scene.scene import NO_CYLINDERS, arm_of, people_of, with_people
+from tests.sim.mesh_reference import MeshReference
 
 SUBSTEPS = 50
 """Rows per period of 50 ms: the referee looks every millisecond."""
@@ -57,7 +57,6 @@ class Period:
         return Trajectory(
             q_robot=self.q + self.qd * x + self.c * x**2,
             q_human=self.human0 + (self.human1 - self.human0) * x / self.dt,
-            dt=self.dt / n,
         )
 
 
@@ -80,7 +79,7 @@ def test_sweep_is_never_later_than_the_meshes_at_millisecond_substeps(
 
 
 def test_pose_test_reports_every_contact_of_the_meshes_in_random_postures(cell: Cell) -> None:
-    rng, arm, reference = np.random.default_rng(62), arm_of(cell), CollisionReference(cell)
+    rng, arm, reference = np.random.default_rng(62), arm_of(cell), MeshReference(cell)
     people, kinds = people_of(cell), {"human": 0, "cell": 0, "self": 0}
     for _ in range(1500):
         q = rng.uniform(arm.limits.q_min, arm.limits.q_max)
@@ -100,12 +99,12 @@ def test_pose_test_reports_every_contact_of_the_meshes_in_random_postures(cell: 
 
 def test_clearance_is_that_of_hulls_less_what_capsules_add(cell: Cell) -> None:
     rng, robot, arm = np.random.default_rng(63), Robot(), arm_of(cell)
-    reference, people, gaps = CollisionReference(cell, "hull"), people_of(cell), []
+    reference, people, gaps = MeshReference(cell, "hull"), people_of(cell), []
     for _ in range(150):
         period = Period(cell, rng, robot, 1.0)
         free = clearance(arm, people, period.q, period.human0[None], NO_CYLINDERS).people_m
         if free > 0.0:
-            gaps.append(reference.distance(period.q, period.human0).value - free)
+            gaps.append(reference.distance(period.q, period.human0) - free)
     assert len(gaps) > 50
     assert min(gaps) > -0.02
     assert np.mean(gaps) < EARLY
@@ -116,7 +115,7 @@ def test_standing_still_at_home_reports_no_contact_and_the_distance(cell: Cell) 
     human_q = human.rest_posture(*cell.human.home)[None]
     found = contact(arm, people, JointPath(arm.home, zero, zero, zero), (human_q, human_q))
     assert found.kind == "none"
-    hull = CollisionReference(cell, "hull").distance(arm.home, human_q[0]).value
+    hull = MeshReference(cell, "hull").distance(arm.home, human_q[0])
     assert found.clearance_m <= hull < found.clearance_m + EARLY
 
 

@@ -42,7 +42,7 @@ def state(cell: Cell) -> dict[str, np.ndarray]:
         "qd": rng.uniform(-0.5, 0.5, 6) * [1, 1, 1, 1, 1, 0],
         "human_q": person + rng.normal(0, 0.1, 18),
         "human_qd": rng.normal(0, 0.5, 18),
-        "goals": cell.positions(),
+        "goals": np.array([station.position for station in cell.stations]),
     }
 
 
