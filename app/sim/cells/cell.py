@@ -15,7 +15,6 @@ from functools import cache, cached_property
 from importlib import resources
 from typing import Any, Self
 
-import numpy as np
 from pydantic import Field, ValidationError
 
 from app.errors import CheckpointMismatch, InvalidInput, NotFound
@@ -38,6 +37,7 @@ LIMITS = {"stations": 128, "obstacles": 32, "people": 4}
 """Longest list of each name."""
 MAX_TARGETS = 2000
 """Most grid points of a goal region."""
+_SHIPPED = resources.files("app.sim.cells") / "data"
 
 
 class Cell(CellData):
@@ -75,16 +75,15 @@ class Cell(CellData):
         Raises:
             NotFound: The cell has no worker.
         """
-        for person in self.workers:
-            return person
-        raise NotFound("worker in the cell", self.name)
+        if not self.workers:
+            raise NotFound("worker in the cell", self.name)
+        return self.workers[0]
 
     @property
     def body(self) -> Vec:
         """Size of the first worker as kernels take it [m], shape (12,); median where none."""
-        for person in self.workers:
-            return person.size.vector(self.floor_z)
-        return MEDIAN.vector(self.floor_z)
+        size = self.workers[0].size if self.workers else MEDIAN
+        return size.vector(self.floor_z)
 
     @property
     def station_ids(self) -> tuple[str, ...]:
@@ -99,11 +98,6 @@ class Cell(CellData):
     def stations_of(self, kind: str) -> tuple[Station, ...]:
         """Return the stations of one kind, in order."""
         return tuple(station for station in self.stations if station.kind == kind)
-
-    def positions(self) -> Vec:
-        """Return the stations' positions [m], shape (n_stations, 3)."""
-        rows = [station.position for station in self.stations]
-        return np.array(rows, dtype=np.float64).reshape(-1, 3)
 
     def station(self, name: str) -> Station:
         """Return one station by id.
@@ -136,11 +130,7 @@ class Cell(CellData):
 
 
 def require_cell(cell: Cell, name: str, sha256: str) -> None:
-    """Raise unless a policy was trained in this cell.
-
-    Args:
-        cell: Work cell in which the policy acts.
-        sha256: Identity of that cell's content.
+    """Raise unless a policy trained in the cell of a name and content acts in this cell.
 
     Raises:
         CheckpointMismatch: It was trained in another cell, or before the cell was changed.
@@ -172,9 +162,10 @@ def lacks_for_pick(cell: Cell) -> str | None:
     A cell describes one worker; presets and arguments of environments set the number and kinds
     of people, 0 to 4. Fixed obstacles are not observed: a policy learns their positions.
     """
-    if len(cell.people) != 1 or not cell.workers:
-        return lacks_for_pick_episodes(cell) or "needs exactly one person, of kind worker"
-    return lacks_for_pick_episodes(cell)
+    lack = lacks_for_pick_episodes(cell)
+    if lack is None and (len(cell.people) != 1 or not cell.workers):
+        return "needs exactly one person, of kind worker"
+    return lack
 
 
 def lacks_for_reach(cell: Cell) -> str | None:
@@ -189,14 +180,8 @@ def lacks_for_reach(cell: Cell) -> str | None:
 @cache
 def cell_names() -> tuple[str, ...]:
     """Return the names of the shipped cells."""
-    folder = resources.files("app.sim.cells") / "data"
-    return tuple(
-        sorted(
-            entry.name.removesuffix(".json")
-            for entry in folder.iterdir()
-            if entry.name.endswith(".json")
-        )
-    )
+    names = [entry.name for entry in _SHIPPED.iterdir()]
+    return tuple(sorted(one.removesuffix(".json") for one in names if one.endswith(".json")))
 
 
 @cache
@@ -208,8 +193,7 @@ def load_cell(name: str = "pick-and-place") -> Cell:
     """
     if name not in cell_names():
         raise NotFound("cell", name, cell_names())
-    text = (resources.files("app.sim.cells") / "data" / f"{name}.json").read_text("utf-8")
-    return Cell.model_validate_json(text)
+    return Cell.model_validate_json((_SHIPPED / f"{name}.json").read_text("utf-8"))
 
 
 def parse_definition(definition: object) -> Cell:

@@ -48,8 +48,8 @@ class RobotCapsules:
 def tool_capsule(tool_length: float, tool_radius: float) -> tuple[Vec, Vec]:
     """Return the ends of the tool's segment in the frame of wrist_3_link [m], shape (3,) each.
 
-    The tool extends from the flange to the tcp, ``tool_length`` along z of ``tool0``; its round
-    end touches the tcp.
+    The tool extends from the flange to the tcp, ``tool_length`` [m] along z of ``tool0``; its
+    round end, of ``tool_radius`` [m], touches the tcp.
     """
     flange = Robot(tool_length).lengths().flange * TOOL_AXIS
     reach = max(tool_length - tool_radius, 0.0)
@@ -58,15 +58,7 @@ def tool_capsule(tool_length: float, tool_radius: float) -> tuple[Vec, Vec]:
 
 @lru_cache(maxsize=8)
 def load_robot_capsules(tool_length: float = 0.12, tool_radius: float = 0.04) -> RobotCapsules:
-    """Read the fitted capsules and add the tool.
-
-    Args:
-        tool_length: Distance from flange to tcp [m].
-        tool_radius: Radius of the tool [m].
-
-    Returns:
-        The capsules, the tool last; the arrays are read-only.
-    """
+    """Return the fitted capsules and the tool's, last; the arrays are read-only."""
     rows = json.loads(CAPSULE_FILE.read_text())["capsules"]
     start, end = tool_capsule(tool_length, tool_radius)
     p0 = np.array([*(row["p0"] for row in rows), start])
@@ -122,12 +114,8 @@ LEVERS = (1.4432, 1.4319, 0.8199, 0.2476, 0.2123, 0.0469)
 def levers(tool_length: float = 0.12, tool_radius: float = 0.04) -> Vec:
     """Return the largest distance of the robot from each joint's axis [m], shape (6,).
 
-    A point moves at most at the sum of joint speeds times levers. A longer or thicker tool adds
-    its excess; the last joint turns the tool about itself.
-
-    Args:
-        tool_length: Distance from flange to tcp [m].
-        tool_radius: Radius of the tool [m].
+    A point moves at most at the sum of joint speeds times levers. A longer or thicker tool [m]
+    adds its excess; the last joint turns the tool about itself.
     """
     longer, thicker = max(tool_length - 0.12, 0.0), max(tool_radius - 0.04, 0.0)
     return np.array(LEVERS) + longer * np.array([1.0, 1.0, 1.0, 1.0, 1.0, 0.0]) + thicker
