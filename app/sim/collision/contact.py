@@ -2,6 +2,10 @@
 
 The same kernels as those of the batches (``kernels/contact.py``), so that reports agree with
 training.
+
+People are given by ``human_q``, the workers' joints [m, rad], shape (W, 18); ``cylinders``, the
+walkers' x, y and radius [m], shape (C, 3); and ``sizes``, the workers' sizes [m], shape
+(W, body.N_SIZE), or None for the cell's person.
 """
 
 from dataclasses import dataclass
@@ -61,16 +65,8 @@ class Clearance:
 def clearance(
     arm: Arm, people: People, q: Vec, human_q: Vec, cylinders: Vec, sizes: Vec | None = None
 ) -> Clearance:
-    """Return the distances of the robot at ``q``.
-
-    Args:
-        q: Joint positions [rad], shape (6,).
-        human_q: The workers' joints [m, rad], shape (W, 18).
-        cylinders: The walkers' x, y and radius [m], shape (C, 3).
-        sizes: The workers' sizes [m], shape (W, body.N_SIZE); None for the cell's person.
-    """
-    robot = arm_kernel.new_robot_pose(arm)
-    arm_kernel.place_robot(arm, as_kernel_array(q), robot)
+    """Return the distances of the robot at joint positions ``q`` [rad], shape (6,)."""
+    robot = _robot_at(arm, q)
     geometry = people_geometry_of(people, human_q, cylinders, sizes)
     to_people, to_cell, to_self = kernel.clearances(arm, people, robot, geometry)
     return Clearance(people_m=to_people, cell_m=to_cell, self_m=to_self)
@@ -88,10 +84,9 @@ def contact(
 
     Args:
         path: The robot's path in the period.
-        human_q: The workers' joints at start and end [m, rad], shape (W, 18) each.
-        cylinders: The walkers' x, y, radius at start and end [m], shape (C, 3) each.
-        sizes: The workers' sizes [m], shape (W, body.N_SIZE), or those at start and end where
-            pelvis or lengths change; None for the cell's person.
+        human_q: The workers at start and end.
+        cylinders: The walkers at start and end.
+        sizes: The workers' sizes, or those at start and end where pelvis or lengths change.
 
     Raises:
         SimulationError: A number is NaN or infinite.
@@ -100,15 +95,8 @@ def contact(
     require_finite("q, qd, c, d", np.concatenate(path))
     require_finite("human_q", np.concatenate(human_q))
     require_finite("cylinders", np.concatenate(cylinders))
-    path = JointPath(
-        as_kernel_array(path.q),
-        as_kernel_array(path.qd),
-        as_kernel_array(path.c),
-        as_kernel_array(path.d),
-    )
-    q0, qd0, c, d = path
-    robot = arm_kernel.new_robot_pose(arm)
-    arm_kernel.place_robot(arm, q0, robot)
+    q0, qd0, c, d = path = JointPath(*map(as_kernel_array, path))
+    robot = _robot_at(arm, q0)
     geometry = people_geometry_of(people, human_q[0], cylinders[0], before)
     geometry.pelvis_z[:] = geometry.size[:, PELVIS_Z]
     geometry.q0[:], geometry.cylinders0[:] = human_q[0], cylinders[0]
@@ -136,19 +124,11 @@ def contact(
 
 
 def worker_distances(arm: Arm, people: People, q: Vec, human_q: Vec, sizes: Vec) -> Vec:
-    """Return the distance of the robot at ``q`` to each worker [m], shape (W,).
-
-    Args:
-        people: Shared data of W workers.
-        q: Joint positions [rad], shape (6,).
-        human_q: The workers' joints [m, rad], shape (W, 18).
-        sizes: Their sizes [m], shape (W, body.N_SIZE).
-    """
+    """Return the distance of the robot at ``q`` [rad] to each worker [m], shape (W,)."""
     n_workers = len(human_q)
     if n_workers == 0:
         return np.zeros(0)
-    robot = arm_kernel.new_robot_pose(arm)
-    arm_kernel.place_robot(arm, as_kernel_array(q), robot)
+    robot = _robot_at(arm, q)
     geometry = people_geometry_of(people, human_q, NO_CYLINDERS, sizes)
     capsule_clearances(robot.columns, geometry.columns, geometry.gap)
     parts = geometry.gap[: n_workers * N_CAPSULES].reshape(n_workers, N_CAPSULES)
@@ -156,21 +136,16 @@ def worker_distances(arm: Arm, people: People, q: Vec, human_q: Vec, sizes: Vec)
 
 
 def pedestrian_distances(arm: Arm, people: People, q: Vec, cylinders: Vec) -> Vec:
-    """Return the distance of the robot at ``q`` to each walking cylinder [m], shape (C,).
+    """Return the distance of the robot at ``q`` [rad] to each walker [m], shape (C,)."""
+    columns, top = _robot_at(arm, q).columns, people.top_z
+    found = [cylinder_clearance(columns, 0, x, y, r, top)[0] for x, y, r in cylinders]
+    return np.array(found)
 
-    Args:
-        people: Shared data with the height of cylinders.
-        q: Joint positions [rad], shape (6,).
-        cylinders: x, y and radius of each [m], shape (C, 3).
-    """
+
+def _robot_at(arm: Arm, q: Vec) -> arm_kernel.RobotPose:
     robot = arm_kernel.new_robot_pose(arm)
     arm_kernel.place_robot(arm, as_kernel_array(q), robot)
-    return np.array(
-        [
-            cylinder_clearance(robot.columns, 0, x, y, r, people.top_z)[0]
-            for x, y, r in cylinders
-        ]
-    )
+    return robot
 
 
 def _who(
