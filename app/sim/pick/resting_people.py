@@ -51,7 +51,11 @@ class PickTarget:
 
 @dataclass(slots=True)
 class RestingPeoplePlanner:
-    """Moves one robot while all people are at rest; :meth:`note` is called every cycle."""
+    """Moves one robot while all people are at rest; :meth:`note` is called every cycle.
+
+    ``people`` are those of this moment. ``q_over`` and ``q_grasp`` are joint positions over the
+    objects of n targets and at them [rad], shape (n, 6).
+    """
 
     arm: Arm
     """Robot in its cell."""
@@ -80,13 +84,7 @@ class RestingPeoplePlanner:
         return True
 
     def free(self, people: Shapes, grasp: GraspRules, q_over: Vec, q_grasp: Vec) -> Flags:
-        """Return which targets are as far from people as a grasp demands, shape (n,).
-
-        Args:
-            people: People at this moment.
-            q_over: Joint positions over the objects [rad], shape (n, 6).
-            q_grasp: Joint positions at the objects [rad], shape (n, 6).
-        """
+        """Return which targets are as far from people as a grasp demands, shape (n,)."""
         least = grasp.start_clearance
         beside = people.columns.tobytes(), people.cylinders.tobytes(), least
         if beside != self._beside:
@@ -108,9 +106,6 @@ class RestingPeoplePlanner:
         Those that are free, and the one whose pick has begun; all where none is left.
 
         Args:
-            people: People at this moment.
-            q_over: Joint positions over the objects [rad], shape (n, 6).
-            q_grasp: Joint positions at the objects [rad], shape (n, 6).
             begun: Index of the target whose pick has begun; None: of no target.
         """
         left = self.free(people, grasp, q_over, q_grasp)
@@ -129,7 +124,6 @@ class RestingPeoplePlanner:
         Args:
             q: Joint positions [rad], shape (6,).
             qd: Joint speeds [rad/s], shape (6,).
-            people: People at this moment.
             target: Target and phase of the pick.
         """
         free = self.free(people, grasp, target.q_over[None], target.q_grasp[None])
@@ -146,6 +140,6 @@ class RestingPeoplePlanner:
             self._goal = target.q.copy()
             self._executor = ReplanningExecutor(self.arm, self._goal[None], settings)
         speeds = self._executor.act(q, qd, people, self._t)
-        if self._executor.report.state not in MOVING:
+        if self._executor.state not in MOVING:
             return None
         return np.asarray((speeds / self.arm.limits.qd_max)[:CONTROLLED])

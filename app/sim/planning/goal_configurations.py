@@ -51,3 +51,16 @@ def goal_configurations(
         if all(np.abs(reached - other).max() > APART for other in found):
             found.append(reached)
     return np.array(found).reshape(-1, 6)
+
+
+def goal_configurations_of(arm: Arm, goals: Vec, seed: int, spread: float) -> list[Vec]:
+    """Return :func:`goal_configurations` of each of several goals, (k, 6) each.
+
+    Args:
+        goals: Goals [m], shape (n, 3).
+        seed: Seed of the search; (seed, index) determines those of a goal.
+    """
+    return [
+        goal_configurations(arm, goal, np.random.default_rng([seed, k]), spread=spread)
+        for k, goal in enumerate(goals)
+    ]

@@ -6,8 +6,7 @@ within the time, as in the thesis' comparison) and AORRTC (Wilson et al. 2025; a
 optimal RRT-Connect). Path length is Euclidean in joint space [rad]. OMPL is used only if the
 straight motion to the nearest goal, the shortest path, is not free (AORRTC of 2.0.1 returns
 paths that do not begin at the start in that case), and with RRT-Connect only if no goal has
-such a motion. The result is a :class:`MotionPlan` with a
-named ``outcome``; only malformed numbers raise.
+such a motion. The joints beyond the controlled ones stay as they are at the start.
 
 The search ends before its budget of wall time, so that the path can be checked once more; a
 step of OMPL in progress may exceed it by a few milliseconds. With ``max_poses`` it ends after
@@ -21,7 +20,7 @@ warning about repeated seeding, is disabled.
 import threading
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -65,8 +64,8 @@ MOST_KEPT = 6
 """Paths kept from while a planner runs."""
 LONGEST_S = 3600.0
 """Greatest budget of a plan [s]."""
-MOST_DETOUR_RAD = 100.0
-"""Greatest range beyond start and goals [rad]: more than any joint has."""
+DETOUR_RAD = 1.5
+"""Range of each joint beyond start and goals [rad], within the cell's limits."""
 _SEEDING = threading.Lock()
 
 
@@ -80,10 +79,6 @@ class PlanSettings:
     """Longest wall time [s], shortening included."""
     max_poses: int | None = None
     """Number of checked poses after which planning ends instead; for repeatable plans."""
-    detour_rad: float = 1.5
-    """Range of each joint beyond start and goals [rad], within the cell's limits."""
-    n_joints: int = CONTROLLED
-    """Joints that move, from the base on; the others stay as they are at the start."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -92,14 +87,8 @@ class MotionPlan:
 
     outcome: str
     """One of OUTCOMES."""
-    planner: str
-    """Name of the planner."""
-    path: Vec
+    path: Vec = field(default_factory=lambda: np.zeros((0, 6)))
     """Configurations joined by straight motions [rad], shape (n, 6); n = 0 without a path."""
-    goal: int
-    """Index of the reached goal; -1 where none is reached."""
-    n_poses: int
-    """Number of configurations checked."""
 
     @property
     def solved(self) -> bool:
@@ -120,8 +109,7 @@ def plan(
     Args:
         checker: People, margins and the robot; people are at rest during planning.
         start: Joint positions [rad], shape (6,).
-        goals: Goal configurations, of which one is to be reached [rad], shape (k, 6); joints
-            that do not move are set to the value of the start.
+        goals: Goal configurations, of which one is to be reached [rad], shape (k, 6).
         settings: Settings of the planner.
         seed: Seed, at least 1.
 
@@ -132,28 +120,27 @@ def plan(
     _require(settings, seed)
     start, goals = _finite("start", start, 1), _finite("goals", goals, 2)
     clock = _Clock(checker, settings)
-    goals = goals.copy()
-    goals[:, settings.n_joints :] = start[settings.n_joints :]
+    goals[:, CONTROLLED:] = start[CONTROLLED:]
     low, high = planning_limits(checker, start)
     limits = checker.arm.limits
     if np.any(start < limits.q_min - SAME) or np.any(start > limits.q_max + SAME):
-        return clock.answer("start-outside-limits")
+        return MotionPlan(outcome="start-outside-limits")
     inside = np.flatnonzero(np.all((goals >= low) & (goals <= high), axis=1))
     if len(inside) == 0:
-        return clock.answer("no-goal")
+        return MotionPlan(outcome="no-goal")
     if not checker.is_free(start):
-        return clock.answer("start-in-contact")
+        return MotionPlan(outcome="start-in-contact")
     usable = np.array([k for k in inside if checker.is_free(goals[k])], dtype=np.int64)
     if len(usable) == 0:
-        return clock.answer("goal-in-contact")
+        return MotionPlan(outcome="goal-in-contact")
     order = usable[np.argsort(np.linalg.norm(goals[usable] - start, axis=1), kind="stable")]
     direct = next((n for n, k in enumerate(order) if checker.edge_free(start, goals[k])), None)
     if direct is not None:
-        straight = np.stack([start, goals[order[direct]]])
+        straight = MotionPlan(outcome="solved", path=np.stack([start, goals[order[direct]]]))
         if direct == 0 or settings.planner == "rrt-connect":
-            return clock.answer("solved", straight, goals)
+            return straight
     if not _SEEDING.acquire(timeout=clock.left_s()):
-        found = _Found("out-of-time", np.zeros((0, len(start))))
+        found = MotionPlan(outcome="out-of-time")
     else:
         try:
             ou.RNG.setSeed(seed)
@@ -162,10 +149,10 @@ def plan(
         finally:
             _SEEDING.release()
     if direct is not None and (
-        found.outcome != "solved" or path_length(found.path) > path_length(straight)
+        not found.solved or path_length(found.path) > path_length(straight.path)
     ):
-        return clock.answer("solved", straight, goals)
-    return clock.answer(found.outcome, found.path, goals)
+        return straight
+    return found
 
 
 def planning_limits(checker: Checker, start: Vec) -> tuple[Vec, Vec]:
@@ -206,36 +193,6 @@ class _Clock:
             return threading.TIMEOUT_MAX
         return max(0.0, self._search_s - (time.perf_counter() - self._start))
 
-    def answer(
-        self, outcome: str, path: Vec | None = None, goals: Vec | None = None
-    ) -> MotionPlan:
-        """Return the plan with the time and poses spent so far.
-
-        Args:
-            outcome: One of OUTCOMES.
-            path: Corners of the path [rad], shape (n, 6); None without one.
-            goals: Goal configurations [rad], shape (k, 6), to name the one that was reached.
-        """
-        path = np.zeros((0, 6)) if path is None else path
-        goal = -1
-        if outcome == "solved" and goals is not None:
-            goal = int(np.argmin(np.linalg.norm(goals - path[-1], axis=1)))
-        return MotionPlan(
-            outcome=outcome,
-            planner=self._settings.planner,
-            path=path,
-            goal=goal,
-            n_poses=self._checker.n_poses - self._n0,
-        )
-
-
-@dataclass(frozen=True, slots=True)
-class _Found:
-    """Result of OMPL: one of OUTCOMES and the path [rad]."""
-
-    outcome: str
-    path: Vec
-
 
 class _Query:
     """One query in OMPL's terms; lives as long as its plan.
@@ -255,44 +212,45 @@ class _Query:
         ou.noOutputHandler()
         self._checker, self._settings, self._clock = checker, settings, clock
         self._start, self._goals = start, goals
-        n = settings.n_joints
-        self._read = _reader(start, n)
+        self._read = _reader(start)
         self._kept: list[tuple[float, Vec]] = []
-        every = np.vstack([start, goals])[:, :n]
-        low = np.maximum(limits[0][:n], every.min(axis=0) - settings.detour_rad)
-        high = np.minimum(limits[1][:n], every.max(axis=0) + settings.detour_rad)
-        space = ob.RealVectorStateSpace(n)
-        bounds = ob.RealVectorBounds(n)
-        for j in range(n):
+        every = np.vstack([start, goals])[:, :CONTROLLED]
+        low = np.maximum(limits[0][:CONTROLLED], every.min(axis=0) - DETOUR_RAD)
+        high = np.minimum(limits[1][:CONTROLLED], every.max(axis=0) + DETOUR_RAD)
+        space = ob.RealVectorStateSpace(CONTROLLED)
+        bounds = ob.RealVectorBounds(CONTROLLED)
+        for j in range(CONTROLLED):
             bounds.setLow(j, float(low[j]))
             bounds.setHigh(j, float(high[j]))
         space.setBounds(bounds)
         self._info = ob.SpaceInformation(space)
         _set_checks(self._info, checker, clock, self._read)
         self._problem = ob.ProblemDefinition(self._info)
-        self._problem.addStartState(_state(space, start, n))
+        self._problem.addStartState(_state(space, start))
         states = ob.GoalStates(self._info)
         for goal in goals:
-            states.addState(_state(space, goal, n))
+            states.addState(_state(space, goal))
         self._problem.setGoal(states)
         self._problem.setOptimizationObjective(ob.PathLengthOptimizationObjective(self._info))
 
-    def solve(self) -> _Found:
+    def solve(self) -> MotionPlan:
         """Run the planner, then shorten its path."""
         anytime = self._settings.planner != "rrt-connect"
         share = 1.0 - SHORTEN_SHARE if anytime else 1.0
-        algorithm = self._algorithm()
+        kinds = {"rrt-connect": og.RRTConnect, "rrt-star": og.RRTstar, "aorrtc": og.AORRTC}
+        algorithm = kinds[self._settings.planner](self._info)
+        algorithm.setRange(RANGE_RAD)
         algorithm.setProblemDefinition(self._problem)
         algorithm.setup()
         algorithm.solve(ob.PlannerTerminationCondition(lambda: self._watch(share)))
         found = self._problem.getSolutionPath()
         if found is None:
-            return _Found("out-of-time", np.zeros((0, 6)))
+            return MotionPlan(outcome="out-of-time")
         if not self._problem.hasExactSolution():
             path = self._rows(found)
             if path_length(path) <= SAME or not self._checker.path_free(path):
-                return _Found("out-of-time", np.zeros((0, 6)))
-            return _Found("approximate", path)
+                return MotionPlan(outcome="out-of-time")
+            return MotionPlan(outcome="approximate", path=path)
         self._keep(found)
         if found.getStateCount() > 2 and not self._clock.over():
             over = ob.PlannerTerminationCondition(self._clock.over)
@@ -301,8 +259,8 @@ class _Query:
         for _, path in sorted(self._kept, key=lambda kept: kept[0]):
             # Ours is the last word: AORRTC may also end with a path of length 0 at the start.
             if self._reaches(path) and self._checker.path_free(path):
-                return _Found("solved", path)
-        return _Found("out-of-time", np.zeros((0, 6)))
+                return MotionPlan(outcome="solved", path=path)
+        return MotionPlan(outcome="out-of-time")
 
     def _watch(self, share: float) -> bool:
         """Return whether the planner's part of the budget is spent; keep the path found.
@@ -327,26 +285,20 @@ class _Query:
         path = self._rows(found)
         self._kept = [*self._kept[-MOST_KEPT:], (path_length(path), path)]
 
-    def _algorithm(self) -> Any:
-        kinds = {"rrt-connect": og.RRTConnect, "rrt-star": og.RRTstar, "aorrtc": og.AORRTC}
-        algorithm = kinds[self._settings.planner](self._info)
-        algorithm.setRange(RANGE_RAD)
-        return algorithm
-
     def _rows(self, found: Any) -> Vec:
         rows = [self._read(found.getState(k)) for k in range(found.getStateCount())]
         return np.array(rows).reshape(-1, 6)
 
 
-def _reader(start: Vec, n: int) -> Callable[[Any], Vec]:
+def _reader(start: Vec) -> Callable[[Any], Vec]:
     """Return the function that reads an OMPL state as joint positions [rad], shape (6,)."""
-    rest = start[n:].tolist()
-    return lambda state: np.array([*state[0:n], *rest])
+    rest = start[CONTROLLED:].tolist()
+    return lambda state: np.array([*state[0:CONTROLLED], *rest])
 
 
-def _state(space: Any, q: Vec, n: int) -> Any:
+def _state(space: Any, q: Vec) -> Any:
     state = space.allocState()
-    for j in range(n):
+    for j in range(CONTROLLED):
         state[j] = float(q[j])
     return state
 
@@ -380,10 +332,5 @@ def _require(settings: PlanSettings, seed: int) -> None:
         raise InvalidInput("budget_s", settings.budget_s, rule)
     if settings.max_poses is not None and settings.max_poses < 1:
         raise InvalidInput("max_poses", settings.max_poses, "must be at least 1")
-    if not 0.0 <= settings.detour_rad <= MOST_DETOUR_RAD:
-        rule = f"must lie in [0, {MOST_DETOUR_RAD:g}] rad"
-        raise InvalidInput("detour_rad", settings.detour_rad, rule)
-    if not 1 <= settings.n_joints <= 6:
-        raise InvalidInput("n_joints", settings.n_joints, "must be between 1 and 6")
     if seed < 1:
         raise InvalidInput("seed", seed, "must be at least 1")

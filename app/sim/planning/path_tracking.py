@@ -17,7 +17,8 @@ spans two segments, a few milliradians at most. The bounded actions
 import numpy as np
 
 from app.sim.core.arrays import Vec
-from app.sim.planning.time_parameterization import TimedPath, TimingLimits, stop_periods
+from app.sim.planning.time_parameterization import TimedPath, stop_periods
+from app.sim.robot.kernels.arm import Arm
 
 GAIN = 0.3
 """Share of the position error that is corrected per period; ours."""
@@ -30,8 +31,8 @@ ON_PLAN = 1e-7
 class PathFollower:
     """The follower of one timed path."""
 
-    def __init__(self, timed: TimedPath, limits: TimingLimits) -> None:
-        self.timed, self._limits = timed, limits
+    def __init__(self, timed: TimedPath, arm: Arm) -> None:
+        self.timed, self._limits = timed, arm.limits
         self.place = 0.0
         """Place of the robot on the path, as the path's own time [s]."""
         self._expected = 0.0
@@ -109,7 +110,7 @@ class PathFollower:
         return min(1.0, max(0.0, float(speed @ qd) / square))
 
 
-def straight_stop(qd: Vec, limits: TimingLimits) -> Vec:
+def straight_stop(qd: Vec, arm: Arm) -> Vec:
     """Return the joint speeds after one period of a straight stop [rad/s], shape (6,)."""
-    n = stop_periods(qd, limits)
+    n = stop_periods(qd, arm)
     return np.asarray(qd * (1.0 - 1.0 / n)) if n > 1 else np.zeros(6)

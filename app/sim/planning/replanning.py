@@ -15,7 +15,6 @@ current state ends; the timed motion turns toward them without standing still wh
 """
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -25,13 +24,14 @@ from app.sim.collision.checker import Checker, Shapes
 from app.sim.core.arrays import Vec, as_kernel_array
 from app.sim.planning.ompl_planners import MotionPlan, PlanSettings, plan
 from app.sim.planning.path_tracking import PathFollower, straight_stop
-from app.sim.planning.time_parameterization import TimingLimits, stopping_point, time_free_path
+from app.sim.planning.time_parameterization import stopping_point, time_free_path
 from app.sim.robot.kernels import acceleration_bounds
 from app.sim.robot.kernels.arm import Arm
 from app.sim.robot.kernels.joints import JointState
 
 REPLAN_BUDGET_S = {"plan-once": 0.0, "replan-on-blocked": 0.2, "replan-every-cycle": 0.02}
 """Budget of later plans by role [s]; ours."""
+ROLES = tuple(REPLAN_BUDGET_S)
 REDUCTION = 0.005
 """Reduction of the margin below the current clearance, if that is below the margin [m], so that
 the robot can leave."""
@@ -59,29 +59,11 @@ class ReplanningSettings:
     """Distance at which people block the path [m]."""
 
 
-@dataclass(slots=True, kw_only=True)
-class ReplanningReport:
-    """Report of an executor, updated every period."""
-
-    state: str = "waiting"
-    """``waiting`` (no plan, at rest or braking), ``following``, ``braking`` (path
-    blocked), ``arrived``, or ``lost`` (farther from the path than LOST_RAD, braking)."""
-    outcome: str = ""
-    """Outcome of the last plan, one of ``ompl_planners.OUTCOMES``; empty before the first."""
-    n_plans: int = 0
-    """Number of plans."""
-    n_changes: int = 0
-    """Switches to a new path."""
-    blocked_s: float = 0.0
-    """Time braking or at rest because the path was blocked [s]."""
-    margin: float = 0.0
-    """Margin of the last plan [m], reduced where the robot was nearer to people."""
-    error_rad: float = 0.0
-    """Greatest distance from the path so far [rad]."""
-
-
 class ReplanningExecutor:
     """Planner with the interface of a policy: state and people in, target joint speeds out.
+
+    In all methods ``q`` and ``qd`` are joint positions [rad] and speeds [rad/s], shape (6,),
+    ``people`` those of this moment, and ``t`` is the time since the start [s].
 
     Args:
         arm: From ``scene.arm_of``.
@@ -97,80 +79,59 @@ class ReplanningExecutor:
         self, arm: Arm, goals: Vec, settings: ReplanningSettings, seed: int = 1
     ) -> None:
         if settings.role not in ROLES:
-            raise InvalidInput("role", settings.role, "is not known", tuple(ROLES))
+            raise InvalidInput("role", settings.role, "is not known", ROLES)
         self.arm, self.goals, self.settings, self.seed = arm, goals, settings, seed
-        self.limits = TimingLimits(
-            qd_max=arm.limits.qd_max, qdd_max=arm.limits.qdd_max, dt=arm.dt
-        )
-        self.report = ReplanningReport(margin=settings.margin)
+        self.state = "waiting"
+        """``waiting`` (no plan, at rest or braking), ``following``, ``braking`` (path
+        blocked), ``arrived``, or ``lost`` (farther from the path than LOST_RAD, braking)."""
+        self.outcome = ""
+        """Outcome of the last plan, one of ``ompl_planners.OUTCOMES``."""
+        self.n_plans = 0
+        """Number of plans."""
+        self.error_rad = 0.0
+        """Greatest distance from the path so far [rad]."""
         self.path_follower: PathFollower | None = None
         self.blocked = False
         self.pending: tuple[float, MotionPlan] | None = None
         self.next_check = -math.inf
 
     def act(self, q: Vec, qd: Vec, people: Shapes, t: float) -> Vec:
-        """Return the target joint speeds after this period [rad/s], shape (6,).
-
-        Args:
-            q: Joint positions [rad], shape (6,).
-            qd: Joint speeds [rad/s], shape (6,).
-            people: People at this moment.
-            t: Time since the start [s].
-        """
-        if self.report.n_plans == 0:
-            first = self.plan_from(
-                people, stopping_point(q, qd, self.limits), self.settings.plan
-            )
+        """Return the target joint speeds after this period [rad/s], shape (6,)."""
+        if self.n_plans == 0:
+            first = self.plan_from(people, stopping_point(q, qd, self.arm), self.settings.plan)
             self.turn_to(first, q, qd, people)
         if self.path_follower is not None:
             self.path_follower.locate(q)
-            self.report.error_rad = max(self.report.error_rad, self.path_follower.error_rad)
-        ROLES[self.settings.role](self, q, qd, people, t)
+            self.error_rad = max(self.error_rad, self.path_follower.error_rad)
+        if self.settings.role == "replan-on-blocked" and self.state != "arrived":
+            self._replan_on_blocked(q, qd, people, t)
+        elif self.settings.role == "replan-every-cycle" and self.state != "arrived":
+            self._replan_every_cycle(q, qd, people, t)
         return self._order(q, qd)
 
     def plan_from(self, people: Shapes, start: Vec, settings: PlanSettings) -> MotionPlan:
         """Plan from a configuration at rest [rad], shape (6,), among the current people."""
-        margin = self.settings.margin + EXTRA_MARGIN
-        checker = self.checker(people, start, margin)
-        answer = plan(checker, start, self.goals, settings, self.seed + self.report.n_plans)
-        report = self.report
-        report.outcome, report.margin = answer.outcome, checker.margin
-        report.n_plans += 1
+        checker = self.checker(people, start, self.settings.margin + EXTRA_MARGIN)
+        answer = plan(checker, start, self.goals, settings, self.seed + self.n_plans)
+        self.outcome = answer.outcome
+        self.n_plans += 1
         return answer
 
     def replan(self, people: Shapes, q: Vec, qd: Vec, t: float) -> None:
-        """Plan from the end of a straight stop; the plan is used after the budget.
-
-        Args:
-            people: People at this moment.
-            q: Joint positions [rad], shape (6,).
-            qd: Joint speeds [rad/s], shape (6,).
-            t: Time since the start [s].
-        """
+        """Plan from the end of a straight stop; the plan is used after the budget."""
         budget = REPLAN_BUDGET_S[self.settings.role]
         later = replace(self.settings.plan, budget_s=budget)
-        answer = self.plan_from(people, stopping_point(q, qd, self.limits), later)
+        answer = self.plan_from(people, stopping_point(q, qd, self.arm), later)
         if answer.solved:
             self.pending = (t + max(budget, self.arm.dt), answer)
 
     def checker(self, people: Shapes, q: Vec, margin: float) -> Checker:
-        """Return the checker for a margin, reduced where the robot is nearer to people.
-
-        Args:
-            people: People at this moment.
-            q: Joint positions [rad], shape (6,).
-            margin: Distance to people [m].
-        """
+        """Return the checker for a margin [m], reduced where the robot is nearer to people."""
         clearance = Checker(self.arm, people).clearance(q).people_m
         return Checker(self.arm, people, max(0.0, min(margin, clearance - REDUCTION)))
 
     def is_blocked(self, people: Shapes, q: Vec) -> bool:
-        """Return whether people are nearer to the rest of the path than the margin.
-
-        Args:
-            people: People at this moment.
-            q: Joint positions [rad], shape (6,).
-        """
+        """Return whether people are nearer to the rest of the path than the margin."""
         if self.path_follower is None:
             return True
         checker = self.checker(people, q, self.settings.margin)
@@ -184,100 +145,70 @@ class ReplanningExecutor:
 
         Args:
             answer: Plan from the configuration where the robot was to stop.
-            q: Joint positions [rad], shape (6,).
-            qd: Joint speeds [rad/s], shape (6,).
-            people: People at this moment.
             within_s: Longest duration of the motion [s].
         """
         if not answer.solved:
             return False
-        stop = stopping_point(q, qd, self.limits)
+        stop = stopping_point(q, qd, self.arm)
         checker = self.checker(people, stop, self.settings.margin)
         for rest in (answer.path[1:], answer.path):
             path = np.vstack([stop, rest])
             if checker.path_free(path):
-                timed = time_free_path(checker, path, self.limits, qd)
+                timed = time_free_path(checker, path, qd)
                 if timed is None or timed.duration > within_s:
                     return False
-                self.path_follower, self.blocked = PathFollower(timed, self.limits), False
-                self.report.n_changes += 1
+                self.path_follower, self.blocked = PathFollower(timed, self.arm), False
                 return True
         return False
 
     def _order(self, q: Vec, qd: Vec) -> Vec:
         """Return the target speeds for the present state of the executor."""
-        report, path_follower = self.report, self.path_follower
+        path_follower = self.path_follower
         if path_follower is None:
-            report.state = "waiting"
-            return straight_stop(qd, self.limits)
+            self.state = "waiting"
+            return straight_stop(qd, self.arm)
         if path_follower.error_rad > LOST_RAD:
-            report.state, self.path_follower = "lost", None
-            return straight_stop(qd, self.limits)
+            self.state, self.path_follower = "lost", None
+            return straight_stop(qd, self.arm)
         near = float(np.abs(q - path_follower.timed.q[-1]).max()) <= ARRIVED_RAD
         if near and float(np.abs(qd).max()) <= ARRIVED_RAD:
-            report.state = "arrived"
+            self.state = "arrived"
         else:
-            report.state = "braking" if self.blocked else "following"
-        if report.state == "braking":
-            report.blocked_s += self.arm.dt
-        return path_follower.target_speeds(q, qd, brake=report.state == "braking")
+            self.state = "braking" if self.blocked else "following"
+        return path_follower.target_speeds(q, qd, brake=self.state == "braking")
 
+    def _replan_on_blocked(self, q: Vec, qd: Vec, people: Shapes, t: float) -> None:
+        """Check the rest of the path; replan if it is blocked."""
+        if self.pending is not None and t >= self.pending[0] - 1e-9:
+            answer, self.pending = self.pending[1], None
+            if self.blocked or self.path_follower is None:
+                self.turn_to(answer, q, qd, people)
+        if t < self.next_check - 1e-9:
+            return
+        self.next_check = t + CHECK_EVERY_S
+        self.blocked = self.is_blocked(people, q)
+        if self.blocked and self.pending is None:
+            self.replan(people, q, qd, t)
 
-def _once(executor: ReplanningExecutor, q: Vec, qd: Vec, people: Shapes, t: float) -> None:
-    """Keep the path."""
+    def _replan_every_cycle(self, q: Vec, qd: Vec, people: Shapes, t: float) -> None:
+        """Plan for the state after this period; switch to the plan for this one."""
+        self.blocked = self.is_blocked(people, q)
+        if self.pending is not None and t >= self.pending[0] - 1e-9:
+            answer, self.pending = self.pending[1], None
+            left = math.inf
+            if self.path_follower is not None and not self.blocked:
+                left = self.path_follower.remaining * (1.0 - BETTER_SHARE)
+            self.turn_to(answer, q, qd, people, left)
+        if self.pending is None:
+            self.replan(people, *self._after_period(q, qd), t)
 
-
-def _on_blocked(
-    executor: ReplanningExecutor, q: Vec, qd: Vec, people: Shapes, t: float
-) -> None:
-    """Check the rest of the path; replan if it is blocked."""
-    if executor.report.state == "arrived":
-        return
-    if executor.pending is not None and t >= executor.pending[0] - 1e-9:
-        answer, executor.pending = executor.pending[1], None
-        if executor.blocked or executor.path_follower is None:
-            executor.turn_to(answer, q, qd, people)
-    if t < executor.next_check - 1e-9:
-        return
-    executor.next_check = t + CHECK_EVERY_S
-    executor.blocked = executor.is_blocked(people, q)
-    if executor.blocked and executor.pending is None:
-        executor.replan(people, q, qd, t)
-
-
-def _every_cycle(
-    executor: ReplanningExecutor, q: Vec, qd: Vec, people: Shapes, t: float
-) -> None:
-    """Plan for the state after this period; switch to the plan for this one."""
-    if executor.report.state == "arrived":
-        return
-    executor.blocked = executor.is_blocked(people, q)
-    if executor.pending is not None and t >= executor.pending[0] - 1e-9:
-        answer, executor.pending = executor.pending[1], None
-        left = math.inf
-        if executor.path_follower is not None and not executor.blocked:
-            left = executor.path_follower.remaining * (1.0 - BETTER_SHARE)
-        executor.turn_to(answer, q, qd, people, left)
-    if executor.pending is None:
-        after_q, after_qd = _after_period(executor, q, qd)
-        executor.replan(people, after_q, after_qd, t)
-
-
-def _after_period(executor: ReplanningExecutor, q: Vec, qd: Vec) -> tuple[Vec, Vec]:
-    """Return positions [rad] and speeds [rad/s] after this period without a safety layer."""
-    arm, path_follower = executor.arm, executor.path_follower
-    if path_follower is None:
-        wanted = straight_stop(qd, executor.limits)
-    else:
-        wanted = path_follower.target_speeds(q, qd, brake=executor.blocked)
-    end = JointState(np.empty(6), np.empty(6), np.empty(6))
-    start = JointState(as_kernel_array(q), as_kernel_array(qd), np.zeros(6))
-    acceleration_bounds.advance_to_speeds(arm.limits, arm.dt, start, wanted, np.empty(6), end)
-    return end.q, end.qd
-
-
-ROLES: dict[str, Callable[[ReplanningExecutor, Vec, Vec, Shapes, float], None]] = {
-    "plan-once": _once,
-    "replan-on-blocked": _on_blocked,
-    "replan-every-cycle": _every_cycle,
-}
+    def _after_period(self, q: Vec, qd: Vec) -> tuple[Vec, Vec]:
+        """Return positions and speeds after this period without a safety layer."""
+        if self.path_follower is None:
+            wanted = straight_stop(qd, self.arm)
+        else:
+            wanted = self.path_follower.target_speeds(q, qd, brake=self.blocked)
+        start = JointState(as_kernel_array(q), as_kernel_array(qd), np.zeros(6))
+        end, limits, dt = JointState(*np.empty((3, 6))), self.arm.limits, self.arm.dt
+        acceleration_bounds.advance_to_speeds(limits, dt, start, wanted, np.empty(6), end)
+        return end.q, end.qd

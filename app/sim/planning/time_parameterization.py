@@ -29,6 +29,7 @@ import numpy as np
 from app.errors import InvalidInput
 from app.sim.collision.checker import Checker
 from app.sim.core.arrays import Vec
+from app.sim.robot.kernels.arm import Arm
 
 SAME = 1e-9
 """Corners nearer than this are one [rad]."""
@@ -46,8 +47,6 @@ class TimedPath:
     """Joint speeds at the knots [rad/s], shape (n + 1, 6); the last are 0."""
     corner_rad: float
     """Largest distance of the motion from the path at corners, per joint [rad]."""
-    n_stops: int
-    """Corners at which it stops."""
 
     @property
     def n_periods(self) -> int:
@@ -84,35 +83,23 @@ class Blends(NamedTuple):
     """Periods at these speeds, n + 1."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class TimingLimits:
-    """Limits of a timed motion, per joint."""
-
-    qd_max: Vec
-    """Speed [rad/s], shape (6,)."""
-    qdd_max: Vec
-    """Acceleration [rad/s^2], shape (6,)."""
-    dt: float
-    """Control period [s]."""
-
-
-def stop_periods(qd: Vec, limits: TimingLimits) -> int:
+def stop_periods(qd: Vec, arm: Arm) -> int:
     """Return the number of periods of a straight stop from speeds [rad/s], shape (6,).
 
     All joints slow down evenly and come to rest together.
     """
-    return math.ceil(float(np.max(np.abs(qd) / (limits.qdd_max * limits.dt))) - 1e-9)
+    return math.ceil(float(np.max(np.abs(qd) / (arm.limits.qdd_max * arm.dt))) - 1e-9)
 
 
-def stopping_point(q: Vec, qd: Vec, limits: TimingLimits) -> Vec:
+def stopping_point(q: Vec, qd: Vec, arm: Arm) -> Vec:
     """Return the end of a straight stop from ``q`` [rad] and ``qd`` [rad/s] [rad], (6,)."""
-    return np.asarray(q + 0.5 * stop_periods(qd, limits) * limits.dt * qd)
+    return np.asarray(q + 0.5 * stop_periods(qd, arm) * arm.dt * qd)
 
 
 def time_path(
-    path: Vec, limits: TimingLimits, qd0: Vec | None = None, stops: frozenset[int] = frozenset()
+    path: Vec, arm: Arm, qd0: Vec | None = None, stops: frozenset[int] = frozenset()
 ) -> TimedPath:
-    """Time a path within limits, from a state in motion or at rest to rest.
+    """Time a path within the arm's limits, from a state in motion or at rest to rest.
 
     Args:
         path: Configurations joined by straight motions [rad], shape (n, 6), n >= 1. For a
@@ -133,23 +120,20 @@ def time_path(
     corners = [k for k in sorted(stops) if (0 if qd0.any() else 1) <= k < len(path) - 1]
     runs: list[TimedPath] = []
     for first, last in zip([0, *corners], [*corners, len(path) - 1], strict=True):
-        runs += _runs(path[first : last + 1], limits, np.zeros(6) if runs else qd0)
+        runs += _runs(path[first : last + 1], arm, np.zeros(6) if runs else qd0)
     return TimedPath(
-        dt=limits.dt,
+        dt=arm.dt,
         q=np.vstack([*(run.q[:-1] for run in runs[:-1]), runs[-1].q]),
         qd=np.vstack([*(run.qd[:-1] for run in runs[:-1]), runs[-1].qd]),
         corner_rad=max(run.corner_rad for run in runs),
-        n_stops=len(runs) - 1,
     )
 
 
-def time_free_path(
-    checker: Checker, path: Vec, limits: TimingLimits, qd0: Vec | None = None
-) -> TimedPath | None:
+def time_free_path(checker: Checker, path: Vec, qd0: Vec | None = None) -> TimedPath | None:
     """Time a path so that the timed motion is free too, stopping at corners where it must.
 
     Args:
-        checker: People and margins.
+        checker: Arm, people and margins.
         path: A free path; see :func:`time_path`.
         qd0: Joint speeds at the start [rad/s], shape (6,); at rest if None.
 
@@ -162,7 +146,7 @@ def time_free_path(
     for first in (frozenset[int](), frozenset({0})) if moving else (frozenset[int](),):
         stops = first
         while True:
-            timed = time_path(path, limits, qd0, stops)
+            timed = time_path(path, checker.arm, qd0, stops)
             k = checker.first_blocked(timed.q, timed.qd)
             if k == timed.n_periods:
                 break
@@ -175,53 +159,52 @@ def time_free_path(
     return best
 
 
-def _runs(path: Vec, limits: TimingLimits, qd0: Vec) -> list[TimedPath]:
+def _runs(path: Vec, arm: Arm, qd0: Vec) -> list[TimedPath]:
     """Time a path without stops between its ends, or with one at the start."""
     apart = np.abs(np.diff(path, axis=0)).max(axis=1) > SAME
     path = np.vstack([path[:1], path[1:][apart]])
     segments = np.diff(path, axis=0)
-    blends = _blends(segments, limits, qd0)
+    blends = _blends(segments, arm, qd0)
     if blends is not None:
-        return [_run(path, limits, qd0, blends)]
-    return [*_runs(path[:1], limits, qd0), *_runs(path, limits, np.zeros(6))]
+        return [_run(path, arm, qd0, blends)]
+    return [*_runs(path[:1], arm, qd0), *_runs(path, arm, np.zeros(6))]
 
 
-def _run(path: Vec, limits: TimingLimits, qd0: Vec, found: Blends) -> TimedPath:
+def _run(path: Vec, arm: Arm, qd0: Vec, found: Blends) -> TimedPath:
     """Return the knots of a path with its blends."""
     blends, speeds, cruise = found
-    q, qd = [path[0] - 0.5 * blends[0] * limits.dt * qd0], [qd0]
+    q, qd = [path[0] - 0.5 * blends[0] * arm.dt * qd0], [qd0]
     corner = 0.0
     for i, corner_q in enumerate(path):
         before, after = (qd0 if i == 0 else speeds[i - 1]), speeds[i]
-        reach = blends[i] * limits.dt
+        reach = blends[i] * arm.dt
         for k in range(1, blends[i] + 1):
-            x = k * limits.dt
+            x = k * arm.dt
             turn = (after - before) * (x * x / (2.0 * reach))
             q.append(corner_q + before * (x - 0.5 * reach) + turn)
             qd.append(before + (after - before) * (k / blends[i]))
         for k in range(1, cruise[i] + 1):
-            q.append(corner_q + after * (0.5 * reach + k * limits.dt))
+            q.append(corner_q + after * (0.5 * reach + k * arm.dt))
             qd.append(after)
         if 0 < i < len(path) - 1:
             corner = max(corner, float(np.abs(after - before).max()) * reach / 8.0)
     q[-1], qd[-1] = path[-1].copy(), np.zeros(6)
-    return TimedPath(dt=limits.dt, q=np.array(q), qd=np.array(qd), corner_rad=corner, n_stops=0)
+    return TimedPath(dt=arm.dt, q=np.array(q), qd=np.array(qd), corner_rad=corner)
 
 
-def _blends(segments: Vec, limits: TimingLimits, qd0: Vec) -> Blends | None:
+def _blends(segments: Vec, arm: Arm, qd0: Vec) -> Blends | None:
     """Return the blends of a path.
 
     Args:
         segments: The segments [rad], shape (n, 6).
-        limits: Limits of the motion.
         qd0: Joint speeds before the first corner [rad/s], shape (6,).
 
     Returns:
         None where the first segment would take longer than a stop and the path from rest.
     """
-    n, dt = len(segments), limits.dt
-    least = np.max(np.abs(segments) / limits.qd_max, axis=1, initial=0.0) / dt
-    moving = stop_periods(qd0, limits)
+    n, dt = len(segments), arm.dt
+    least = np.max(np.abs(segments) / arm.limits.qd_max, axis=1, initial=0.0) / dt
+    moving = stop_periods(qd0, arm)
     blends = np.array([moving if moving > 0 else min(n, 1), *[1] * n], dtype=np.float64)
     speeds, longest = np.zeros((n + 1, 6)), math.inf
     while True:
@@ -230,12 +213,12 @@ def _blends(segments: Vec, limits: TimingLimits, qd0: Vec) -> Blends | None:
         if n:
             speeds[:n] = segments / ((cruise + ends) * dt)[:, None]
         turns = np.diff(speeds, axis=0, prepend=qd0[None])
-        short = np.max(np.abs(turns) / (limits.qdd_max * dt), axis=1) - 1e-9 > blends
+        short = np.max(np.abs(turns) / (arm.limits.qdd_max * dt), axis=1) - 1e-9 > blends
         if not short.any():
             break
         if moving > 0 and short[0]:  # where its corner lies fixes the first blend: go slower
             if longest == math.inf:
-                longest = moving + _periods_from_rest(segments, limits)
+                longest = moving + _periods_from_rest(segments, arm)
             if cruise[0] > longest:
                 return None
             least[0] = cruise[0] + ends[0] + 1.0
@@ -244,8 +227,8 @@ def _blends(segments: Vec, limits: TimingLimits, qd0: Vec) -> Blends | None:
     return Blends([int(b) for b in blends], speeds, [*(int(m) for m in cruise), 0])
 
 
-def _periods_from_rest(segments: Vec, limits: TimingLimits) -> int:
+def _periods_from_rest(segments: Vec, arm: Arm) -> int:
     """Return the number of periods that a path takes from rest to rest."""
-    found = _blends(segments, limits, np.zeros(6))
+    found = _blends(segments, arm, np.zeros(6))
     assert found is not None  # only a start in motion slows the first segment down
     return sum(found.periods) + sum(found.cruise)

@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.sim.core.arrays import Vec
-from app.sim.planning.goal_configurations import goal_configurations
+from app.sim.planning.goal_configurations import goal_configurations_of
 from app.sim.reach.batch import ReachBatch
 from app.sim.robot.kernels.arm import Arm
 from app.sim.scenario.kernels.episode import COLLISION, RUNNING, SUCCESS, SUCCESS_DISTANCE
@@ -50,6 +50,7 @@ CORRELATION = 0.9
 
 Index = NDArray[np.int64]
 Acts = Callable[[ReachBatch], NDArray[np.float32]]
+"""A policy: returns the actions of all environments of a batch."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -96,18 +97,15 @@ def sample_detours(
 
 
 def toward(arm: Arm, q: Vec, aim: Vec) -> NDArray[np.float32]:
-    """Return actions of straight joint motions, in [-1, 1], shape (n, 6).
-
-    Args:
-        arm: From ``scene.arm_of``.
-        q: Joint positions [rad], shape (n, 6).
-        aim: Target configurations [rad], shape (n, 6).
-    """
+    """Return actions of straight motions from ``q`` to ``aim`` [rad], in [-1, 1], (n, 6)."""
     return np.clip(GAIN * (aim - q) / arm.limits.qd_max, -1.0, 1.0).astype(np.float32)
 
 
 class OracleSearch:
     """Resimulates the episodes of a batch from their first states.
+
+    In the methods, ``episodes`` are indices of episodes, shape (k,), and ``n_each`` is the
+    number of resimulations of each.
 
     Args:
         batch: Environments at the start of their episodes; not changed.
@@ -120,12 +118,7 @@ class OracleSearch:
         self.n = batch.n_envs
         self._copies = ReachBatch(batch.cell, n_copies, seed, batch.settings)
         goals, self._which = np.unique(batch.state.goal, axis=0, return_inverse=True)
-        found = [
-            goal_configurations(
-                self._arm, goal, np.random.default_rng([seed, k]), spread=SPREAD
-            )
-            for k, goal in enumerate(goals)
-        ]
+        found = goal_configurations_of(self._arm, goals, seed, SPREAD)
         home = np.array(self._arm.home)[None]
         self._configurations = [each if len(each) else home for each in found]
         self.resimulations = Resimulations(
@@ -140,13 +133,7 @@ class OracleSearch:
         return np.flatnonzero(self.resimulations.reached == 0)
 
     def scripted(self, episodes: Index, n_each: int, *, at_once: bool = False) -> None:
-        """Run scripted resimulations of some episodes.
-
-        Args:
-            episodes: Their indices, shape (k,).
-            n_each: Resimulations of each.
-            at_once: Whether all move to the goal immediately.
-        """
+        """Run scripted resimulations; ``at_once``: all move to the goal immediately."""
         for rows in self._parts(episodes, n_each):
             first, until = sample_detours(self._arm, self._rng, len(rows))
             if at_once:
@@ -155,13 +142,7 @@ class OracleSearch:
             self._simulate(rows, lambda batch, k: np.zeros(0), first, until, last)
 
     def disturbed(self, episodes: Index, n_each: int, acts: Acts) -> None:
-        """Run resimulations of some episodes with a policy and noise on its actions.
-
-        Args:
-            episodes: Their indices, shape (k,).
-            n_each: Resimulations of each.
-            acts: The policy: actions of all environments of a batch.
-        """
+        """Run resimulations with a policy and noise on its actions."""
         for rows in self._parts(episodes, n_each):
             first, until = sample_detours(self._arm, self._rng, len(rows))
             until[self._rng.uniform(size=len(rows)) < 0.5] = 0.0
@@ -181,12 +162,8 @@ class OracleSearch:
         """Simulate every episode once with a policy alone."""
         for rows in self._parts(np.arange(self.n), 1):
             none = np.zeros(len(rows))
-            self._simulate(
-                rows, lambda batch, k: acts(batch)[:k], self._home(len(rows)), none, None
-            )
-
-    def _home(self, k: int) -> Vec:
-        return np.repeat(np.array(self._arm.home)[None], k, axis=0)
+            home = np.tile(self._arm.home, (len(rows), 1))
+            self._simulate(rows, lambda batch, k: acts(batch)[:k], home, none, None)
 
     def _parts(self, episodes: Index, n_each: int) -> Sequence[Index]:
         """Split the resimulations into groups of at most ``n_copies`` episodes."""

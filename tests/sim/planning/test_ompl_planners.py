@@ -13,7 +13,7 @@ from app.sim.human import model as human
 from app.sim.planning import ompl_planners as planners
 from app.sim.planning.goal_configurations import goal_configurations
 from app.sim.planning.ompl_planners import PLANNERS, PlanSettings, path_length, plan
-from app.sim.planning.time_parameterization import TimingLimits, time_free_path
+from app.sim.planning.time_parameterization import time_free_path
 from app.sim.scene.scene import arm_of
 from tests.sim.configurations import vertical_configuration
 from tests.sim.mesh_reference import MeshReference
@@ -38,7 +38,10 @@ def blocking_people() -> Shapes:
 
 
 def ask(people: Shapes, settings: PlanSettings, seed: int = 1) -> planners.MotionPlan:
-    checker = Checker(ARM, people, MARGIN)
+    return ask_with(Checker(ARM, people, MARGIN), settings, seed)
+
+
+def ask_with(checker: Checker, settings: PlanSettings, seed: int = 1) -> planners.MotionPlan:
     return plan(checker, station("cube5"), station("cube0")[None], settings, seed)
 
 
@@ -56,23 +59,22 @@ def test_of_a_blocked_and_a_free_goal_the_shorter_path_counts(planner: str) -> N
     answer = plan(
         checker, station("cube5"), goals, PlanSettings(planner=planner, max_poses=9_000)
     )
-    assert answer.solved and answer.goal == 1
+    assert answer.solved
     np.testing.assert_array_equal(answer.path, [station("cube5"), station("dock0")])
     far = goals[1] + np.array([0.0, 0.0, 0.0, 0.0, 2.2, 0.0])
     assert checker.edge_free(station("cube5"), far)
+    goals[1] = far
     answer = plan(
-        checker,
-        station("cube5"),
-        np.stack([goals[0], far]),
-        PlanSettings(planner=planner, max_poses=9_000),
+        checker, station("cube5"), goals, PlanSettings(planner=planner, max_poses=9_000)
     )
-    assert answer.goal == (1 if planner == "rrt-connect" else 0)
+    reached = goals[1 if planner == "rrt-connect" else 0]
+    np.testing.assert_allclose(answer.path[-1, :5], reached[:5], atol=1e-6)
 
 
 @pytest.mark.parametrize("planner", PLANNERS)
 def test_a_path_round_a_person_is_free_for_the_reference_on_raw_meshes(planner: str) -> None:
     answer = ask(blocking_people(), PlanSettings(planner=planner, max_poses=20_000))
-    assert answer.solved and answer.goal == 0
+    assert answer.solved
     np.testing.assert_array_equal(answer.path[[0, -1]], [station("cube5"), station("cube0")])
     reference, human_q = MeshReference(CELL), reaching_person()
     for a, b in zip(answer.path[:-1], answer.path[1:], strict=True):
@@ -127,18 +129,21 @@ def test_threads_do_not_disturb_each_other() -> None:
 
 @pytest.mark.parametrize("planner", PLANNERS)
 def test_no_budget_is_said_and_no_more_is_looked_at(planner: str) -> None:
-    answer = ask(blocking_people(), PlanSettings(planner=planner, max_poses=10))
+    checker = Checker(ARM, blocking_people(), MARGIN)
+    answer = ask_with(checker, PlanSettings(planner=planner, max_poses=10))
     assert answer.outcome in ("out-of-time", "approximate")
-    assert answer.goal == -1
-    assert answer.n_poses < 200
+    assert checker.n_poses < 200
 
 
 @pytest.mark.parametrize("planner", PLANNERS)
-def test_an_unreachable_goal_ends_with_the_budget(planner: str) -> None:
-    boxed_in = PlanSettings(planner=planner, budget_s=0.1, detour_rad=0.0)
-    answer = ask(blocking_people(), boxed_in)
+def test_an_unreachable_goal_ends_with_the_budget(
+    planner: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(planners, "DETOUR_RAD", 0.0)
+    checker = Checker(ARM, blocking_people(), MARGIN)
+    answer = ask_with(checker, PlanSettings(planner=planner, budget_s=0.1))
     assert answer.outcome in ("out-of-time", "approximate")
-    assert answer.n_poses > 100
+    assert checker.n_poses > 100
 
 
 def test_start_and_goal_in_contact_have_names() -> None:
@@ -174,14 +179,14 @@ def test_plan_that_waits_for_another_one_keeps_its_budget() -> None:
     assert found.outcome == "out-of-time"
 
 
-def test_one_of_several_goals_is_reached_and_named() -> None:
+def test_one_of_several_goals_is_reached() -> None:
     goals = goal_configurations(
         ARM, np.array(CELL.station("cube0").position), np.random.default_rng(0)
     )
     checker = Checker(ARM, blocking_people(), MARGIN)
     answer = plan(checker, station("cube5"), goals, PlanSettings(max_poses=20_000))
     assert answer.solved
-    np.testing.assert_allclose(answer.path[-1, :5], goals[answer.goal, :5], atol=1e-12)
+    assert np.abs(goals - answer.path[-1])[:, :5].max(axis=1).min() < 1e-12
 
 
 def test_a_cylinder_in_the_shared_workspace_is_planned_round_within_its_limits() -> None:
@@ -194,8 +199,7 @@ def test_a_cylinder_in_the_shared_workspace_is_planned_round_within_its_limits()
     start = start[[checker.is_free(q) for q in start]][0]
     answer = plan(checker, start, goals, PlanSettings(max_poses=20_000))
     assert answer.solved and len(answer.path) > 2
-    limits = TimingLimits(qd_max=arm.limits.qd_max, qdd_max=arm.limits.qdd_max, dt=arm.dt)
-    timed = time_free_path(checker, answer.path, limits)
+    timed = time_free_path(checker, answer.path)
     assert timed is not None
     assert np.all(np.abs(timed.qd) <= arm.limits.qd_max + 1e-9)
     assert np.all(np.abs(np.diff(timed.qd, axis=0)) <= arm.limits.qdd_max * arm.dt + 1e-9)
@@ -210,15 +214,6 @@ def test_joints_that_stay_do_not_move() -> None:
     np.testing.assert_array_equal(answer.path[:, 5], 0.7)
 
 
-def test_six_joints_can_be_planned() -> None:
-    goal = station("cube0")
-    goal[5] = 1.0
-    checker = Checker(ARM, blocking_people(), MARGIN)
-    settings = PlanSettings(max_poses=20_000, n_joints=6)
-    answer = plan(checker, station("cube5"), goal[None], settings)
-    assert answer.solved and answer.path[-1, 5] == 1.0
-
-
 @pytest.mark.parametrize(
     ("settings", "field"),
     [
@@ -227,9 +222,6 @@ def test_six_joints_can_be_planned() -> None:
         (PlanSettings(budget_s=float("nan")), "budget_s"),
         (PlanSettings(budget_s=float("inf")), "budget_s"),
         (PlanSettings(max_poses=-1), "max_poses"),
-        (PlanSettings(detour_rad=float("nan")), "detour_rad"),
-        (PlanSettings(detour_rad=-0.1), "detour_rad"),
-        (PlanSettings(n_joints=7), "n_joints"),
     ],
 )
 def test_bad_settings_are_named(settings: PlanSettings, field: str) -> None:

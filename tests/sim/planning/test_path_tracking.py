@@ -7,13 +7,12 @@ import numpy as np
 from app.sim.cells.cell import load_cell
 from app.sim.core.arrays import Vec
 from app.sim.planning.path_tracking import PathFollower, straight_stop
-from app.sim.planning.time_parameterization import TimingLimits, time_path
+from app.sim.planning.time_parameterization import time_path
 from app.sim.robot.kernels import acceleration_bounds
 from app.sim.robot.kernels.joints import JointState
 from app.sim.scene.scene import arm_of
 
 ARM = arm_of(load_cell())
-LIMITS = TimingLimits(qd_max=ARM.limits.qd_max, qdd_max=ARM.limits.qdd_max, dt=ARM.dt)
 
 
 def move(q: Vec, qd: Vec, wanted: Vec) -> tuple[Vec, Vec, Vec]:
@@ -33,7 +32,7 @@ def follow(
     seed: int, scale: Callable[[int], float], n_periods: int = 1000
 ) -> tuple[PathFollower, list[float], Vec]:
     """Follow a path while somebody scales the wanted speeds; the limits are asserted."""
-    path_follower, errors = PathFollower(time_path(some_path(seed), LIMITS), LIMITS), []
+    path_follower, errors = PathFollower(time_path(some_path(seed), ARM), ARM), []
     q, qd = path_follower.timed.q[0].copy(), np.zeros(6)
     for k in range(n_periods):
         path_follower.locate(q)
@@ -76,7 +75,7 @@ def test_erratic_scaling_stays_within_ten_milliradians_and_arrives() -> None:
 
 def test_braking_rests_on_the_path_and_goes_on_from_there() -> None:
     for seed in range(5):
-        path_follower = PathFollower(time_path(some_path(seed), LIMITS), LIMITS)
+        path_follower = PathFollower(time_path(some_path(seed), ARM), ARM)
         q, qd = path_follower.timed.q[0].copy(), np.zeros(6)
         for k in range(1000):
             path_follower.locate(q)
@@ -93,7 +92,7 @@ def test_a_straight_stop_keeps_the_direction_and_the_limits() -> None:
         qd = rng.uniform(-1.0, 1.0, 6) * ARM.limits.qd_max
         track = qd / np.linalg.norm(qd)
         for _ in range(4):
-            after = straight_stop(qd, LIMITS)
+            after = straight_stop(qd, ARM)
             assert np.all(np.abs(after - qd) <= ARM.limits.qdd_max * ARM.dt + 1e-12)
             np.testing.assert_allclose(after, (after @ track) * track, atol=1e-12)
             qd = after

@@ -70,7 +70,7 @@ def drive(
     c, q_out, qd_out = np.empty(6), np.empty(6), np.empty(6)
     while t < limit_s:
         wanted = follower.act(q, qd, people(t), t) * scale(t)
-        states.append(follower.report.state)
+        states.append(follower.state)
         visited.append(q)
         if states[-1] == "arrived":
             break
@@ -95,13 +95,13 @@ def test_every_role_arrives_in_an_empty_cell_in_the_same_time(role: str) -> None
     assert run.states[-1] == "arrived"
     assert run.seconds == pytest.approx(drive("plan-once", lambda _: NO_PEOPLE).seconds)
     np.testing.assert_allclose(run.q, station("cube0"), atol=1e-3)
-    assert run.follower.report.error_rad < 1e-9
+    assert run.follower.error_rad < 1e-9
 
 
 def test_plan_once_ignores_people_that_arrive_later() -> None:
     run = drive("plan-once", from_time(0.3, BLOCKING))
     assert run.states[-1] == "arrived"
-    assert run.follower.report.n_plans == 1
+    assert run.follower.n_plans == 1
     assert run.least_m < 0.0
 
 
@@ -109,11 +109,10 @@ def test_plan_once_ignores_people_that_arrive_later() -> None:
 @pytest.mark.parametrize("planner", PLANNERS)
 def test_replanning_roles_go_round_a_person_who_comes(role: str, planner: str) -> None:
     run = drive(role, from_time(0.3, BLOCKING), planner)
-    report = run.follower.report
     assert run.states[-1] == "arrived"
-    assert report.n_changes >= 2
+    assert run.follower.n_plans >= 2
     assert run.least_m > run.follower.settings.margin
-    assert "braking" in run.states and report.blocked_s > 0.0
+    assert "braking" in run.states
 
 
 @pytest.mark.parametrize("role", REPLANNING)
@@ -127,13 +126,13 @@ def test_the_motion_driven_is_free_for_the_reference_on_raw_meshes(role: str) ->
 
 def test_when_blocked_plans_only_when_blocked() -> None:
     run = drive("replan-on-blocked", from_time(0.3, BLOCKING))
-    assert run.follower.report.n_plans <= 4
-    assert drive("replan-on-blocked", lambda _: NO_PEOPLE).follower.report.n_plans == 1
+    assert run.follower.n_plans <= 4
+    assert drive("replan-on-blocked", lambda _: NO_PEOPLE).follower.n_plans == 1
 
 
 def test_every_tick_plans_in_every_period() -> None:
     run = drive("replan-every-cycle", lambda _: NO_PEOPLE)
-    assert run.follower.report.n_plans >= len(run.states) - 1
+    assert run.follower.n_plans >= len(run.states) - 1
 
 
 @pytest.mark.parametrize("role", REPLANNING)
@@ -143,7 +142,7 @@ def test_a_blocked_goal_makes_them_brake_say_so_and_go_on_when_it_is_free(role: 
     assert set(during) == {"braking"}
     assert run.states[-1] == "arrived" and run.seconds > 4.0
     still = drive(role, from_time(0.3, AT_THE_GOAL), limit_s=3.0)
-    assert still.follower.report.outcome == "goal-in-contact"
+    assert still.follower.outcome == "goal-in-contact"
     assert still.states[-1] == "braking"
 
 
@@ -151,7 +150,7 @@ def test_a_blocked_goal_makes_them_brake_say_so_and_go_on_when_it_is_free(role: 
 def test_without_a_plan_the_robot_rests_and_says_why(role: str) -> None:
     run = drive(role, lambda _: AT_THE_GOAL, limit_s=1.0)
     assert set(run.states) == {"waiting"}
-    assert run.follower.report.outcome == "goal-in-contact"
+    assert run.follower.outcome == "goal-in-contact"
     np.testing.assert_array_equal(run.q, station("cube5"))
 
 
@@ -169,7 +168,7 @@ def test_a_layer_that_slows_and_stops_the_robot_does_not_lose_it(role: str) -> N
     run = drive(role, lambda _: BLOCKING, scale=halting)
     assert run.states[-1] == "arrived"
     assert run.least_m > run.follower.settings.margin - 0.005
-    assert run.follower.report.error_rad < 5e-3
+    assert run.follower.error_rad < 5e-3
 
 
 @pytest.mark.parametrize("role", REPLANNING)
@@ -189,11 +188,11 @@ def test_a_robot_pushed_off_its_path_is_lost_and_planned_for_again() -> None:
     follower.act(q, qd, NO_PEOPLE, 0.0)
     pushed = q - np.array([0.3, 0.3, 0.0, 0.0, 0.0, 0.0])
     follower.act(pushed, qd, NO_PEOPLE, ARM.dt)
-    assert follower.report.state == "lost"
+    assert follower.state == "lost"
     for k in range(2, 14):
         follower.act(pushed, qd, NO_PEOPLE, k * ARM.dt)
-    assert follower.report.state == "following"
-    assert follower.report.n_plans == 2
+    assert follower.state == "following"
+    assert follower.n_plans == 2
 
 
 def test_an_unknown_role_is_named() -> None:

@@ -1,7 +1,6 @@
 """Timed paths keep the limits to rounding, in exact segments, and stay near their path."""
 
 import itertools
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,7 +12,6 @@ from app.sim.core.arrays import Vec
 from app.sim.planning.ompl_planners import planning_limits
 from app.sim.planning.time_parameterization import (
     TimedPath,
-    TimingLimits,
     stop_periods,
     stopping_point,
     time_free_path,
@@ -27,8 +25,7 @@ from tests.sim.configurations import vertical_configuration
 
 CELL = load_cell()
 ARM = arm_of(CELL)
-LIMITS = TimingLimits(qd_max=ARM.limits.qd_max, qdd_max=ARM.limits.qdd_max, dt=ARM.dt)
-SLUGGISH = replace(LIMITS, qdd_max=0.1 * ARM.limits.qdd_max)
+SLUGGISH = ARM._replace(limits=ARM.limits._replace(qdd_max=0.1 * ARM.limits.qdd_max))
 """With a tenth of the acceleration corners are rounded widely enough to touch something."""
 
 
@@ -41,7 +38,7 @@ def some_paths(n: int, seed: int = 0) -> list[tuple[Vec, Vec, Vec, frozenset[int
         q0, qd0 = path[0].copy(), np.zeros(6)
         if trial % 2:
             qd0 = rng.uniform(-1.0, 1.0, 6) * ARM.limits.qd_max
-            path[0] = stopping_point(q0, qd0, LIMITS)
+            path[0] = stopping_point(q0, qd0, ARM)
         stops = frozenset(int(k) for k in range(corners) if rng.random() < 0.2)
         out.append((q0, qd0, path, stops))
     return out
@@ -56,23 +53,28 @@ def distance_to_path(q: Vec, path: Vec) -> float:
     return best
 
 
+def n_stops(timed: TimedPath) -> int:
+    """Number of knots at rest between the ends."""
+    return int((timed.qd[1:-1] == 0.0).all(axis=1).sum())
+
+
 def test_speeds_and_accelerations_stay_inside_the_limits() -> None:
     for _, qd0, path, stops in some_paths(600):
-        timed = time_path(path, LIMITS, qd0, stops)
+        timed = time_path(path, ARM, qd0, stops)
         assert np.all(np.abs(timed.qd) <= ARM.limits.qd_max + 1e-12)
         assert np.all(np.abs(np.diff(timed.qd, axis=0)) <= ARM.limits.qdd_max * ARM.dt + 1e-12)
 
 
 def test_periods_are_polynomials_of_degree_two_that_join() -> None:
     for _, qd0, path, stops in some_paths(300):
-        timed = time_path(path, LIMITS, qd0, stops)
+        timed = time_path(path, ARM, qd0, stops)
         mean = 0.5 * (timed.qd[:-1] + timed.qd[1:])
         np.testing.assert_allclose(np.diff(timed.q, axis=0), mean * ARM.dt, atol=1e-12)
 
 
 def test_motions_begin_at_the_state_and_rest_at_the_end() -> None:
     for q0, qd0, path, stops in some_paths(300):
-        timed = time_path(path, LIMITS, qd0, stops)
+        timed = time_path(path, ARM, qd0, stops)
         np.testing.assert_allclose(timed.q[0], q0, atol=1e-12)
         np.testing.assert_array_equal(timed.qd[0], qd0)
         np.testing.assert_array_equal(timed.q[-1], path[-1])
@@ -82,7 +84,7 @@ def test_motions_begin_at_the_state_and_rest_at_the_end() -> None:
 def test_motions_leave_their_path_by_no_more_than_they_say() -> None:
     for _, qd0, path, stops in some_paths(24):
         if not qd0.any() and len(path) > 1:
-            timed = time_path(path, LIMITS, qd0, stops)
+            timed = time_path(path, ARM, qd0, stops)
             step = np.abs(np.diff(path, axis=0)).max() / 800
             for q in timed.q:
                 assert distance_to_path(q, path) <= timed.corner_rad + step
@@ -90,15 +92,15 @@ def test_motions_leave_their_path_by_no_more_than_they_say() -> None:
 
 def test_stops_rest_at_their_corners() -> None:
     path = np.cumsum(np.random.default_rng(3).normal(size=(5, 6)), axis=0)
-    timed = time_path(path, LIMITS, None, frozenset({2}))
+    timed = time_path(path, ARM, None, frozenset({2}))
     at = np.flatnonzero(np.abs(timed.q - path[2]).max(axis=1) < 1e-12)
-    assert timed.n_stops == 1 and len(at) == 1
+    assert n_stops(timed) == 1 and len(at) == 1
     np.testing.assert_array_equal(timed.qd[at[0]], np.zeros(6))
 
 
 def test_a_single_joint_move_takes_the_time_of_the_formula() -> None:
     # v / A = 1/6 s is 4 periods of 0.05 s; 0.5 rad then cruise 0.5 / 0.5 s - 4 periods = 16.
-    timed = time_path(np.array([np.zeros(6), 0.5 * np.eye(6)[0]]), LIMITS)
+    timed = time_path(np.array([np.zeros(6), 0.5 * np.eye(6)[0]]), ARM)
     assert timed.n_periods == 4 + 16 + 4
 
 
@@ -106,7 +108,7 @@ def test_timing_costs_little_beside_the_speed_limits() -> None:
     rng, spent, least = np.random.default_rng(5), 0.0, 0.0
     for _ in range(100):
         path = np.cumsum(rng.normal(size=(4, 6)) * 0.5, axis=0)
-        spent += time_path(path, LIMITS).duration
+        spent += time_path(path, ARM).duration
         least += (np.abs(np.diff(path, axis=0)) / ARM.limits.qd_max).max(axis=1).sum()
     assert least <= spent < 1.2 * least
 
@@ -117,7 +119,7 @@ def test_every_segment_lies_in_the_interval_of_the_bounded_actions() -> None:
     for _ in range(60):
         path = rng.uniform(low, high, size=(5, 6))
         path[1, :3], path[3, 3:] = low[:3], high[3:]  # touch the limits of the plans
-        timed = time_path(path, LIMITS)
+        timed = time_path(path, ARM)
         for k in range(timed.n_periods):
             c = (timed.qd[k + 1] - timed.qd[k]) / (2.0 * ARM.dt)
             for j in range(6):
@@ -127,7 +129,7 @@ def test_every_segment_lies_in_the_interval_of_the_bounded_actions() -> None:
 
 
 def test_at_interpolates_the_segments_and_holds_the_ends() -> None:
-    timed = time_path(np.array([np.zeros(6), np.full(6, 0.4)]), LIMITS)
+    timed = time_path(np.array([np.zeros(6), np.full(6, 0.4)]), ARM)
     q, qd = timed.at(2.5 * ARM.dt)
     c = (timed.qd[3] - timed.qd[2]) / (2.0 * ARM.dt)
     x = 0.5 * ARM.dt
@@ -141,15 +143,15 @@ def test_at_interpolates_the_segments_and_holds_the_ends() -> None:
 def test_at_takes_every_time_before_the_end(dt: float) -> None:
     for n in range(1, 300):
         q = np.linspace(np.zeros(6), np.ones(6), n + 1)
-        timed = TimedPath(dt=dt, q=q, qd=np.zeros((n + 1, 6)), corner_rad=0.0, n_stops=0)
+        timed = TimedPath(dt=dt, q=q, qd=np.zeros((n + 1, 6)), corner_rad=0.0)
         last = timed.at(np.nextafter(timed.duration, 0.0))[0]
         np.testing.assert_allclose(last, q[-2], atol=1e-9)
 
 
 def test_a_stop_takes_the_time_of_the_slowest_joint() -> None:
     qd = np.array([0.3, -0.1, 0.0, 0.0, 0.0, 0.0])
-    assert stop_periods(qd, LIMITS) == 2
-    np.testing.assert_allclose(stopping_point(np.zeros(6), qd, LIMITS), 0.05 * qd)
+    assert stop_periods(qd, ARM) == 2
+    np.testing.assert_allclose(stopping_point(np.zeros(6), qd, ARM), 0.05 * qd)
 
 
 def corner_beside_a_ball() -> tuple[Checker, Vec]:
@@ -166,11 +168,11 @@ def corner_beside_a_ball() -> tuple[Checker, Vec]:
         offset = rng.normal(size=3)
         ball = tcp + 0.15 * offset / np.linalg.norm(offset)
         people = capsule_shapes(np.array([[ball, ball]]), np.array([0.03]))
-        checker = Checker(ARM, people, 0.0, 0.0)
+        checker = Checker(SLUGGISH, people, 0.0, 0.0)
         near = min(checker.clearance(q).people_m for q in rounded)
         far = min(checker.clearance(q).people_m for q in sharp)
         if near < far - 0.002:
-            return Checker(ARM, people, 0.5 * (near + far), 0.0), path
+            return Checker(SLUGGISH, people, 0.5 * (near + far), 0.0), path
     raise AssertionError("no such ball")
 
 
@@ -179,20 +181,20 @@ def test_a_corner_that_would_touch_is_taken_with_a_stop() -> None:
     assert checker.path_free(path)
     rounded = time_path(path, SLUGGISH)
     assert checker.first_blocked(rounded.q, rounded.qd) < rounded.n_periods
-    timed = time_free_path(checker, path, SLUGGISH)
-    assert isinstance(timed, TimedPath) and timed.n_stops == 1
+    timed = time_free_path(checker, path)
+    assert isinstance(timed, TimedPath) and n_stops(timed) == 1
     assert checker.first_blocked(timed.q, timed.qd) == timed.n_periods
 
 
 def test_a_start_in_motion_turns_at_once_where_that_is_shorter() -> None:
     checker = Checker(ARM, no_people())
     qd0 = np.array([0.4, 0.0, 0.0, 0.0, 0.0, 0.0])
-    stop = stopping_point(ARM.home, qd0, LIMITS)
+    stop = stopping_point(ARM.home, qd0, ARM)
     path = np.stack([stop, stop - np.array([0.5, 0, 0, 0, 0, 0])])
-    timed = time_free_path(checker, path, LIMITS, qd0)
+    timed = time_free_path(checker, path, qd0)
     assert timed is not None
-    assert timed.n_periods <= time_path(path, LIMITS, qd0).n_periods
-    assert timed.n_periods <= time_path(path, LIMITS, qd0, frozenset({0})).n_periods
+    assert timed.n_periods <= time_path(path, ARM, qd0).n_periods
+    assert timed.n_periods <= time_path(path, ARM, qd0, frozenset({0})).n_periods
     np.testing.assert_array_equal(timed.qd[0], qd0)
 
 
@@ -201,16 +203,16 @@ def test_a_reversal_that_the_deceleration_leaves_no_room_for_begins_with_a_stop(
     share: float,
 ) -> None:
     qd0 = np.zeros(6)
-    qd0[0] = share * LIMITS.qdd_max[0] * LIMITS.dt  # the stop takes that share of a period
-    stop = stopping_point(ARM.home, qd0, LIMITS)
+    qd0[0] = share * ARM.limits.qdd_max[0] * ARM.dt  # the stop takes that share of a period
+    stop = stopping_point(ARM.home, qd0, ARM)
     path = np.stack([stop, stop - np.array([0.5, 0, 0, 0, 0, 0])])
-    timed = time_path(path, LIMITS, qd0)
-    assert timed.n_stops == 1
-    assert timed.n_periods == time_path(path, LIMITS, qd0, frozenset({0})).n_periods
+    timed = time_path(path, ARM, qd0)
+    assert n_stops(timed) == 1
+    assert timed.n_periods == time_path(path, ARM, qd0, frozenset({0})).n_periods
 
 
 def test_bad_paths_are_named() -> None:
     with pytest.raises(InvalidInput, match="path"):
-        time_path(np.zeros((0, 6)), LIMITS)
+        time_path(np.zeros((0, 6)), ARM)
     with pytest.raises(InvalidInput, match="finite"):
-        time_path(np.full((2, 6), np.nan), LIMITS)
+        time_path(np.full((2, 6), np.nan), ARM)

@@ -12,12 +12,13 @@ from app.policies.evaluation.reach.episodes import run_to_end
 from app.policies.inference.controllers import Controller
 from app.sim.cells.cell import Cell
 from app.sim.core.arrays import Vec
+from app.sim.planning.goal_configurations import goal_configurations_of
 from app.sim.planning.ompl_planners import PlanSettings
 from app.sim.planning.replanning import ReplanningSettings
 from app.sim.reach.batch import ReachBatch, ReachSettings
 from app.sim.reach.crossings import CrossingSet
 from app.sim.reach.monitored.batch import MonitoredReachBatch
-from app.sim.reach.monitored.planners import drive_planner, goal_configurations_of
+from app.sim.reach.monitored.planners import GOAL_SPREAD, drive_planner
 from app.sim.reach.oracle_search import Acts, sample_detours, toward
 from app.sim.robot.actions import ActionSettings
 from app.sim.robot.kernels.arm import Arm
@@ -145,7 +146,8 @@ class Comparison:
     @cached_property
     def configurations(self) -> list[Vec]:
         """Configurations at each goal [rad], shape (k, 6) each."""
-        return goal_configurations_of(arm_of(self.cell), self.crossed.goals, self.seed)
+        goals = self.crossed.goals
+        return goal_configurations_of(arm_of(self.cell), goals, self.seed, GOAL_SPREAD)
 
     def policy(self, controller: Controller, *, no_person: bool = False) -> CrossingRuns:
         """Run a policy over all crossings."""
@@ -161,7 +163,7 @@ class Comparison:
     ) -> CrossingRuns:
         """Run a planner over all crossings; a blind one ignores people."""
         batch = self.batch(no_person=no_person, monitored=monitored)
-        overrides, _ = drive_planner(
+        overrides = drive_planner(
             batch, self.configurations, settings, self.seed + 1, blind=blind
         )
         return CrossingRuns(episodes=batch.runs(), overrides=overrides)

@@ -5,11 +5,12 @@ from dataclasses import replace
 import numpy as np
 
 from app.sim.cells.cell import load_cell
+from app.sim.planning.goal_configurations import goal_configurations_of
 from app.sim.planning.ompl_planners import PlanSettings
 from app.sim.planning.replanning import ReplanningSettings
 from app.sim.reach.batch import ReachSettings
 from app.sim.reach.monitored.batch import MonitoredReachBatch
-from app.sim.reach.monitored.planners import GOAL_SPREAD, drive_planner, goal_configurations_of
+from app.sim.reach.monitored.planners import GOAL_SPREAD, drive_planner
 from app.sim.robot.ur10 import Robot
 from app.sim.safety.layer import safety_settings
 from app.sim.scenario.monitoring import MonitoringSettings
@@ -18,7 +19,7 @@ from app.sim.scene.scene import arm_of
 CELL = load_cell("shared-workspace")
 ARM = arm_of(CELL)
 GOALS = np.array([[0.2, 0.9, 0.3], [-0.2, 0.85, 0.25]])
-Q_GOALS = goal_configurations_of(ARM, GOALS, 3)
+Q_GOALS = goal_configurations_of(ARM, GOALS, 3, GOAL_SPREAD)
 PLANNED = PlanSettings(planner="rrt-connect", max_poses=6_000)
 RULES = ReachSettings(goals="box", people=("walker",), time_limit_s=15.0)
 
@@ -45,7 +46,7 @@ def run(role: str, tracks: np.ndarray | None, **more: bool) -> MonitoredReachBat
     )
     batch.reset()
     batch.set_goals(np.arange(2), GOALS)
-    overrides, _ = drive_planner(
+    overrides = drive_planner(
         batch, Q_GOALS, ReplanningSettings(role=role, plan=PLANNED), 5, **more
     )
     for row, course in enumerate(overrides):
