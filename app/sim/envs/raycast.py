@@ -6,7 +6,6 @@ pixel and direction smooth the edges. No graphics library and no display is need
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import product
 from typing import NamedTuple
 
@@ -18,6 +17,7 @@ from app.sim.envs.solids import Floats, Rgb, Solid, dot, single
 Image = NDArray[np.uint8]
 """Rows from the top, columns from the left, red, green, blue."""
 Rows = NDArray[np.int64]
+Point = tuple[float, float, float]
 
 SAMPLES = 2
 """Rays per pixel in each direction."""
@@ -33,24 +33,14 @@ SKY: Rgb = (206, 217, 230)
 HORIZON: Rgb = (238, 241, 245)
 FLOOR: Rgb = (214, 219, 226)
 LINE: Rgb = (176, 186, 197)
+FOV = 0.7
+"""Vertical field of view [rad]."""
 GRID_M = 0.5
 """Distance of the lines on the floor [m]."""
 FADE_M = 9.0
 """Distance from the camera at which the floor has the colour of the horizon [m]."""
 LIFT_M = 2e-3
 """Distance from a surface at which a ray to the light begins [m]."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Camera:
-    """A camera that is held upright."""
-
-    position: tuple[float, float, float]
-    """Position [m]."""
-    look_at: tuple[float, float, float]
-    """Point in the middle of the image [m]."""
-    fov: float = 0.7
-    """Vertical field of view [rad]."""
 
 
 def _linear(colour: Rgb) -> Floats:
@@ -71,10 +61,11 @@ class _Hits(NamedTuple):
 
 
 class Raycaster:
-    """Draws scenes that are seen by one camera.
+    """Draws scenes that are seen by one camera, held upright.
 
     Args:
-        camera: Position and view.
+        position: Position of the camera [m].
+        look_at: Point in the middle of the image [m].
         width: Columns of the images [px].
         height: Rows of the images [px].
         floor_z: Height of the floor [m].
@@ -83,20 +74,21 @@ class Raycaster:
 
     def __init__(
         self,
-        camera: Camera,
+        position: Point,
+        look_at: Point,
         width: int,
         height: int,
         floor_z: float,
         still: Sequence[Solid] = (),
     ) -> None:
         self._shape = (SAMPLES * height, SAMPLES * width)
-        self._eye, self._floor_z = single(camera.position), floor_z
-        ahead = single(camera.look_at) - self._eye
+        self._eye, self._floor_z = single(position), floor_z
+        ahead = single(look_at) - self._eye
         ahead /= np.linalg.norm(ahead)
         right = np.cross(ahead, single([0.0, 0.0, 1.0]))
         right /= np.linalg.norm(right)
         self._axes = np.stack([right, np.cross(ahead, right), ahead]).astype(np.float32)
-        self._focus = float(0.5 * self._shape[0] / np.tan(0.5 * camera.fov))
+        self._focus = float(0.5 * self._shape[0] / np.tan(0.5 * FOV))
         rows, columns = (
             (np.arange(n, dtype=np.float32) + 0.5 - 0.5 * n) / self._focus for n in self._shape
         )

@@ -9,7 +9,7 @@ from app.sim.cells.cell import Cell
 from app.sim.cells.parts import Station, TableGeometry
 from app.sim.cells.support import support_height
 from app.sim.core.arrays import Vec, as_kernel_array
-from app.sim.envs.raycast import Camera, Image, Raycaster
+from app.sim.envs.raycast import Image, Point, Raycaster
 from app.sim.envs.solids import Box, Capsule, Cylinder, Rgb, Solid
 from app.sim.geometry.capsules import RADIUS, ends_of
 from app.sim.human import model as human
@@ -22,12 +22,8 @@ from app.sim.scene.scene import arm_of, people_geometry_of, people_of
 from app.sim.sorting.layout import block_height, half_size, is_sorting
 from app.sim.sorting.state import NULL, SortingShape, SortingState
 
-Point = tuple[float, float, float]
-
 WIDTH, HEIGHT = 480, 360
 """Size of the images [px]."""
-FOV = 0.7
-"""Vertical field of view [rad]."""
 
 TOP: Rgb = (236, 233, 226)
 EDGE: Rgb = (172, 142, 108)
@@ -66,33 +62,25 @@ _PARTS = {
 """Colours of a worker's capsules besides arms and trunk."""
 
 
-def raycaster_of(cell: Cell) -> Raycaster:
-    """Return the raycaster of a cell, which does not depend on its people."""
-    return _raycaster(cell.model_copy(update={"people": ()}))
-
-
 @lru_cache(maxsize=8)
 def _raycaster(cell: Cell) -> Raycaster:
-    """Return a new raycaster; the camera distance depends on the scenario."""
+    """Return the raycaster of a cell; the camera distance depends on the scenario."""
     if is_sorting(cell):
         position, look_at = (2.05, -1.15, 1.7), (0.0, 0.62, 0.1)
     elif cell.goal_region is not None:
         position, look_at = (2.9, -2.0, 2.2), (-0.2, 0.75, 0.0)
     else:
         position, look_at = (2.4, -1.1, 1.5), (-0.05, 0.6, 0.12)
-    camera = Camera(position=position, look_at=look_at, fov=FOV)
-    return Raycaster(camera, WIDTH, HEIGHT, cell.floor_z, _static_solids(cell))
+    return Raycaster(position, look_at, WIDTH, HEIGHT, cell.floor_z, _static_solids(cell))
 
 
 def picture(cell: Cell, robot_q: Vec, people: Sequence[Solid], task: Sequence[Solid]) -> Image:
-    """Return an image of a cell, uint8, shape (HEIGHT, WIDTH, 3).
+    """Return an image of a cell with the robot at joints ``robot_q`` [rad], shape (6,).
 
-    Args:
-        robot_q: The robot's joints [rad], shape (6,).
-        people: From :func:`people_solids`.
-        task: Targets or blocks.
+    The image is uint8, shape (HEIGHT, WIDTH, 3); ``task`` are targets or blocks.
     """
-    return raycaster_of(cell).draw([*_robot_solids(cell, robot_q), *people, *task])
+    empty = cell.model_copy(update={"people": ()})  # the raycaster does not depend on people
+    return _raycaster(empty).draw([*_robot_solids(cell, robot_q), *people, *task])
 
 
 def _static_solids(cell: Cell) -> tuple[Solid, ...]:
@@ -189,11 +177,7 @@ def standing_workers(cell: Cell) -> list[Solid]:
 
 
 def target_solids(goal: Vec) -> list[Solid]:
-    """Return a target and the sphere of success around it.
-
-    Args:
-        goal: Position [m], shape (3,).
-    """
+    """Return a target at a position [m], shape (3,), and the sphere of success around it."""
     return [
         Capsule(start=goal, end=goal, radius=0.025, colour=TARGET),
         Capsule(start=goal, end=goal, radius=SUCCESS_DISTANCE, colour=TARGET, opacity=0.45),

@@ -2,11 +2,15 @@
 
 Source: ray and capsule by Quilez, "Intersectors" (2016); boxes and cylinders by the slab method
 of Kay and Kajiya (1986).
+
+A solid has a colour and an opacity; below 1 it is translucent, without shadow. ``corners``
+returns those of a box around it [m], shape (8, 3). ``hit`` intersects rays of given origins [m]
+and unit directions, each of shape (n, 3) or (3,); it returns the distance to the first point
+[m], inf where there is none, shape (n,), and its unit normal, shape (n, 3).
 """
 
 from dataclasses import dataclass
 from itertools import product
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,33 +18,6 @@ from numpy.typing import ArrayLike, NDArray
 Rgb = tuple[int, int, int]
 """A colour, sRGB, 0 to 255."""
 Floats = NDArray[np.float32]
-
-
-class Solid(Protocol):
-    """A convex solid of one colour."""
-
-    @property
-    def colour(self) -> Rgb:
-        """Colour."""
-
-    @property
-    def opacity(self) -> float:
-        """Opacity: 1 for solids; below 1 translucent, without shadow."""
-
-    def corners(self) -> Floats:
-        """Return the corners of a box around it [m], shape (8, 3)."""
-
-    def hit(self, origin: Floats, ray: Floats) -> tuple[Floats, Floats]:
-        """Intersect rays.
-
-        Args:
-            origin: Origins [m], shape (3,) or (n, 3).
-            ray: Their unit directions, shape (n, 3) or (3,).
-
-        Returns:
-            Distance to the first point [m], inf where there is none, (n,); its unit normal,
-            (n, 3).
-        """
 
 
 _UNIT = np.array(list(product((-1.0, 1.0), repeat=3)), dtype=np.float32)
@@ -62,13 +39,13 @@ class Capsule:
     opacity: float = 1.0
 
     def corners(self) -> Floats:
-        """Return the corners of a box around it [m], shape (8, 3)."""
+        """Return the corners of a box around it."""
         ends = np.stack([single(self.start), single(self.end)])
         low, high = ends.min(axis=0) - self.radius, ends.max(axis=0) + self.radius
         return single(0.5 * (low + high) + 0.5 * (high - low) * _UNIT)
 
     def hit(self, origin: Floats, ray: Floats) -> tuple[Floats, Floats]:
-        """Intersect rays; see :class:`Solid`."""
+        """Intersect rays."""
         a, b = single(self.start), single(self.end)
         axis, away = b - a, origin - a
         length2 = max(float(axis @ axis), 1e-12)
@@ -104,12 +81,12 @@ class Cylinder:
     opacity: float = 1.0
 
     def corners(self) -> Floats:
-        """Return the corners of a box around it [m], shape (8, 3)."""
+        """Return the corners of a box around it."""
         middle = single(self.base) + single([0.0, 0.0, 0.5 * self.height])
         return middle + single([self.radius, self.radius, 0.5 * self.height]) * _UNIT
 
     def hit(self, origin: Floats, ray: Floats) -> tuple[Floats, Floats]:
-        """Intersect rays; see :class:`Solid`."""
+        """Intersect rays."""
         away = origin - single(self.base)
         flat, start = ray[..., :2], away[..., :2]
         square = np.maximum(dot(flat, flat), 1e-12)
@@ -145,11 +122,11 @@ class Box:
         return single([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
     def corners(self) -> Floats:
-        """Return its corners [m], shape (8, 3)."""
+        """Return its corners."""
         return single(single(self.center) + single(self.half_size) * _UNIT @ self._turn().T)
 
     def hit(self, origin: Floats, ray: Floats) -> tuple[Floats, Floats]:
-        """Intersect rays; see :class:`Solid`."""
+        """Intersect rays."""
         turn, half = self._turn(), single(self.half_size)
         away, ray = single((origin - single(self.center)) @ turn), single(ray @ turn)
         pairs = [_slab(away[..., k], ray[..., k], -half[k], half[k]) for k in range(3)]
@@ -162,6 +139,9 @@ class Box:
         sign = np.take_along_axis(np.broadcast_to(ray, lows.shape), face[:, None], axis=1)
         np.put_along_axis(normal, face[:, None], -np.sign(sign), axis=1)
         return t, normal @ turn.T
+
+
+Solid = Capsule | Cylinder | Box
 
 
 def dot(a: Floats, b: Floats) -> Floats:

@@ -58,17 +58,14 @@ class Batch(SteppedBatch, Protocol):
 class SteppedTask(Protocol):
     """A batch with its spaces, for training."""
 
+    action_space: spaces.Space[Any]
+    """Space of one row's actions."""
+    observation_space: spaces.Space[Any]
+    """Space of one row's observations."""
+
     @property
     def batch(self) -> SteppedBatch:
         """The environments."""
-
-    @property
-    def action_space(self) -> spaces.Space[Any]:
-        """Space of one row's actions."""
-
-    @property
-    def observation_space(self) -> spaces.Space[Any]:
-        """Space of one row's observations."""
 
     def actions(self, given: Any) -> NDArray[Any]:
         """Return actions as the batch takes them."""
@@ -170,8 +167,6 @@ def next_episode(
     """Number and start the next episodes of some rows.
 
     Args:
-        batch: Batch of the rows.
-        rows: Numbers of the rows.
         seed: Seed of episode 0; None for the next episode of the present seed.
         episodes: Numbers of the episodes instead of these, from :func:`episodes_of`.
     """

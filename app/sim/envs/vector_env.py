@@ -101,9 +101,8 @@ class BatchVectorEnv(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
 
     def _chosen(self, mask: Any, seed: int | None) -> Mask:
         """Return the environments that a reset starts."""
-        every = np.ones(self.num_envs, dtype=np.bool_)
         if mask is None:
-            return every
+            return np.ones(self.num_envs, dtype=np.bool_)
         field, found = "options.reset_mask", np.asarray(mask)
         if found.dtype != np.bool_ or found.shape != (self.num_envs,):
             given = f"{found.dtype} of shape {found.shape}"
@@ -174,14 +173,7 @@ class BatchVectorEnv(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
         return _marked({"final_obs": last}, done) | {"final_info": info, "_final_info": done}
 
     def render(self) -> tuple[Image, ...] | None:
-        """Return an image of every environment, uint8, shape (360, 480, 3) each.
-
-        Returns:
-            None if the environment was made without a ``render_mode``.
-
-        Raises:
-            ResetNeeded: ``reset`` was never called.
-        """
+        """Return an image of every environment, as :meth:`SingleEnv.render` does."""
         if self.render_mode is None:
             gymnasium.logger.warn("render() needs an environment made with a render_mode")
             return None
@@ -207,13 +199,10 @@ def _marked(infos: dict[str, NDArray[Any]], rows: Mask) -> dict[str, Any]:
 
 def _only(infos: dict[str, NDArray[Any]], rows: Mask) -> dict[str, NDArray[Any]]:
     """Return infos with None or 0 in all other environments."""
-    empty = {
-        name: np.full_like(values, None if values.dtype == object else 0)
-        for name, values in infos.items()
-    }
-    for name, values in infos.items():
-        empty[name][rows] = values[rows]
-    return empty
+    found = {name: values.copy() for name, values in infos.items()}
+    for values in found.values():
+        values[~rows] = None if values.dtype == object else 0
+    return found
 
 
 def _autoreset_of(mode: str | AutoresetMode) -> AutoresetMode:
