@@ -21,10 +21,8 @@ from app.sim.safety.kernels.adversarial_people import Trial, new_trial_work
 from app.sim.safety.kernels.adversarial_trials import (
     ALLOWED,
     CONTACT,
-    MODE,
     MOVING,
     N_RESULT,
-    POLICY,
     SLOWED,
     SPEED,
     STEPS,
@@ -34,9 +32,6 @@ from app.sim.safety.kernels.adversarial_trials import (
 from app.sim.safety.kernels.separation_check import new_ssm_workspace
 from app.sim.safety.layer import SafetySettings, separation_rule
 from app.sim.scene.scene import HumanKind, arm_of, new_people_state, people_of, with_people
-
-POLICIES = ("smooth", "constant", "goals", "bang-bang")
-MODES = ("script", "straight", "zig-zag", "tease")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -67,8 +62,6 @@ class TrialResult:
 
     rows: Vec
     """One row per episode; see ``safety/kernels/adversarial_trials.py``."""
-    dt: float
-    """Control period [s]."""
 
     @property
     def n(self) -> int:
@@ -110,15 +103,6 @@ class TrialResult:
         """Share of all periods in which the override was below 1, stops included."""
         return float(self.rows[:, SLOWED].sum() / self.rows[:, STEPS].sum())
 
-    def of(self, policy: str | None = None, mode: str | None = None) -> "TrialResult":
-        """Return the episodes of one policy, or of one behaviour of people."""
-        kept = np.ones(self.n, dtype=bool)
-        if policy is not None:
-            kept &= self.rows[:, POLICY] == POLICIES.index(policy)
-        if mode is not None:
-            kept &= self.rows[:, MODE] == MODES.index(mode)
-        return TrialResult(rows=self.rows[kept], dt=self.dt)
-
 
 def run_trial(
     settings: TrialSettings, n_episodes: int, seed: int, first: int = 0
@@ -142,10 +126,7 @@ def run_trial(
     geometry = new_people_geometry(people, len(cell.workers), len(cell.cylinders))
     n_late = ceil(settings.true_delay / arm.dt - 1e-9)
     shape = (people.columns.shape[1], len(cell.cylinders))
-    spaces = (
-        new_ssm_workspace(arm, *shape),
-        new_ssm_workspace(arm, *shape),
-    )
+    spaces = new_ssm_workspace(arm, *shape), new_ssm_workspace(arm, *shape)
     work = new_trial_work(arm, people, state, geometry, spaces, n_late)
     rows = np.zeros((n_episodes, N_RESULT))
     trial = Trial(
@@ -157,4 +138,4 @@ def run_trial(
         action=settings.action.rule(),
     )
     safety_trial.run_episodes(arm, people, trial, seed, first, work, rows)
-    return TrialResult(rows=rows, dt=arm.dt)
+    return TrialResult(rows=rows)

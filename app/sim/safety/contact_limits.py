@@ -82,26 +82,16 @@ CAPSULE_REGIONS: tuple[tuple[str, ...], ...] = (
 """Regions that each of a worker's capsules covers; the most delicate one counts."""
 
 
-def reduced_mass(region: Region, robot_mass: float) -> float:
-    """Return the reduced mass of a region and the robot [kg].
-
-    Args:
-        region: Body region.
-        robot_mass: Effective mass of the robot, M/2 + m_L [kg].
-    """
-    return 1.0 / (1.0 / region.mass + 1.0 / robot_mass)
-
-
 def contact_speed(region: Region, robot_mass: float, contact_area: float) -> float:
     """Return the greatest speed of a transient contact with a region [m/s].
 
     Args:
-        region: Body region.
         robot_mass: Effective mass of the robot, M/2 + m_L [kg].
         contact_area: Area over which the robot touches [cm^2].
     """
     force = region.transient * min(region.force, region.pressure * contact_area)
-    return force / math.sqrt(reduced_mass(region, robot_mass) * 1000.0 * region.stiffness)
+    reduced_mass = 1.0 / (1.0 / region.mass + 1.0 / robot_mass)
+    return force / math.sqrt(reduced_mass * 1000.0 * region.stiffness)
 
 
 def capsule_contact_speeds(robot_mass: float, contact_area: float) -> Vec:
