@@ -12,10 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.sim.cells.cell import Cell
+from app.sim.core.arrays import Vec
 from app.sim.reach.batch import ReachBatch, ReachSettings
 from app.sim.reach.kernels import queries
 from app.sim.reach.recipe_rules import BlockedRules
-from app.sim.scenario.kernels.episode import RUNNING, SUCCESS_DISTANCE
+from app.sim.scenario.kernels.episode import RUNNING, SUCCESS_DISTANCE, Indices
 
 CONTACT = 2e-3
 """Clearance up to which the contact test may report a contact [m]."""
@@ -33,24 +34,16 @@ class BlockedReachBatch(ReachBatch):
     def _move(self, act: NDArray[np.float32]) -> None:
         """Step every running environment, block arms in contact, and fill rewards."""
         state = self.state
-        live = state.outcome == RUNNING
-        q, robot, clear = state.q.copy(), state.robot.copy(), state.clear.copy()
-        distance, touched = state.distance.copy(), state.touched.copy()
+        live, touched = state.outcome == RUNNING, state.touched.copy()
+        before = [part.copy() for part in (state.q, state.robot, state.clear, state.distance)]
         super()._move(act)
         contact = state.touched > touched
         envs = np.flatnonzero(contact)
         if envs.size:
-            self._block(envs, q[envs], robot[envs], clear[envs], distance[envs])
+            self._block(envs, *(part[envs] for part in before))
         self._rew[:] = np.where(live, self._rewards(act, contact), 0.0)
 
-    def _block(
-        self,
-        envs: NDArray[np.int64],
-        q: NDArray[np.float64],
-        robot: NDArray[np.float64],
-        clear: NDArray[np.float64],
-        distance: NDArray[np.float64],
-    ) -> None:
+    def _block(self, envs: Indices, q: Vec, robot: Vec, clear: Vec, distance: Vec) -> None:
         """Undo the joint motion of environments in which it deepens a contact.
 
         Args:
@@ -72,9 +65,7 @@ class BlockedReachBatch(ReachBatch):
         state.qd[held], state.qdd[held] = 0.0, 0.0
         state.distance[held] = distance[blocked]
 
-    def _rewards(
-        self, act: NDArray[np.float32], contact: NDArray[np.bool_]
-    ) -> NDArray[np.float64]:
+    def _rewards(self, act: NDArray[np.float32], contact: NDArray[np.bool_]) -> Vec:
         """Return the rewards of this period, shape (n_envs,)."""
         weights, d = self.settings.weights, self.state.distance
         rules = self.settings.blocked or BlockedRules()

@@ -28,7 +28,7 @@ part of the segment, and its axis may pass behind the goal.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -75,35 +75,14 @@ BEHIND = (0.2, 3.0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Crossing:
-    """One crossing person and the goal of the robot."""
-
-    number: int
-    """Number in its set."""
-    goal: Vec
-    """Goal of the tcp [m], shape (3,)."""
-    track: Vec
-    """The person's x, y and radius at the ends of control periods [m], shape (n + 1, 3)."""
-    arrival: float
-    """Time when the axis reaches the segment [s]."""
-    speed: float
-    """Walking speed [m/s]; of a recorded person, at the crossing."""
-    dwell: float
-    """Time at rest on the segment [s]; NaN for a recorded person."""
-    source: str
-    """Recording; empty for a simulated walk."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class CrossingSet:
     """Crossings of one cell as arrays."""
 
     goals: Vec
-    """Goals [m], shape (n, 3)."""
+    """Goals of the tcp [m], shape (n, 3)."""
     tracks: Vec
-    """Cylinders: x, y, radius [m], shape (n, n_cycles + 1, 3); the last one repeats."""
-    crossings: tuple[Crossing, ...]
-    """The crossings."""
+    """People's x, y and radius at the ends of control periods [m], shape (n, n_cycles + 1, 3);
+    the last row of a shorter track repeats."""
 
 
 def tcp_at_home(cell: Cell) -> Vec:
@@ -117,8 +96,7 @@ def covered(track: Vec, start: Vec, goal: Vec) -> NDArray[np.bool_]:
 
     Args:
         track: x, y, radius at the ends of control periods [m], shape (n + 1, 3).
-        start: Start of the segment [m], shape (>= 2,).
-        goal: Its end [m], shape (>= 2,).
+        start: Start of the segment [m], shape (3,); ``goal`` is its end.
     """
     segment = goal[:2] - start[:2]
     offset = track[:, :2] - start[:2]
@@ -133,44 +111,31 @@ def crossings(cell: Cell, n: int = N_CROSSINGS, seed: int = SEED) -> CrossingSet
     Raises:
         InvalidInput: ``n`` is 0, or the cell has no goal region or no space for a person.
     """
-    if n < 1:
-        raise InvalidInput("crossings", n, "must be at least 1")
     home = tcp_at_home(cell)
-    return _set_of([_walk(cell, home, seed, number) for number in range(n)])
+    return _set_of(lambda number: _walk(cell, home, seed, number), n)
 
 
 def recorded_crossings(cell: Cell, motions: Sequence[Motion], n: int) -> CrossingSet:
     """Return crossings made from recorded people.
 
     Args:
-        cell: Work cell with a goal region.
         motions: Runs of recorded motion without artifacts.
         n: Number of crossings; each is determined by its number and the motions.
 
     Raises:
         InvalidInput: ``n`` is 0, there is no motion, or no motion crosses the segment.
     """
-    if n < 1:
-        raise InvalidInput("crossings", n, "must be at least 1")
     if not motions:
         raise InvalidInput("motions", 0, "must hold at least one run of recorded motion")
     home, dt = tcp_at_home(cell), cell.robot.dt
     cylinders = [cylinder_track(motion, cell.floor_z, dt) for motion in motions]
-    found = []
-    for number in range(n):
-        found.append(_recorded(cell, home, motions, cylinders, number))
-    return _set_of(found)
+    return _set_of(lambda number: _recorded(cell, home, motions, cylinders, number), n)
 
 
 def cylinder_track(motion: Motion, floor_z: float, dt: float) -> Vec:
-    """Return a recorded person as cylinders: x, y, radius [m], shape (n, 3).
+    """Return a recorded person as cylinders every ``dt`` [s]: x, y, radius [m], shape (n, 3).
 
     Source: docs/method.md 2.8.
-
-    Args:
-        motion: One run.
-        floor_z: Height of the floor [m].
-        dt: Time between cylinders [s].
     """
     settings = CylinderSettings(flesh_margin=0.0)
     size = motion.size.vector(floor_z)
@@ -184,21 +149,17 @@ def cylinder_track(motion: Motion, floor_z: float, dt: float) -> Vec:
     return np.array(rows)
 
 
-def _set_of(found: Sequence[Crossing]) -> CrossingSet:
-    longest = max(len(crossing.track) for crossing in found)
-    tracks = np.empty((len(found), longest, 3))
-    for row, crossing in zip(tracks, found, strict=True):
-        row[: len(crossing.track)] = crossing.track
-        row[len(crossing.track) :] = crossing.track[-1]
-    return CrossingSet(
-        goals=np.stack([crossing.goal for crossing in found]),
-        tracks=tracks,
-        crossings=tuple(found),
-    )
+def _set_of(draw: Callable[[int], tuple[Vec, Vec]], n: int) -> CrossingSet:
+    if n < 1:
+        raise InvalidInput("crossings", n, "must be at least 1")
+    goals, tracks = zip(*map(draw, range(n)), strict=True)
+    longest = max(map(len, tracks))
+    padded = [np.pad(one, ((0, longest - len(one)), (0, 0)), "edge") for one in tracks]
+    return CrossingSet(goals=np.stack(goals), tracks=np.stack(padded))
 
 
-def _walk(cell: Cell, home: Vec, seed: int, number: int) -> Crossing:
-    """Draw a crossing that is clear of the robot at home."""
+def _walk(cell: Cell, home: Vec, seed: int, number: int) -> tuple[Vec, Vec]:
+    """Draw goal and track of a crossing that is clear of the robot at home."""
     rng = np.random.default_rng([seed, number])
     for _ in range(TRIES):
         goal = _goal(cell, rng)
@@ -210,19 +171,9 @@ def _walk(cell: Cell, home: Vec, seed: int, number: int) -> Crossing:
         signed = np.where(
             times < arrival, times - arrival, np.maximum(0.0, times - arrival - dwell)
         )
-        track = np.empty((len(times), 3))
-        track[:, :2] = there + speed * signed[:, None] * course
-        track[:, 2] = radius
+        track = _straight(there, speed * signed, course, radius)
         if _clear_of_home(cell, track):
-            return Crossing(
-                number=number,
-                goal=goal,
-                track=track,
-                arrival=arrival,
-                speed=speed,
-                dwell=dwell,
-                source="",
-            )
+            return goal, track
     raise InvalidInput(
         "cell", cell.name, "has no space for a person between the robot and its goals"
     )
@@ -234,8 +185,8 @@ def _recorded(
     motions: Sequence[Motion],
     cylinders: Sequence[Vec],
     number: int,
-) -> Crossing:
-    """Draw goal, recording and moment of a crossing that is clear of the robot at home."""
+) -> tuple[Vec, Vec]:
+    """Draw goal and track of a recorded crossing that is clear of the robot at home."""
     rng, dt = np.random.default_rng([SEED, number, 1]), cell.robot.dt
     for _ in range(TRIES):
         goal, which = _goal(cell, rng), int(rng.integers(len(motions)))
@@ -245,23 +196,16 @@ def _recorded(
             continue
         first = int(rng.integers(len(cylinders[which]) - lead))
         run = cylinders[which][first : first + round(LONGEST_S / dt)].copy()
-        speed = _turn(run, lead, there, course, dt)
-        if speed < LEAST_STEP:
+        if _turn(run, lead, there, course, dt) < LEAST_STEP:
             continue
-        track = np.vstack([run, _leaving(run[-1], course, dt)])
+        steps = np.arange(1, math.ceil(FAR / LEAVE_SPEED / dt) + 1)
+        leaving = _straight(run[-1, :2], LEAVE_SPEED * dt * steps, course, run[-1, 2])
+        track = np.vstack([run, leaving])
         crossed = covered(track, home, goal)
         first_covered = float(np.argmax(crossed) * dt)
         in_time = crossed.any() and 0.0 < first_covered <= ARRIVAL[1]
         if in_time and _clear_of_home(cell, track):
-            return Crossing(
-                number=number,
-                goal=goal,
-                track=track,
-                arrival=first_covered,
-                speed=speed,
-                dwell=math.nan,
-                source=f"{motions[which].source}, from {first * dt:.2f} s",
-            )
+            return goal, track
     names = sorted({motion.name for motion in motions})
     raise InvalidInput("motions", names, "must contain a person who walks across the segment")
 
@@ -293,13 +237,9 @@ def _across(
     return there, np.array([math.cos(course), math.sin(course)])
 
 
-def _leaving(last: Vec, course: Vec, dt: float) -> Vec:
-    """Return the track of a person who leaves along the course after a recording."""
-    steps = np.arange(1, math.ceil(FAR / LEAVE_SPEED / dt) + 1)
-    track = np.empty((len(steps), 3))
-    track[:, :2] = last[:2] + LEAVE_SPEED * dt * steps[:, None] * course
-    track[:, 2] = last[2]
-    return track
+def _straight(there: Vec, along: NDArray[np.floating], course: Vec, radius: float) -> Vec:
+    """Return the track of a person at distances ``along`` a course [m], shape (n, 3)."""
+    return np.column_stack([there + along[:, None] * course, np.full(len(along), radius)])
 
 
 def _clear_of_home(cell: Cell, track: Vec) -> bool:

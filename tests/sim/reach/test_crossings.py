@@ -67,31 +67,43 @@ def crossing_time(track: Vec, start: Vec, goal: Vec, dt: float) -> float:
     return math.inf
 
 
+def steps_of(track: Vec) -> Vec:
+    """Return the speeds of a track's periods until it ends [m/s]."""
+    steps = np.linalg.norm(np.diff(track[:, :2], axis=0), axis=1) / DT
+    return steps[: np.flatnonzero(steps)[-1] + 1]
+
+
 def test_every_one_of_the_200_crosses_between_the_robot_and_its_goal(evaluated):
-    assert len(evaluated.crossings) == len(evaluated.goals) == 200
-    for one in evaluated.crossings:
-        found = crossing_time(one.track, HOME, one.goal, DT)
-        assert found == pytest.approx(one.arrival, abs=DT + 1e-9)
-        assert covered(one.track, HOME, one.goal)[round(one.arrival / DT)]
+    assert len(evaluated.tracks) == len(evaluated.goals) == 200
+    for track, goal in zip(evaluated.tracks, evaluated.goals, strict=True):
+        arrival = crossing_time(track, HOME, goal, DT)
+        assert crossing.ARRIVAL[0] - DT <= arrival <= crossing.ARRIVAL[1] + DT
+        assert covered(track, HOME, goal)[round(arrival / DT)]
 
 
 def test_they_keep_to_the_stated_ranges(evaluated):
     half = 0.5 * np.array(CELL.goal_region.size)
     assert (np.abs(evaluated.goals - CELL.goal_region.center) <= half).all()
-    for one in evaluated.crossings:
-        assert crossing.ARRIVAL[0] <= one.arrival <= crossing.ARRIVAL[1]
-        steps = np.linalg.norm(np.diff(one.track[:, :2], axis=0), axis=1) / DT
-        assert steps.max() == pytest.approx(one.speed)
-        assert crossing.SPEED[0] <= one.speed <= crossing.SPEED[1]
-        assert crossing.RADIUS[0] <= one.track[0, 2] <= crossing.RADIUS[1]
-        stands = (steps < 1e-9).sum() * DT
-        assert stands == pytest.approx(one.dwell, abs=2 * DT)
-        assert crossing.DWELL[0] <= one.dwell <= crossing.DWELL[1]
+    speeds, radii, dwells = [], [], []
+    for track in evaluated.tracks:
+        steps = steps_of(track)
+        speeds.append(steps.max())
+        radii.append(track[0, 2])
+        dwells.append((steps < 1e-9).sum() * DT)
+        moving = steps[(steps > 1e-9) & (steps < steps.max() - 1e-9)]
+        assert len(moving) <= 2  # the periods in which the person stops and starts
+    for found, (low, high), slack in (
+        (speeds, crossing.SPEED, 1e-9),
+        (radii, crossing.RADIUS, 0.0),
+        (dwells, crossing.DWELL, 2 * DT),
+    ):
+        assert low - slack <= min(found) < low + 0.2 * (high - low)
+        assert high - 0.2 * (high - low) < max(found) <= high + slack
 
 
 def test_they_begin_away_from_home_and_never_touch_a_robot_that_waits_there(evaluated):
-    for one in evaluated.crossings[::20]:
-        found = clearances_at_home(one.track[::10])
+    for track in evaluated.tracks[::20]:
+        found = clearances_at_home(track[::10])
         assert found[0] >= crossing.AT_START
         assert found.min() >= crossing.CLEAR - 0.01
         assert found[-1] > 2.0
@@ -99,16 +111,16 @@ def test_they_begin_away_from_home_and_never_touch_a_robot_that_waits_there(eval
 
 def test_a_crossing_is_fixed_by_seed_and_number(evaluated):
     again = crossings(CELL, 3)
-    for k in range(3):
-        np.testing.assert_array_equal(again.crossings[k].track, evaluated.crossings[k].track)
+    n = again.tracks.shape[1]
+    np.testing.assert_array_equal(again.tracks, evaluated.tracks[:3, :n])
     assert not np.array_equal(crossings(CELL, 3, seed=1).goals, again.goals)
 
 
 def test_shorter_tracks_of_a_set_stay_where_they_end(evaluated):
-    one = min(evaluated.crossings, key=lambda each: len(each.track))
-    rest = evaluated.tracks[one.number, len(one.track) :]
+    alone = crossings(CELL, 1).tracks[0]
+    rest = evaluated.tracks[0, len(alone) :]
     assert len(rest) > 0
-    assert (rest == one.track[-1]).all()
+    assert (rest == alone[-1]).all()
 
 
 def test_an_axis_that_passes_behind_the_goal_does_not_cross():
@@ -126,13 +138,14 @@ def test_recorded_people_become_cylinders_that_cover_the_segment():
     run = cylinder_track(motion, CELL.floor_z, DT)
     assert np.linalg.norm(run[-1, :2] - run[0, :2]) == pytest.approx(2.4, abs=0.3)
     found = recorded_crossings(CELL, [motion], 4)
-    for one in found.crossings:
-        over = covered(one.track, HOME, one.goal)
-        assert np.argmax(over) * DT == pytest.approx(one.arrival)
-        assert 0.0 < one.arrival <= crossing.ARRIVAL[1]
-        assert crossing.LEAST_STEP <= one.speed <= 1.2
-        assert "made-up.csv" in one.source
-        assert clearances_at_home(one.track[::5]).min() >= crossing.CLEAR - 0.01
+    for track, goal in zip(found.tracks, found.goals, strict=True):
+        arrival = np.argmax(covered(track, HOME, goal)) * DT
+        assert 0.0 < arrival <= crossing.ARRIVAL[1]
+        behind = HOME + crossing.BEHIND[1] * (goal - HOME)
+        k, half = round(crossing_time(track, HOME, behind, DT) / DT), round(0.5 / DT)
+        step = np.linalg.norm(track[k + half, :2] - track[max(k - half, 0), :2])
+        assert crossing.LEAST_STEP <= step <= 1.2
+        assert clearances_at_home(track[::5]).min() >= crossing.CLEAR - 0.01
 
 
 def test_recordings_of_people_who_stand_still_are_refused_by_name():

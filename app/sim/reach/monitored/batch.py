@@ -66,9 +66,8 @@ class MonitoredReachBatch(ReachBatch):
         monitoring: MonitoringSettings = DEFAULT_MONITORING,
         *,
         tracks: Vec | None = None,
-        first_env: int = 0,
     ) -> None:
-        super().__init__(cell, n_envs, seed, settings, first_env)
+        super().__init__(cell, n_envs, seed, settings)
         self.safety, self.n_tracks = safety, 0 if tracks is None else len(tracks)
         if tracks is not None:
             self._require_tracks(tracks)
