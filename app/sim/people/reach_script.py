@@ -146,40 +146,33 @@ def reach_script(
     cell: Cell,
     hand: Hand,
     palms: tuple[Vec, Vec],
-    pelvis_x: tuple[float | None, float | None] = (None, None),
-    delay_s: float = 0.4,
+    delay_s: float,
 ) -> ReachScript:
     """Return a single reach between two points with deterministic postures.
 
     Args:
         hand: Working hand.
         palms: Initial and final palm position [m], shape (3,) each; equal for no motion.
-        pelvis_x: Initial and final pelvis x [m]; None follows the palm.
         delay_s: Rest before the move [s].
     """
-    postures = [
-        standing_reach(cell, palm, hand, stand)
-        for palm, stand in zip(palms, pelvis_x, strict=True)
-    ]
+    postures = [standing_reach(cell, palm, hand) for palm in palms]
     distance = float(np.linalg.norm(np.subtract(*palms)))
     duration = max(SHORTEST_REACH_S, distance / REACH_PACE)
     return ReachScript(np.array([delay_s]), np.array([duration]), np.array(postures))
 
 
-def standing_reach(cell: Cell, palm: Vec, hand: Hand, pelvis_x: float | None) -> Vec:
+def standing_reach(cell: Cell, palm: Vec, hand: Hand) -> Vec:
     """Return a posture with one palm at a point and the other at the table's edge.
 
     Args:
         palm: Position of the palm [m], shape (3,).
         hand: The hand.
-        pelvis_x: Pelvis x [m]; None follows the palm.
 
     Returns:
         Joint positions [m, rad], shape (18,).
     """
     sign = -1.0 if hand == "r" else 1.0
-    x = 0.8 * palm[0] - sign * 0.12 if pelvis_x is None else pelvis_x
-    x = float(np.clip(x, cell.human.x_min, cell.human.x_max))
+    x = float(np.clip(0.8 * palm[0] - sign * 0.12, cell.human.x_min, cell.human.x_max))
     start = human.rest_posture(x, cell.human.y_min + 0.03, cell.human.home[2])
     support = np.array([x + sign * -0.25, cell.table.y_max - 0.03, 0.06])
     right, left = (palm, support) if hand == "r" else (support, palm)

@@ -172,13 +172,7 @@ def _clearances(beside: list[Checker], q: Vec) -> Vec:
 
 
 def case_geometry(cell: Cell, case: Case, person: PersonGeometry | None = None) -> CaseGeometry:
-    """Measure a case study.
-
-    Args:
-        cell: Its cell.
-        case: The case.
-        person: Its person, where already measured.
-    """
+    """Measure a case study; ``person`` is its person, where already measured."""
     stations, start = stations_of(cell), case.robot_start
     nearer, farther = sorted(case.goals, key=lambda goal: stations.tool_path_m[start, goal])
     return CaseGeometry(

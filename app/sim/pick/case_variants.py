@@ -95,7 +95,7 @@ def _nearer_and_beside(shown: CaseGeometry) -> bool:
 
 
 def _nearer_under_hand(shown: CaseGeometry) -> bool:
-    first, last = _blocked(shown, shown.nearer)
+    first, last = _nearer_blocked(shown)
     return (
         first == 0.0
         and last == shown.person.times[LAST]
@@ -105,7 +105,7 @@ def _nearer_under_hand(shown: CaseGeometry) -> bool:
 
 
 def _nearer_for_a_while(shown: CaseGeometry) -> bool:
-    first, last = _blocked(shown, shown.nearer)
+    first, last = _nearer_blocked(shown)
     when = int(np.searchsorted(shown.person.times, first))
     return (
         _free(shown, shown.nearer, FIRST)
@@ -119,7 +119,7 @@ def _nearer_for_a_while(shown: CaseGeometry) -> bool:
 
 
 def _nearer_for_good(shown: CaseGeometry) -> bool:
-    (first, last), times = _blocked(shown, shown.nearer), shown.person.times
+    (first, last), times = _nearer_blocked(shown), shown.person.times
     after = shown.person.goal_m[shown.nearer][times >= first]
     start, end = shown.blocked_s(shown.farther) or (0.0, 0.0)
     return (
@@ -134,9 +134,9 @@ def _nearer_for_good(shown: CaseGeometry) -> bool:
     )
 
 
-def _blocked(shown: CaseGeometry, goal: str) -> tuple[float, float]:
-    """Return the first and the last time at which a goal is blocked [s]; inf for never."""
-    return shown.blocked_s(goal) or (np.inf, np.inf)
+def _nearer_blocked(shown: CaseGeometry) -> tuple[float, float]:
+    """Return the first and the last time of the nearer goal's block [s]; inf for never."""
+    return shown.blocked_s(shown.nearer) or (np.inf, np.inf)
 
 
 DESCRIPTIONS: Mapping[str, CaseDescription] = {
@@ -202,7 +202,7 @@ def variants_of(cell: Cell, case: Case) -> tuple[Case, ...]:
             continue
         for candidate in _robots(cell, moved):
             shown = case_geometry(cell, candidate, person)
-            if agrees(case.id, shown) and not _same(candidate, case):
+            if agrees(case.id, shown) and _id_of(candidate) != _id_of(case):
                 expected = shown.nearer if described.to_nearer else shown.farther
                 found.append(
                     replace(
@@ -238,11 +238,6 @@ def _robots(cell: Cell, case: Case) -> Iterator[Case]:
     for station, goals in product(cell.pick_stations, combinations(cubes, 2)):
         if station.id not in goals:
             yield replace(case, robot_start=station.id, goals=goals)
-
-
-def _same(one: Case, other: Case) -> bool:
-    """Return whether two cases have the same stations and hand."""
-    return _id_of(one) == _id_of(replace(other, id=one.id))
 
 
 def _id_of(case: Case) -> str:

@@ -48,8 +48,6 @@ class Case:
     """Palm relative to its stations [m]."""
     delay_s: float = 0.4
     """Rest of the person before the move [s]."""
-    pelvis_x: tuple[float | None, float | None] = (None, None)
-    """The person's x at the start and at the end [m]; None follows the palm."""
 
 
 CASES = (
@@ -146,4 +144,4 @@ def palms_of(cell: Cell, case: Case) -> Vec:
 def script_of(cell: Cell, case: Case) -> ReachScript:
     """Return the person's movement in a case study."""
     first, last = palms_of(cell, case)
-    return reach_script(cell, case.hand, (first, last), case.pelvis_x, case.delay_s)
+    return reach_script(cell, case.hand, (first, last), case.delay_s)

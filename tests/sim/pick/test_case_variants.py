@@ -51,7 +51,7 @@ def test_a_variant_keeps_what_its_case_expects(case):
         assert agrees(case.id, shown)
         assert one.first == (case.first and shown.nearer)
         assert (one.expected == shown.nearer) == (case.expected == nearer_of(case))
-        kept = ("switches", "palm_offset", "delay_s", "pelvis_x")
+        kept = ("switches", "palm_offset", "delay_s")
         assert all(getattr(one, name) == getattr(case, name) for name in kept)
 
 

@@ -45,7 +45,7 @@ class HandMotion:
 def motion_of(cell: Cell, motion: HandMotion, name: str) -> Motion:
     """Return a motion as joint positions of the cell's person."""
     palms = np.array(motion.palms)
-    postures = [standing_reach(cell, palm, motion.hand, None) for palm in palms]
+    postures = [standing_reach(cell, palm, motion.hand) for palm in palms]
     duration = np.linalg.norm(np.diff(palms, axis=0), axis=1) / motion.speeds
     duration = np.maximum(duration, SAMPLE_S)
     start = np.cumsum(motion.pauses) + np.concatenate([[0.0], np.cumsum(duration)[:-1]])
