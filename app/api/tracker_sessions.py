@@ -17,7 +17,7 @@ from dataclasses import dataclass, field, replace
 from app.errors import Conflict, NotFound
 from app.sim.core.arrays import Vec
 from app.sim.perception.multi_person_tracker import MultiPersonTracker, UnassignedDetection
-from app.sim.perception.person_estimator import Flag, PersonEstimate
+from app.sim.perception.person_estimator import STALE_S, Flag, PersonEstimate
 from app.sim.perception.stamp_timeline import StampTimeline
 
 MAX_SESSIONS = 32
@@ -147,7 +147,7 @@ class TrackerSession:
         added: list[Flag] = []
         if self.timeline.out_of_step or self.timeline.jumped:
             added.append("clock-jump")
-        silent = since_frame_s > self.estimator.settings.stale_s
+        silent = since_frame_s > STALE_S
         if self.timeline.out_of_step or self.timeline.stamp is None or silent:
             added.append("stale")
         if not added:

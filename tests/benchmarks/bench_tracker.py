@@ -17,8 +17,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from app.sim.perception.bounding_cylinder import FLESH_MARGIN, GROWTH
+from app.sim.perception.kalman_filter import HOLD_S
 from app.sim.perception.keypoint_sensor_model import KeypointSensorSettings
-from app.sim.perception.person_estimator import EstimatorSettings
+from app.sim.perception.person_estimator import STALE_S
 from tests.benchmarks.measure import Row, arguments, report
 from tests.sim.tracker_errors import SECONDS, SEEDS, errors
 
@@ -74,12 +76,11 @@ def shown(value: object) -> str:
 def main() -> None:
     """Measure and print."""
     options = arguments(BENCH)
-    settings = EstimatorSettings()
     stated = {
-        "flesh_margin_m": settings.cylinder.flesh_margin,
-        "hold_s": settings.filter.hold_s,
-        "growth_m_s": settings.cylinder.growth,
-        "stale_s": settings.stale_s,
+        "flesh_margin_m": FLESH_MARGIN,
+        "hold_s": HOLD_S,
+        "growth_m_s": GROWTH,
+        "stale_s": STALE_S,
     }
     rows = [measured(name) for name in ROWS]
     if options.json:

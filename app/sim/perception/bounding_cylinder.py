@@ -21,31 +21,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from app.errors import InvalidInput
 from app.sim.core.arrays import Vec
 from app.sim.perception.keypoints import BODY_25, N_KEYPOINTS, K
 
 RADIUS_FACTOR = 1.1
 """Factor on the radius (docs/method.md 2.8)."""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class CylinderSettings:
-    """Margins of the safety cylinder."""
-
-    flesh_margin: float = 0.17
-    """Added to the radius and to the top [m]. Around exact key-points of a person at work,
-    0.131 m contain the whole surface of the median body and 0.145 m that of the 95th percentile
-    (stature, arms, shoulders); crown and fingertips determine both. The rest is for noise."""
-    growth: float = 1.6
-    """Speed at which the radius grows while nothing is seen and the hold time is over [m/s];
-    walking speed of ISO 13855."""
-
-    def __post_init__(self) -> None:
-        for name in ("flesh_margin", "growth"):
-            value = getattr(self, name)
-            if not (np.isfinite(value) and value >= 0.0):
-                raise InvalidInput(name, value, "must be finite and not negative")
+FLESH_MARGIN = 0.17
+"""Added to the radius and to the top [m]. Around exact key-points of a person at work, 0.131 m
+contain the whole surface of the median body and 0.145 m that of the 95th percentile (stature,
+arms, shoulders); crown and fingertips determine both. The rest is for noise."""
+GROWTH = 1.6
+"""Speed at which the radius grows while nothing is seen and the hold time is over [m/s];
+walking speed of ISO 13855."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -122,18 +109,17 @@ def bounding_box(points: Vec) -> Vec:
 
 
 def safety_cylinder(
-    points: Vec, velocity: Vec | None = None, settings: CylinderSettings | None = None
+    points: Vec, velocity: Vec | None = None, flesh_margin: float = FLESH_MARGIN
 ) -> SafetyCylinder | None:
     """Return the safety cylinder around key-points, or None where all are missing.
 
     Args:
         points: Key-points [m], shape (25, 3), NaN where missing for longer than the hold time.
         velocity: Velocity of the cylinder's axis [m/s], shape (2,); zero where None.
-        settings: Margins.
+        flesh_margin: Added to the radius and to the top [m].
 
     Source: docs/method.md 2.8. Deviates: see the head of this file.
     """
-    settings = settings or CylinderSettings()
     seen = np.asarray(np.isfinite(points).all(axis=1))
     if not seen.any():
         return None
@@ -145,9 +131,9 @@ def safety_cylinder(
     wide, high = _unseen_reach(points, seen, center)
     return SafetyCylinder(
         center=center,
-        radius=max(RADIUS_FACTOR * radius, wide) + settings.flesh_margin,
+        radius=max(RADIUS_FACTOR * radius, wide) + flesh_margin,
         bottom=float(corners[:, 2].min()),
-        top=max(top, high) + settings.flesh_margin,
+        top=max(top, high) + flesh_margin,
         velocity=np.zeros(2) if velocity is None else np.array(velocity),
     )
 

@@ -7,51 +7,36 @@ that an unseen point comes to rest, and is driven by white acceleration:
     Q = a^2 [dt^4/4, dt^3/2; dt^3/2, dt^2].
 
 The three axes of a point share one covariance. Gating rejects a measurement farther from the
-prediction than ``gate + max_speed dt``, with dt since the last measurement: the point then
+prediction than ``GATE + MAX_SPEED dt``, with dt since the last measurement: the point then
 counts as unseen, and restarts after the hold time.
 
 Source: Bar-Shalom et al., Estimation with Applications to Tracking and Navigation (2001),
 ch. 6; Singer (1970) for the decay, here of the speed.
 """
 
-from dataclasses import dataclass, fields
-
 import numpy as np
 from numpy.typing import NDArray
 
-from app.errors import InvalidInput
 from app.sim.core.arrays import Vec
 
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class FilterSettings:
-    """Noise of state and measurement, gate and times."""
-
-    noise: float = 0.02
-    """Standard deviation of a measurement at confidence 1, per axis [m]."""
-    acceleration: float = 2.5
-    """Standard deviation of the driving acceleration, per axis [m/s^2]."""
-    memory_s: float = 0.4
-    """Time constant tau of the speed [s]."""
-    hold_s: float = 0.5
-    """Time for which an unseen point is predicted [s]."""
-    gate: float = 0.2
-    """Distance from the prediction at which a measurement is rejected, without delay [m]."""
-    max_speed: float = 4.0
-    """Speed that widens the gate with the time since the point was seen [m/s]."""
-
-    def __post_init__(self) -> None:
-        for item in fields(self):
-            value = getattr(self, item.name)
-            if not (np.isfinite(value) and value > 0.0):
-                raise InvalidInput(item.name, value, "must be finite and greater than 0")
+NOISE = 0.02
+"""Standard deviation of a measurement at confidence 1, per axis [m]."""
+ACCELERATION = 2.5
+"""Standard deviation of the driving acceleration, per axis [m/s^2]."""
+MEMORY_S = 0.4
+"""Time constant tau of the speed [s]."""
+HOLD_S = 0.5
+"""Time for which an unseen point is predicted [s]."""
+GATE = 0.2
+"""Distance from the prediction at which a measurement is rejected, without delay [m]."""
+MAX_SPEED = 4.0
+"""Speed that widens the gate with the time since the point was seen [m/s]."""
 
 
 class PointFilter:
     """Filters of ``n`` points."""
 
-    def __init__(self, n: int, settings: FilterSettings) -> None:
-        self.settings = settings
+    def __init__(self, n: int) -> None:
         self.t = -np.inf
         """Time of the last update [s]."""
         self.seen_at = np.full(n, -np.inf)
@@ -62,7 +47,7 @@ class PointFilter:
 
     def known(self, t: float) -> NDArray[np.bool_]:
         """Return whether points were measured within the hold time before ``t`` [s], (n,)."""
-        return np.asarray(t - self.seen_at <= self.settings.hold_s + 1e-9)
+        return np.asarray(t - self.seen_at <= HOLD_S + 1e-9)
 
     def at(self, t: float) -> tuple[Vec, Vec]:
         """Return positions [m] and speeds [m/s] at ``t``, (n, 3) each; NaN where not known."""
@@ -74,9 +59,8 @@ class PointFilter:
         return np.where(known, p, np.nan), np.where(known, v, np.nan)
 
     def _step(self, t: float) -> tuple[float, float]:
-        tau = self.settings.memory_s
-        e = float(np.exp(-max(t - self.t, 0.0) / tau))
-        return e, tau * (1.0 - e)
+        e = float(np.exp(-max(t - self.t, 0.0) / MEMORY_S))
+        return e, MEMORY_S * (1.0 - e)
 
     def gate(self, t: float, points: Vec) -> NDArray[np.bool_]:
         """Return whether measurements are too far from the prediction, shape (n,).
@@ -90,7 +74,7 @@ class PointFilter:
         away = np.linalg.norm(points - self.at(t)[0], axis=1)
         with np.errstate(invalid="ignore"):
             since = t - np.maximum(self._measured_at, self.seen_at)
-            too_far = np.asarray(away > self.settings.gate + self.settings.max_speed * since)
+            too_far = np.asarray(away > GATE + MAX_SPEED * since)
         self._measured_at[np.isfinite(points).all(axis=1)] = t
         return too_far
 
@@ -106,7 +90,7 @@ class PointFilter:
         if known.any():
             self._predict(t)
         seen = np.isfinite(points).all(axis=1) & (confidences > 0.0)
-        variance = (self.settings.noise / np.maximum(confidences, 1e-3)) ** 2
+        variance = (NOISE / np.maximum(confidences, 1e-3)) ** 2
         fresh = seen & ~known
         self._p[fresh], self._v[fresh] = points[fresh], 0.0
         self._cov[fresh, 0], self._cov[fresh, 1], self._cov[fresh, 2] = (
@@ -132,7 +116,7 @@ class PointFilter:
 
     def _predict(self, t: float) -> None:
         e, b = self._step(t)
-        dt, a2 = t - self.t, self.settings.acceleration**2
+        dt, a2 = t - self.t, ACCELERATION**2
         pp, pv, vv = self._cov.T
         self._p += b * self._v
         self._v *= e

@@ -24,6 +24,8 @@ from app.sim.core.arrays import Vec
 from app.sim.human.kernels.kinematics import MEDIAN_TRUNK
 from app.sim.perception.keypoints import BODY_25, FARTHEST_M, N_KEYPOINTS, K
 
+MIN_CONFIDENCE = 0.1
+"""Confidence below which a key-point counts as missing."""
 OUTLIER_M = 1.6
 """Largest distance of a key-point from the median of all [m]; stretched arms reach 1.3 m."""
 _ENOUGH = 5
@@ -111,14 +113,13 @@ UNSEEN = Keypoints(points=np.full((N_KEYPOINTS, 3), np.nan), confidences=np.zero
 def check_keypoints(
     keypoints: ArrayLike,
     confidences: ArrayLike | None = None,
-    min_confidence: float = 0.1,
     place: str = "",
     floor_z: float | None = None,
 ) -> Keypoints:
     """Validate one received frame of one person.
 
     A key-point is missing if all coordinates are NaN, if it is exactly (0, 0, 0) or
-    (-1, -1, -1), or if its confidence is NaN or below ``min_confidence``. It is unusable if it
+    (-1, -1, -1), or if its confidence is NaN or below ``MIN_CONFIDENCE``. It is unusable if it
     has only some coordinates, is infinite, beyond 100 m, or has a confidence outside [0, 1].
     A frame of missing key-points is empty, unless some have low confidences: these show a
     person, whose place is then unknown.
@@ -126,7 +127,6 @@ def check_keypoints(
     Args:
         keypoints: Order of BODY_25, cell's frame [m], shape (25, 3).
         confidences: Confidences in [0, 1], shape (25,); 1 where None.
-        min_confidence: Confidence below which a key-point counts as missing.
         place: Prefix of the field's name in errors, such as ``"people[1]."``.
         floor_z: Height of the floor [m]; None: heights are not checked.
 
@@ -144,8 +144,8 @@ def check_keypoints(
     unusable = beyond | ~np.isfinite(points).all(axis=1)
     trust = np.clip(np.nan_to_num(trust, nan=0.0), 0.0, 1.0)
     points = np.clip(points, -_HUGE, _HUGE)
-    low = ~missing & ~beyond & (trust > 0.0) & (trust < min_confidence)
-    missing |= ~beyond & (trust < max(min_confidence, 1e-6))
+    low = ~missing & ~beyond & (trust > 0.0) & (trust < MIN_CONFIDENCE)
+    missing |= ~beyond & (trust < MIN_CONFIDENCE)
     unusable |= _too_far(points, ~missing & ~unusable)
     unusable &= ~missing
     missing |= unusable
@@ -154,7 +154,7 @@ def check_keypoints(
     if missing.all() and low.any():
         greatest = digits(float(given[low].max()))
         implausible = (
-            f"no usable key-point has a confidence of {min_confidence:g} or more: the greatest "
+            f"no usable key-point has a confidence of {MIN_CONFIDENCE:g} or more: the greatest "
             f"is {greatest}"
         )
     elif missing.all() and unusable.any():

@@ -26,13 +26,10 @@ from numpy.typing import ArrayLike
 from app.errors import InvalidInput
 from app.sim.core.arrays import Vec
 from app.sim.people.kernels.people import MAX_PEOPLE
+from app.sim.perception.bounding_cylinder import GROWTH
+from app.sim.perception.kalman_filter import GATE, HOLD_S, MAX_SPEED
 from app.sim.perception.keypoint_check import UNSEEN, Keypoints, check_keypoints
-from app.sim.perception.person_estimator import (
-    EstimatorSettings,
-    Flag,
-    PersonEstimate,
-    PersonEstimator,
-)
+from app.sim.perception.person_estimator import Flag, PersonEstimate, PersonEstimator
 
 MAX_SKELETONS = 64
 """Largest number of people in a frame."""
@@ -108,8 +105,8 @@ class MultiPersonTracker:
     def __init__(self, n_people: int, size: Vec, floor_z: float | None = None) -> None:
         if not 1 <= n_people <= MAX_PEOPLE:
             raise InvalidInput("n_people", n_people, f"must lie in [1, {MAX_PEOPLE}]")
-        self.settings, self._floor_z = EstimatorSettings(), floor_z
-        self._tracks = [PersonEstimator(size, self.settings, floor_z) for _ in range(n_people)]
+        self._floor_z = floor_z
+        self._tracks = [PersonEstimator(size, floor_z) for _ in range(n_people)]
         self._order: list[int | None] = [None] * n_people
         self._flags: list[tuple[Flag, ...]] = [()] * n_people
         self._foreign: str | None = None
@@ -142,9 +139,8 @@ class MultiPersonTracker:
             raise InvalidInput("people", len(people), f"must be at most {MAX_SKELETONS}")
         if len(trust) != len(people):
             raise InvalidInput("confidences", len(trust), "must be as many as people")
-        least = self.settings.min_confidence
         frames = [
-            check_keypoints(points, trust[j], least, f"people[{j}].", self._floor_z)
+            check_keypoints(points, trust[j], f"people[{j}].", self._floor_z)
             for j, points in enumerate(people)
         ]
         seen = {j: frame.points for j, frame in enumerate(frames) if frame.seen.any()}
@@ -160,12 +156,8 @@ class MultiPersonTracker:
 
     def _assign(self, t: float, seen: Mapping[int, Vec]) -> tuple[list[int | None], set[int]]:
         """Return the detection of each track, and the tracks taken over by other people."""
-        limits = self.settings.filter
         expected = [track.expected(t) for track in self._tracks]
-        gates = [
-            limits.gate + limits.max_speed * min(track.unseen_s(t), limits.hold_s)
-            for track in self._tracks
-        ]
+        gates = [GATE + MAX_SPEED * min(track.unseen_s(t), HOLD_S) for track in self._tracks]
         there = list(seen)
         matched = match_people(expected, list(seen.values()), gates)
         order = [None if k is None else there[k] for k in matched]
@@ -205,13 +197,13 @@ class MultiPersonTracker:
             if (last := self._tracks[i].last_points) is not None
         }
         own = min(apart, key=apart.__getitem__, default=None)
-        if own is not None and apart[own] <= self.settings.filter.gate:
+        if own is not None and apart[own] <= GATE:
             return own
         return next((i for i in free if i not in apart), None)
 
     def _walked(self, t: float, i: int) -> float:
         """Return the distance that the person of a track can have walked unseen [m]."""
-        return self.settings.cylinder.growth * self._tracks[i].unseen_s(t)
+        return GROWTH * self._tracks[i].unseen_s(t)
 
     def _nearest(self, t: float, i: int) -> float:
         """Return the smallest possible distance of a track's unseen person to the base [m]."""
@@ -220,9 +212,7 @@ class MultiPersonTracker:
 
     def _was_waiting(self, t: float, points: Vec) -> bool:
         """Return whether an untracked detection was present in the previous frame."""
-        limits = self.settings.filter
-        since = min(max(t - self._waiting_since, 0.0), limits.hold_s)
-        gate = limits.gate + limits.max_speed * since
+        gate = GATE + MAX_SPEED * min(max(t - self._waiting_since, 0.0), HOLD_S)
         return any(_median_distance(points, before) <= gate for before in self._waiting)
 
     def _set_flags(

@@ -9,24 +9,24 @@ latency.
 
 Degradations, named in the estimate:
 
-- a missing key-point is predicted for ``hold_s``; then the joints it determines keep their
+- a missing key-point is predicted for ``HOLD_S``; then the joints it determines keep their
   angles (``held``) and the cylinder widens to the reach of the missing point;
-- arms or legs with exchanged sides are exchanged back (``arms-swapped``, ...); after ``swap_s``
+- arms or legs with exchanged sides are exchanged back (``arms-swapped``, ...); after ``SWAP_S``
   the group is restarted, with sides from the direction the person faces (``sides-restarted``);
 - if most key-points moved faster than a person can, the frame is rejected (``jump``); after
-  ``hold_s`` without a credible frame the person is restarted (``restarted``);
-- without detection for ``stale_s``: ``stale``; after ``hold_s`` the last cylinder grows at
+  ``HOLD_S`` without a credible frame the person is restarted (``restarted``);
+- without detection for ``STALE_S``: ``stale``; after ``HOLD_S`` the last cylinder grows at
   walking speed and the joints are at rest;
-- a poor fit of the model is a ``misfit`` (another body size, a bad tracker); beyond ``unfit``
+- a poor fit of the model is a ``misfit`` (another body size, a bad tracker); beyond ``UNFIT``
   (kneeling, sitting, lying) there are no joint angles, only the cylinder;
 - key-points in another frame or unit: ``foreign-frame``; the frame counts as empty;
 - arms and legs both contradict the facing direction: ``mirrored``. Either both are exchanged or
-  the frame is mirrored, which displaces people: after ``swap_s`` without other frames, such
+  the frame is mirrored, which displaces people: after ``SWAP_S`` without other frames, such
   frames count as ``foreign-frame``.
 """
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -38,13 +38,13 @@ from app.sim.human import model as human
 from app.sim.human.kernels.kinematics import N_SIZE
 from app.sim.human.person import Person
 from app.sim.perception.bounding_cylinder import (
-    CylinderSettings,
+    GROWTH,
     SafetyCylinder,
     bounding_box,
     greatest_distance,
     safety_cylinder,
 )
-from app.sim.perception.kalman_filter import FilterSettings, PointFilter
+from app.sim.perception.kalman_filter import HOLD_S, PointFilter
 from app.sim.perception.keypoint_angles import FITTED, fit_errors, joint_angles, joint_motion
 from app.sim.perception.keypoint_check import UNSEEN, Keypoints, check_keypoints
 from app.sim.perception.keypoints import (
@@ -75,41 +75,22 @@ Flag = Literal[
     "stale",
     "misfit",
 ]
+STALE_S = 0.25
+"""Age of the newest credible key-point from which an estimate is stale [s]."""
+SWAP_S = 0.5
+"""Time until a group with exchanged sides is restarted, and a mirrored frame rejected [s]."""
+MISFIT = 0.10
+"""Median distance of the model's joints, or one of a wrist, that counts as misfit [m]."""
+UNFIT = 0.25
+"""Misfit of the trunk beyond which there are no joint angles [m]; the median model fits
+statures between the 1st and 99th percentile within 0.2 m."""
+QD_MAX = 8.0
+"""Bound of estimated joint speeds [rad/s, m/s], against noise near singularities."""
 _SWAPPED: dict[Group, Flag] = {"arms": "arms-swapped", "legs": "legs-swapped"}
 """Groups with a side check; eyes and ears are too close to each other for it."""
 _DECIDING = [K[name] for name in (*FITTED, "mid_hip", "hip_r", "hip_l")]
 """Key-points that determine joint angles."""
 _MIRRORED = "arms and legs are mirrored (does one axis point the other way here?)"
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class EstimatorSettings:
-    """Noise, margins and times of the estimate."""
-
-    filter: FilterSettings = field(default_factory=FilterSettings)
-    """Noise of state and measurement, hold time."""
-    cylinder: CylinderSettings = field(default_factory=CylinderSettings)
-    """Flesh margin and growth."""
-    min_confidence: float = 0.1
-    """Confidence below which a key-point counts as missing."""
-    stale_s: float = 0.25
-    """Age of the newest credible key-point from which an estimate is stale [s]."""
-    swap_s: float = 0.5
-    """Time until a group with exchanged sides is restarted, and a mirrored frame rejected
-    [s]."""
-    misfit: float = 0.10
-    """Median distance of the model's joints, or one of a wrist, that counts as misfit [m]."""
-    unfit: float = 0.25
-    """Misfit of the trunk beyond which there are no joint angles [m]; the median model fits
-    statures between the 1st and 99th percentile within 0.2 m."""
-    qd_max: float = 8.0
-    """Bound of estimated joint speeds [rad/s, m/s], against noise near singularities."""
-
-    def __post_init__(self) -> None:
-        for name in ("min_confidence", "stale_s", "swap_s", "misfit", "unfit", "qd_max"):
-            value = getattr(self, name)
-            if not (math.isfinite(value) and value >= 0.0):
-                raise InvalidInput(name, value, "must be finite and not negative")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -158,20 +139,16 @@ class PersonEstimator:
 
     Args:
         size: The person's size [m], shape (12,) (``Cell.body``).
-        settings: Noise, margins and times.
         floor_z: Height of the floor [m]; None: heights are not checked.
     """
 
-    def __init__(
-        self, size: Vec, settings: EstimatorSettings | None = None, floor_z: float | None = None
-    ) -> None:
+    def __init__(self, size: Vec, floor_z: float | None = None) -> None:
         if np.shape(size) != (N_SIZE,) or not np.isfinite(size).all():
             rule = f"must be {N_SIZE} finite numbers"
             raise InvalidInput("size", np.asarray(size).tolist(), rule)
-        self.settings = settings or EstimatorSettings()
         self._size, self._floor_z = size, floor_z
-        self._points = PointFilter(N_KEYPOINTS, self.settings.filter)
-        self._center = PointFilter(1, self.settings.filter)
+        self._points = PointFilter(N_KEYPOINTS)
+        self._center = PointFilter(1)
         self._t = self._seen_at = self._mirrored_at = self._mirror_seen_at = -math.inf
         self._swapped_at: dict[Group, float] = {}
         self._q: Vec | None = None
@@ -203,8 +180,7 @@ class PersonEstimator:
             InvalidInput: See :func:`~app.sim.perception.keypoint_check.check_keypoints`, or
                 ``t`` is not later than the previous time; the state is unchanged.
         """
-        least, floor_z = self.settings.min_confidence, self._floor_z
-        self.take_frame(t, check_keypoints(keypoints, confidences, least, floor_z=floor_z))
+        self.take_frame(t, check_keypoints(keypoints, confidences, floor_z=self._floor_z))
 
     def take_frame(self, t: float, frame: Keypoints, fresh: bool = False) -> None:
         """Process one validated frame; see :meth:`take`.
@@ -224,7 +200,7 @@ class PersonEstimator:
         flags: list[Flag] = []
         if all(faces_backward(frame.points, group) for group in _SWAPPED):
             flags.append("mirrored")
-            if self._mirrored_for(t) > self.settings.swap_s:
+            if self._mirrored_for(t) > SWAP_S:
                 frame = replace(UNSEEN, implausible=_MIRRORED)
         elif frame.seen.any():
             self._mirror_seen_at = -math.inf
@@ -251,7 +227,7 @@ class PersonEstimator:
 
     def _mirrored_for(self, t: float) -> float:
         """Count a mirrored frame; return the time since the first of them in a row [s]."""
-        is_first = t - self._mirror_seen_at > self.settings.filter.hold_s
+        is_first = t - self._mirror_seen_at > HOLD_S
         self._mirrored_at, self._mirror_seen_at = (t if is_first else self._mirrored_at), t
         return t - self._mirrored_at
 
@@ -272,7 +248,7 @@ class PersonEstimator:
             members = GROUPS[group]
             known = bool(np.isfinite(expected[list(members)]).any())
             since = self._swapped_at.get(group, t)
-            if known and t - since > self.settings.swap_s:
+            if known and t - since > SWAP_S:
                 self._points.forget(list(members))
                 del self._swapped_at[group]
                 flags.append("sides-restarted")
@@ -303,7 +279,7 @@ class PersonEstimator:
         q, held = joint_angles(points, before, self._size)
         if self._q is not None or not held[:5].any():
             self._q = q
-            self._unfit = fit_errors(q, self._size, points)[1] > self.settings.unfit
+            self._unfit = fit_errors(q, self._size, points)[1] > UNFIT
         corners = bounding_box(points[known])
         center = 0.5 * (corners[:1] + corners[7:])
         if self._center.gate(t, center).any():
@@ -343,9 +319,9 @@ class PersonEstimator:
         person, held, (misfit, _, wrist_misfit) = self._person(points, speeds)
         if self.last_points is None:
             flags.append("never-seen")
-        elif age > self.settings.stale_s:
+        elif age > STALE_S:
             flags.append("stale")
-        if max(wrist_misfit, misfit) > self.settings.misfit:
+        if max(wrist_misfit, misfit) > MISFIT:
             flags.append("misfit")
         return PersonEstimate(
             t=t,
@@ -367,7 +343,7 @@ class PersonEstimator:
     def _carried_at(self, t: float) -> float:
         """Return the longest current prediction of a key-point of trunk and arms [s]."""
         carried = t - self._points.seen_at[_DECIDING]
-        return float(carried[carried <= self.settings.filter.hold_s].max(initial=0.0))
+        return float(carried[carried <= HOLD_S].max(initial=0.0))
 
     def person_at(self, t: float) -> Person | None:
         """Return only joint angles and speeds of :meth:`at` at ``t`` [s]."""
@@ -375,7 +351,7 @@ class PersonEstimator:
         if self._q is None:
             return None
         points, speeds = self._points.at(t)
-        q, qd, _ = joint_motion(points, speeds, self._q, self._size, self.settings.qd_max)
+        q, qd, _ = joint_motion(points, speeds, self._q, self._size, QD_MAX)
         return Person(q=q, qd=qd, size=self._size)
 
     def _person(
@@ -384,17 +360,16 @@ class PersonEstimator:
         """Return joint angles and speeds, the held joints, and the errors of the fit [m]."""
         if self._q is None:
             return None, np.ones(18, dtype=np.bool_), (math.nan, math.nan, 0.0)
-        q, qd, held = joint_motion(points, speeds, self._q, self._size, self.settings.qd_max)
+        q, qd, held = joint_motion(points, speeds, self._q, self._size, QD_MAX)
         return Person(q=q, qd=qd, size=self._size), held, fit_errors(q, self._size, points)
 
     def _cylinder_at(self, t: float, points: Vec, age: float) -> SafetyCylinder | None:
         """Return the cylinder around known key-points at ``t``, else the last one, grown."""
         if self.last_points is None:
             return None
-        settings = self.settings.cylinder
         if np.isfinite(points).any():
             velocity = self._center.at(t)[1][0, :2]
-            return safety_cylinder(points, np.nan_to_num(velocity), settings)
-        last = safety_cylinder(self.last_points, None, settings)
-        growth = settings.growth * max(0.0, age - self.settings.filter.hold_s)
+            return safety_cylinder(points, np.nan_to_num(velocity))
+        last = safety_cylinder(self.last_points)
+        growth = GROWTH * max(0.0, age - HOLD_S)
         return None if last is None else last.after(0.0, growth)

@@ -21,11 +21,7 @@ from app.sim.perception.bounding_cylinder import SafetyCylinder, safety_cylinder
 from app.sim.perception.keypoint_angles import joint_motion
 from app.sim.perception.keypoint_check import check_keypoints
 from app.sim.perception.keypoints import BODY_25, N_KEYPOINTS, Group, swap_sides
-from app.sim.perception.person_estimator import (
-    EstimatorSettings,
-    PersonEstimate,
-    PersonEstimator,
-)
+from app.sim.perception.person_estimator import QD_MAX, PersonEstimate, PersonEstimator
 
 _EXCHANGED: dict[str, Group] = {"arms-swapped": "arms", "legs-swapped": "legs"}
 FASTEST_POINT = 20.0
@@ -54,17 +50,15 @@ def estimate_once(
         confidences: Trust in each in [0, 1], shape (25,); 1 where None.
         velocities: Velocities of the key-points [m/s], shape (25, 3), NaN where unknown.
         place: Put before the field's name in errors, such as ``"people[1]."``.
-
         floor_z: Height of the floor [m]; None: heights over it are not judged.
 
     Raises:
         InvalidInput: Not numbers, or another shape.
     """
-    settings = EstimatorSettings()
-    frame = check_keypoints(keypoints, confidences, settings.min_confidence, place, floor_z)
+    frame = check_keypoints(keypoints, confidences, place, floor_z)
     speeds, wrong = _velocities(velocities, place)
     frame = replace(frame, unusable=frame.unusable + wrong)
-    estimator = PersonEstimator(size, settings)
+    estimator = PersonEstimator(size)
     estimator.take_frame(0.0, frame)
     estimate = estimator.at(0.0)
     if estimate.cylinder is None:
@@ -74,7 +68,7 @@ def estimate_once(
     for flag, group in _EXCHANGED.items():
         if flag in estimate.flags:
             speeds = swap_sides(speeds, group)
-    return _moving(estimate, estimator.expected(0.0), speeds, settings)
+    return _moving(estimate, estimator.expected(0.0), speeds)
 
 
 def _velocities(velocities: ArrayLike | None, place: str) -> tuple[Vec, tuple[str, ...]]:
@@ -92,19 +86,13 @@ def _velocities(velocities: ArrayLike | None, place: str) -> tuple[Vec, tuple[st
     return given, tuple(f"velocity of {BODY_25[int(k)]}" for k in np.flatnonzero(wrong))
 
 
-def _moving(
-    estimate: PersonEstimate, points: Vec, speeds: Vec, settings: EstimatorSettings
-) -> PersonEstimate:
+def _moving(estimate: PersonEstimate, points: Vec, speeds: Vec) -> PersonEstimate:
     """Return the estimate with the speeds that its key-points have."""
     person = estimate.person
     if person is not None and person.size is not None:
-        q, qd, _ = joint_motion(points, speeds, person.q, person.size, settings.qd_max)
+        q, qd, _ = joint_motion(points, speeds, person.q, person.size, QD_MAX)
         estimate = replace(estimate, person=Person(q=q, qd=qd, size=person.size))
-    centers = [
-        safety_cylinder(points + s * speeds, None, settings.cylinder)
-        for s in (-_STEP_S, _STEP_S)
-    ]
-    before, after = centers
+    before, after = (safety_cylinder(points + s * speeds) for s in (-_STEP_S, _STEP_S))
     if estimate.cylinder is None or before is None or after is None:
         return estimate
     velocity = (after.center - before.center) / (2.0 * _STEP_S)

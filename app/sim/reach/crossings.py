@@ -39,7 +39,7 @@ from app.sim.cells.cell import Cell
 from app.sim.collision.checker import Checker, shapes_of
 from app.sim.core.arrays import Vec
 from app.sim.mocap.importer import Motion
-from app.sim.perception.bounding_cylinder import CylinderSettings, safety_cylinder
+from app.sim.perception.bounding_cylinder import safety_cylinder
 from app.sim.perception.keypoints import keypoints_of
 from app.sim.reach.batch import goal_region_of
 from app.sim.robot.ur10 import Robot
@@ -137,13 +137,12 @@ def cylinder_track(motion: Motion, floor_z: float, dt: float) -> Vec:
 
     Source: docs/method.md 2.8.
     """
-    settings = CylinderSettings(flesh_margin=0.0)
     size = motion.size.vector(floor_z)
     times = np.arange(0.0, float(motion.times[-1]) + 1e-9, dt)
     rows = []
     for t in times:
         q = motion.q[min(int(np.searchsorted(motion.times, t)), len(motion.q) - 1)]
-        cylinder = safety_cylinder(keypoints_of(q, size, floor_z), settings=settings)
+        cylinder = safety_cylinder(keypoints_of(q, size, floor_z), flesh_margin=0.0)
         assert cylinder is not None
         rows.append((*cylinder.center, cylinder.radius))
     return np.array(rows)

@@ -3,15 +3,12 @@
 import numpy as np
 import pytest
 
-from app.errors import InvalidInput
 from app.sim.human import model as human
 from app.sim.human.anthropometry import percentile_body
-from app.sim.perception.bounding_cylinder import CylinderSettings, bounding_box, safety_cylinder
+from app.sim.perception.bounding_cylinder import bounding_box, safety_cylinder
 from app.sim.perception.keypoints import GROUPS, K, keypoints_of
 from tests.sim.perception.cylinder_contents import holds
 from tests.sim.tracked_person import CELL, seen, work
-
-BARE = CylinderSettings(flesh_margin=0.0)
 
 
 def test_box_of_a_turned_box_is_that_box() -> None:
@@ -31,7 +28,7 @@ def test_no_smaller_cylinder_holds_the_box() -> None:
     rng = np.random.default_rng(6)
     for q in work(1, 12.0)[1][::20]:
         corners = bounding_box(seen(q))[:, :2]
-        found = safety_cylinder(seen(q), settings=BARE)
+        found = safety_cylinder(seen(q), flesh_margin=0.0)
         assert found is not None
         for center in found.center + 0.2 * rng.standard_normal((200, 2)):
             radius = np.linalg.norm(corners - center, axis=1).max()
@@ -113,9 +110,3 @@ def test_cylinder_moves_on_with_its_velocity() -> None:
     later = found.after(0.2, 0.03)
     np.testing.assert_allclose(later.center - found.center, [0.1, -0.2])
     assert later.radius == pytest.approx(found.radius + 0.03)
-
-
-@pytest.mark.parametrize("margin", [-0.1, np.nan, np.inf])
-def test_margins_that_are_none_are_refused(margin: float) -> None:
-    with pytest.raises(InvalidInput, match="flesh_margin"):
-        CylinderSettings(flesh_margin=margin)

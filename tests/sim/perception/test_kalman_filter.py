@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from app.errors import InvalidInput
-from app.sim.perception.kalman_filter import FilterSettings, PointFilter
+from app.sim.perception import kalman_filter
+from app.sim.perception.kalman_filter import PointFilter
 
 DT = 1.0 / 30.0
 
 
-def run(points: np.ndarray, settings: FilterSettings | None = None) -> PointFilter:
-    found = PointFilter(points.shape[1], settings or FilterSettings())
+def run(points: np.ndarray) -> PointFilter:
+    found = PointFilter(points.shape[1])
     for k, frame in enumerate(points):
         found.update(k * DT, frame, np.ones(len(frame)))
     return found
@@ -36,7 +36,7 @@ def test_even_motion_is_followed_with_its_speed() -> None:
 def test_steady_speed_is_estimated_too_low_by_the_documented_share(
     rate_hz: int, share: float, late_ms: float
 ) -> None:
-    found, n = PointFilter(1, FilterSettings()), 3 * rate_hz
+    found, n = PointFilter(1), 3 * rate_hz
     for k in range(n + 1):
         found.update(k / rate_hz, np.array([[1.6 * k / rate_hz, 0.0, 0.0]]), np.ones(1))
     p, v = found.at(n / rate_hz)
@@ -44,10 +44,13 @@ def test_steady_speed_is_estimated_too_low_by_the_documented_share(
     assert 1e3 * (n / rate_hz - p[0, 0] / 1.6) == pytest.approx(late_ms, abs=0.5)
 
 
-def test_unseen_point_comes_to_rest_and_is_then_unknown() -> None:
-    settings = FilterSettings(hold_s=2.0, memory_s=0.2)
+def test_unseen_point_comes_to_rest_and_is_then_unknown(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(kalman_filter, "HOLD_S", 2.0)
+    monkeypatch.setattr(kalman_filter, "MEMORY_S", 0.2)
     t = np.arange(60)[:, None, None] * DT
-    found = run(t * np.array([[1.0, 0.0, 0.0]]), settings)
+    found = run(t * np.array([[1.0, 0.0, 0.0]]))
     now = 59 * DT
     (early, _), (late, speed) = found.at(now + 1.0), found.at(now + 1.9)
     assert abs(early[0, 0] - late[0, 0]) < 0.005 and abs(speed[0, 0]) < 0.01
@@ -86,9 +89,3 @@ def test_less_trust_moves_less() -> None:
         found.update(30 * DT, np.array([[0.1, 0.0, 0.0]]), np.array([trust]))
         moved.append(found.at(30 * DT)[0][0, 0])
     assert 0.0 < 2.0 * moved[1] < moved[0]
-
-
-@pytest.mark.parametrize("value", [0.0, -1.0, np.nan, np.inf])
-def test_settings_without_sense_are_refused(value: float) -> None:
-    with pytest.raises(InvalidInput, match="memory_s"):
-        FilterSettings(memory_s=value)

@@ -11,7 +11,7 @@ from app.sim.perception.keypoint_sensor_model import (
     KeypointSensorSettings,
 )
 from app.sim.perception.keypoints import K, swap_sides
-from app.sim.perception.person_estimator import EstimatorSettings, PersonEstimator
+from app.sim.perception.person_estimator import UNFIT, PersonEstimator
 from app.sim.scene.scene import capsule_speeds_of, people_geometry_of, people_of
 from tests.sim.perception.cylinder_contents import holds
 from tests.sim.postures import POSTURES, kneeling_and_looking_down, posture
@@ -262,7 +262,7 @@ def test_joint_angles_are_given_only_where_the_model_fits(name: str) -> None:
     else:
         joints = human.joint_points(estimate.person.q, CELL.body)
         near = np.linalg.norm(joints["neck"] - points[K["neck"]])
-        assert near < 1.1 * estimator.settings.unfit
+        assert near < 1.1 * UNFIT
 
 
 def test_people_who_stand_are_given_joint_angles_and_those_who_lie_are_not() -> None:
@@ -370,8 +370,6 @@ def test_any_finite_frames_give_a_finite_estimate() -> None:
     assert taken > 100
 
 
-def test_settings_without_sense_are_refused_by_name() -> None:
-    with pytest.raises(InvalidInput, match="stale_s"):
-        EstimatorSettings(stale_s=np.nan)
+def test_a_size_without_sense_is_refused_by_name() -> None:
     with pytest.raises(InvalidInput, match="size"):
         PersonEstimator(np.nan)
