@@ -26,7 +26,6 @@ from app.sim.mocap.joint_centres import (
     PELVIS,
     SHOULDER_L,
     SHOULDER_R,
-    SIDES,
     BodyTrack,
     trunk_frame,
     unit,
@@ -60,9 +59,7 @@ def body_angles(track: BodyTrack, size: BodySize) -> tuple[Vec, Vec]:
     pelvis = points[:, NECK] - size.trunk * torso[:, :, 2]
     q[:, :2] = pelvis[:, :2]
     rate_hz = 1.0 / float(np.median(np.diff(track.times)))
-    for hand, side in SIDES.items():
-        clavicle, arm = (6, 10) if hand == "r" else (8, 14)
-        shoulder = SHOULDER_R if hand == "r" else SHOULDER_L
+    for side, shoulder, clavicle, arm in ((-1.0, SHOULDER_R, 6, 10), (1.0, SHOULDER_L, 8, 14)):
         inside = np.einsum("nji,nkj->nki", torso, _segments(points, shoulder))
         protract = np.empty((len(q), 2))
         joint_angles.clavicles_to_angles(as_kernel_array(inside[:, 0]), side, protract)

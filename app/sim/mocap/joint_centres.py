@@ -3,36 +3,30 @@
 from dataclasses import dataclass, field
 
 import numpy as np
-import scipy
 
-from app.sim.core.arrays import Vec
+from app.sim.core.arrays import Vec, as_kernel_array
 from app.sim.human.anthropometry import BodySize
-from app.sim.mocap.bvh import axis_turns
+from app.sim.human.kernels import kinematics as body
+from app.sim.human.model import POINT_NAMES
 
 TRACK_NAMES = (
-    "pelvis",
-    "neck",
-    "shoulder_r",
-    "elbow_r",
-    "wrist_r",
-    "shoulder_l",
-    "elbow_l",
-    "wrist_l",
+    *("pelvis", "neck"),
+    *("shoulder_r", "elbow_r", "wrist_r", "shoulder_l", "elbow_l", "wrist_l"),
 )
 """Joint centres that determine the 18 angles."""
 PELVIS, NECK, SHOULDER_R, ELBOW_R, WRIST_R, SHOULDER_L, ELBOW_L, WRIST_L = range(8)
-MEASURED = (
-    "trunk",
-    "clavicle_r",
-    "clavicle_l",
-    "upper_arm_r",
-    "upper_arm_l",
-    "forearm_r",
-    "forearm_l",
-)
+_TRACKED = [POINT_NAMES.index(name) for name in TRACK_NAMES]
+_SEGMENTS = {
+    "trunk": (PELVIS, NECK),
+    "clavicle_r": (NECK, SHOULDER_R),
+    "clavicle_l": (NECK, SHOULDER_L),
+    "upper_arm_r": (SHOULDER_R, ELBOW_R),
+    "upper_arm_l": (SHOULDER_L, ELBOW_L),
+    "forearm_r": (ELBOW_R, WRIST_R),
+    "forearm_l": (ELBOW_L, WRIST_L),
+}
+MEASURED = tuple(_SEGMENTS)
 """Lengths determined by joint centres; all others are those of the median person."""
-SIDES = {"r": -1.0, "l": 1.0}
-"""Sign of the body's lateral axis (y, to the left) on either side."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -56,18 +50,11 @@ def measure(points: Vec) -> BodySize:
     Args:
         points: Joint centres [m], shape (n, 8, 3).
     """
-
-    def length(a: int, b: int) -> float:
-        return float(np.median(np.linalg.norm(points[:, b] - points[:, a], axis=1)))
-
     return BodySize(
-        trunk=length(PELVIS, NECK),
-        clavicle_r=length(NECK, SHOULDER_R),
-        clavicle_l=length(NECK, SHOULDER_L),
-        upper_arm_r=length(SHOULDER_R, ELBOW_R),
-        upper_arm_l=length(SHOULDER_L, ELBOW_L),
-        forearm_r=length(ELBOW_R, WRIST_R),
-        forearm_l=length(ELBOW_L, WRIST_L),
+        **{
+            name: float(np.median(np.linalg.norm(points[:, b] - points[:, a], axis=1)))
+            for name, (a, b) in _SEGMENTS.items()
+        }
     )
 
 
@@ -97,34 +84,9 @@ def model_points(q: Vec, pelvis_z: Vec, size: BodySize) -> Vec:
         pelvis_z: Height of the pelvis [m], shape (n,).
         size: The person's lengths.
     """
-    points = np.empty((len(q), 8, 3))
-    points[:, PELVIS, :2], points[:, PELVIS, 2] = q[:, :2], pelvis_z
-    torso = axis_turns(2, q[:, 2]) @ euler_turns(q[:, 3], q[:, 4], q[:, 5])
-    points[:, NECK] = points[:, PELVIS] + size.trunk * torso[:, :, 2]
-    lengths = size.lengths()
-    for hand, side in SIDES.items():
-        clavicle, arm = (6, 10) if hand == "r" else (8, 14)
-        shoulder = SHOULDER_R if hand == "r" else SHOULDER_L
-        protract, elevate = q[:, clavicle], q[:, clavicle + 1]
-        level = np.cos(elevate)
-        direction = np.stack(
-            [level * np.sin(protract), side * level * np.cos(protract), np.sin(elevate)], axis=1
-        )
-        step = lengths[f"clavicle_{hand}"] * np.einsum("nij,nj->ni", torso, direction)
-        points[:, shoulder] = points[:, NECK] + step
-        flex, abduct, rotate, bend = q[:, arm : arm + 4].T
-        upper = torso @ euler_turns(-flex, side * abduct, rotate)
-        fore = upper @ axis_turns(1, -bend)
-        upper_arm, forearm = lengths[f"upper_arm_{hand}"], lengths[f"forearm_{hand}"]
-        points[:, shoulder + 1] = points[:, shoulder] - upper_arm * upper[:, :, 2]
-        points[:, shoulder + 2] = points[:, shoulder + 1] - forearm * fore[:, :, 2]
-    return points
-
-
-def euler_turns(a: Vec, b: Vec, c: Vec) -> Vec:
-    """Return ``Ry(a) Rx(b) Rz(c)`` for angles [rad] of shape (n,), shape (n, 3, 3)."""
-    return np.asarray(
-        scipy.spatial.transform.Rotation.from_euler(
-            "YXZ", np.column_stack([a, b, c])
-        ).as_matrix()
-    )
+    lengths, trig = size.vector(0.0), np.empty((3, 16))
+    points, frames = np.empty((len(q), body.N_POINTS, 3)), np.empty((body.N_FRAMES, 3, 3))
+    for joints, height, out in zip(as_kernel_array(q), pelvis_z, points, strict=True):
+        lengths[body.PELVIS_Z] = height
+        body.points_and_frames(joints, lengths, trig, out, frames)
+    return points[:, _TRACKED]

@@ -31,7 +31,6 @@ from app.sim.mocap.csv_tables import (
 )
 from app.sim.mocap.faults import bad, shown
 from app.sim.mocap.inverse_kinematics import euler_angles, one_branch
-from app.sim.mocap.joint_centres import euler_turns
 from app.sim.mocap.tables import (
     MAX_COLUMNS,
     TextTable,
@@ -265,4 +264,5 @@ def trunk_angles(angle: Mapping[str, Vec]) -> tuple[Vec, Vec]:
 
 def _turn(about_z: Vec, about_x: Vec, about_y: Vec) -> Vec:
     """Return OpenSim's ``Rz Rx Ry`` in our axes (x forward, y left, z up), shape (n, 3, 3)."""
-    return euler_turns(-about_z, about_x, about_y)
+    angles = np.column_stack([-about_z, about_x, about_y])
+    return np.asarray(scipy.spatial.transform.Rotation.from_euler("YXZ", angles).as_matrix())
