@@ -153,10 +153,25 @@ def read_motion(
     name = PurePath(file_name).stem[:100]
     origin = f"{PurePath(file_name).name[:100]} ({digest})"
     segments = [_converted(track, angles, size, span) for span in spans]
+    q, height = (np.concatenate(part) for part in zip(*segments, strict=True))
     # CSV tables state heights relative to standing; elsewhere standing is estimated.
-    standing = 0.0 if ending == ".csv" else None
-    joined = _Segments(track, size, spans, segments, standing)
+    standing = 0.0 if ending == ".csv" else float(np.percentile(height, 95.0))
     in_file = tuple((int(frames[a]), int(frames[b])) for a, b in spans)
+    runs = tuple(
+        Motion(
+            name=name,
+            source=f"{origin}, frames {first} to {last}",
+            times=_own(track.times[a : b + 1] - track.times[a]),
+            q=_own(run_q),
+            pelvis_z=_own(run_height - standing),
+            size=size,
+            first_frame=first,
+        )
+        for (a, b), (first, last), (run_q, run_height) in zip(
+            spans, in_file, segments, strict=True
+        )
+    )
+    points = np.concatenate([track.points[a : b + 1] for a, b in spans])
     return ImportedMotion(
         name=name,
         format=ending[1:],
@@ -164,15 +179,11 @@ def read_motion(
         n_frames=len(track.times) if angles is None else angles.n_frames,
         duration=float(track.times[-1] - track.times[0]),
         size=size,
-        runs=joined.motions(name, origin, in_file),
+        runs=runs,
         spans=in_file,
         artifacts=artifacts,
-        wrists=joined.error((WRIST_R, WRIST_L)),
-        elbows=joined.error((ELBOW_R, ELBOW_L)),
-        wrists_at_fixed_height=joined.error((WRIST_R, WRIST_L), carry_height=False),
-        pelvis=joined.error((PELVIS,)),
-        fixed_body=joined.error((WRIST_R, WRIST_L), body=BodySize()),
-        beyond_limits=beyond_limits(np.concatenate([q for q, _ in segments])),
+        **_errors(q, height, standing, size, points),
+        beyond_limits=beyond_limits(q),
     )
 
 
@@ -240,54 +251,35 @@ def beyond_limits(q: Vec) -> dict[str, tuple[float, float]]:
     }
 
 
-class _Segments:
-    """The clean runs of one track, with common errors."""
+def _errors(
+    q: Vec, height: Vec, standing: float, size: BodySize, points: Vec
+) -> dict[str, Spread]:
+    """Return the errors of the model's joint centres, by the fields of ImportedMotion.
 
-    def __init__(
-        self,
-        track: BodyTrack,
-        size: BodySize,
-        spans: Sequence[tuple[int, int]],
-        segments: Sequence[tuple[Vec, Vec]],
-        standing: float | None,
-    ) -> None:
-        self._track, self._size, self._spans = track, size, spans
-        self._q = np.concatenate([q for q, _ in segments])
-        self._height = np.concatenate([height for _, height in segments])
-        self._points = np.concatenate([track.points[a : b + 1] for a, b in spans])
-        if standing is None:
-            standing = float(np.percentile(self._height, 95.0))
-        self._standing = standing
-        self._segments = segments
+    Args:
+        q: Joint positions of all runs [m, rad], shape (n, 18).
+        height: Heights of the pelvis [m], shape (n,).
+        standing: Standing height of the pelvis [m].
+        size: Size of the recorded person.
+        points: Joint centres of the file [m], shape (n, 8, 3).
+    """
 
-    def motions(
-        self, name: str, origin: str, in_file: Sequence[tuple[int, int]]
-    ) -> tuple[Motion, ...]:
-        """Return the runs, with the pelvis's height relative to standing."""
-        return tuple(
-            Motion(
-                name=name,
-                source=f"{origin}, frames {first} to {last}",
-                times=_own(self._track.times[a : b + 1] - self._track.times[a]),
-                q=_own(q),
-                pelvis_z=_own(height - self._standing),
-                size=self._size,
-                first_frame=first,
-            )
-            for (a, b), (first, last), (q, height) in zip(
-                self._spans, in_file, self._segments, strict=True
-            )
-        )
+    def away(pelvis_z: Vec, body: BodySize) -> Vec:
+        return np.asarray(np.linalg.norm(model_points(q, pelvis_z, body) - points, axis=2))
 
-    def error(
-        self, which: tuple[int, ...], *, body: BodySize | None = None, carry_height: bool = True
-    ) -> Spread:
-        """Return the distances between points of the model and of the file [m]."""
-        height = self._height if carry_height else np.full(len(self._height), self._standing)
-        model = model_points(self._q, height, body or self._size)
-        distances = np.linalg.norm((model - self._points)[:, list(which)], axis=2)
-        p50, p99, worst = (float(one) for one in np.percentile(distances, (50.0, 99.0, 100.0)))
-        return Spread(p50=p50, p99=p99, worst=worst)
+    own, wrists = away(height, size), [WRIST_R, WRIST_L]
+    found = {
+        "wrists": own[:, wrists],
+        "elbows": own[:, [ELBOW_R, ELBOW_L]],
+        "wrists_at_fixed_height": away(np.full_like(height, standing), size)[:, wrists],
+        "pelvis": own[:, PELVIS],
+        "fixed_body": away(height, BodySize())[:, wrists],
+    }
+    shares = {name: np.percentile(one, (50.0, 99.0, 100.0)) for name, one in found.items()}
+    return {
+        name: Spread(p50=float(p50), p99=float(p99), worst=float(worst))
+        for name, (p50, p99, worst) in shares.items()
+    }
 
 
 def _converted(
