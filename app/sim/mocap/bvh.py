@@ -81,7 +81,8 @@ def read_bvh(text: str) -> Bvh:
         BadRecording: The text is not a valid BVH file; the faults name lines.
     """
     lines = lines_of(text)
-    start = next((k for k, line in enumerate(lines) if _first_word(line) == "MOTION"), None)
+    firsts = ([_keyword(word) for word in line.split()[:1]] for line in lines)
+    start = next((k for k, first in enumerate(firsts) if first == ["MOTION"]), None)
     if start is None:
         rule = "has no line MOTION, which precedes the frames"
         raise bad(len(lines), "", rule, "the file is cut off or not a BVH file")
@@ -112,7 +113,7 @@ def forward(bvh: Bvh, wanted: Sequence[int]) -> Vec:
 
     Position channels replace the offset of a joint, as in most readers.
     """
-    needed = _with_ancestors(bvh, wanted)
+    needed = with_ancestors(bvh, wanted)
     parts = range(0, len(bvh.values), CHUNK_FRAMES)
     return np.concatenate(
         [_forward(bvh, bvh.values[k : k + CHUNK_FRAMES], wanted, needed) for k in parts]
@@ -138,7 +139,8 @@ def _forward(bvh: Bvh, values: Vec, wanted: Sequence[int], needed: set[int]) -> 
     return np.stack([places[k] for k in wanted], axis=1)
 
 
-def _with_ancestors(bvh: Bvh, wanted: Sequence[int]) -> set[int]:
+def with_ancestors(bvh: Bvh, wanted: Sequence[int]) -> set[int]:
+    """Return the indices of joints and of all their ancestors."""
     needed: set[int] = set()
     for k in wanted:
         while k >= 0 and k not in needed:
@@ -217,21 +219,34 @@ def _row(line: str, words: Sequence[str]) -> Vec:
 
 def _bad_words(words: Sequence[str], line: int) -> Iterator[Fault]:
     for k, word in enumerate(words):
-        rule = _number_rule(word)
-        if rule:
+        if rule := _number_rule(word):
             place, hint = f"line {line}, number {k + 1}", _comma_hint(word)
             yield Fault(place=place, value=shown(word), rule=rule, hint=hint)
 
 
+def as_number(word: str) -> float | None:
+    """Return a number, None for text; unlike Python's, ``1_000`` is none."""
+    try:
+        return None if "_" in word else float(word)
+    except ValueError:
+        return None
+
+
 def _number_rule(word: str) -> str:
     """Return the rule that a word violates; empty for a valid number."""
-    try:
-        value = float("" if "_" in word else word)
-    except ValueError:
+    value = as_number(word)
+    if value is None:
         return "must be a number"
     if abs(value) <= MAX_NUMBER:
         return ""
     return f"must be a finite number of at most {digits(MAX_NUMBER)}"
+
+
+def _number(word: str, line: int) -> float:
+    """Return the number in a line, validated."""
+    if rule := _number_rule(word):
+        raise bad(line, shown(word), rule, _comma_hint(word))
+    return float(word)
 
 
 def _comma_hint(text: str) -> str:
@@ -267,19 +282,10 @@ def _frame_lines(head: list[tuple[int, str]], n_lines: int) -> tuple[int, float]
         start, colon, rest = text.partition(":")
         if not colon or start.lower().split() != name[:-1].lower().split():
             raise bad(line, shown(text.strip()), f'must be "{name}" with a number')
-        word = rest.strip()
-        rule = _number_rule(word)
-        if rule:
-            raise bad(line, shown(word), rule, _comma_hint(word))
-        found.append(float(word))
+        found.append(_number(rest.strip(), line))
     if found[0] < 0.0 or found[0] != int(found[0]):
         raise bad(texts[0][0], f"{found[0]:g}", "must be a whole number of frames")
     return int(found[0]), check_dt(found[1], f"line {texts[1][0]}, Frame Time")
-
-
-def _first_word(line: str) -> str:
-    """Return the first word of a line, a keyword as in ``_WORDS``."""
-    return next((_keyword(word) for word in line.split()[:1]), "")
 
 
 def _keyword(word: str) -> str:
@@ -308,20 +314,18 @@ class _Tree:
             raise bad(self._line, "", "must be HIERARCHY", "the file is not a BVH file")
         self._open_joint(_keyword(self._next("ROOT")))
         while self._open:
-            self._part(_keyword(self._next("} or JOINT")))
+            word = _keyword(self._next("} or JOINT"))
+            if word == "}":
+                self._open.pop()
+            elif word in ("JOINT", "End"):
+                self._open_joint(word)
+            else:
+                rule = f"must be one of {', '.join(_WORDS[2:])}"
+                raise bad(self._line, shown(word), rule)
         if self._ahead is not None:
             rule = "must be MOTION: a file must hold one skeleton"
             raise bad(self._ahead[0], shown(self._ahead[1]), rule)
         return tuple(self._joints)
-
-    def _part(self, word: str) -> None:
-        if word == "}":
-            self._open.pop()
-        elif word in ("JOINT", "End"):
-            self._open_joint(word)
-        else:
-            rule = f"must be one of {', '.join(_WORDS[2:])}"
-            raise bad(self._line, shown(word), rule)
 
     def _open_joint(self, word: str) -> None:
         if word not in ("ROOT", "JOINT", "End") or (word == "ROOT") != (not self._joints):
@@ -369,10 +373,7 @@ class _Tree:
 
     def _number(self) -> float:
         word = self._next("a number")
-        rule = _number_rule(word)
-        if rule:
-            raise bad(self._line, shown(word), rule, _comma_hint(word))
-        return float(word)
+        return _number(word, self._line)
 
     def _expect(self, word: str) -> None:
         found = self._next(word)

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from app.errors import digits
+from app.errors import BadRecording, digits
 from app.sim.core.arrays import Vec
 from app.sim.human.model import JOINT_NAMES
 from app.sim.mocap.artifacts import Artifact
@@ -153,7 +153,7 @@ def _require_rise(pelvis_z: Vec) -> None:
     extreme = float(max(pelvis_z.min(), pelvis_z.max(), key=abs))
     if not SPAN_Z[0] <= extreme <= SPAN_Z[1]:
         rule = f"is the height relative to standing; must be {SPAN_Z[0]:g} to {SPAN_Z[1]:g} m"
-        raise bad("column pelvis_z", f"{extreme:.4g}", rule, _unit_hint(extreme, extreme))
+        raise _not_metres("column pelvis_z", extreme, rule)
     rise = float(np.median(pelvis_z))
     if rise > MAX_RISE:
         rule = f"is the median rise above standing; must be at most {MAX_RISE:g} m"
@@ -183,24 +183,23 @@ def in_radians(angles: Mapping[str, Vec], degrees: bool) -> Vec:
         BadRecording: The values fit the other unit.
     """
     turning = ("pelvis_yaw", "pelvis_rotation")
-    largest = {
-        name: float(np.abs(column).max())
-        for name, column in angles.items()
-        if name not in turning
+    bounded = {
+        name: np.abs(column).max() for name, column in angles.items() if name not in turning
     }
-    name = max(largest, key=largest.__getitem__)
-    most = largest[name]
+    name = max(bounded, key=bounded.__getitem__)
+    most = float(bounded[name])
     if not degrees and most > MAX_RADIANS:
         rule = f"must be at most {MAX_RADIANS} rad, as the file declares radians"
-        raise bad(f"column {name}", f"{most:.4g}", rule, "looks like degrees")
-    if degrees and 0.0 < most <= MIN_DEGREES:
+        hint = "looks like degrees"
+    elif degrees and 0.0 < most <= MIN_DEGREES:
         rule = f"is the largest angle, and a motion in degrees exceeds {MIN_DEGREES}"
-        raise bad(f"column {name}", f"{most:.4g}", rule, "looks like radians")
-    if degrees and most > 720.0:
-        rule = "must be at most 720 degrees"
-        raise bad(f"column {name}", f"{most:.4g}", rule)
-    columns = np.stack(list(angles.values()), axis=1)
-    return _continuous(np.radians(columns) if degrees else columns)
+        hint = "looks like radians"
+    elif degrees and most > 720.0:
+        rule, hint = "must be at most 720 degrees", ""
+    else:
+        columns = np.stack(list(angles.values()), axis=1)
+        return _continuous(np.radians(columns) if degrees else columns)
+    raise bad(f"column {name}", f"{most:.4g}", rule, hint)
 
 
 def _continuous(angles: Vec) -> Vec:
@@ -219,10 +218,8 @@ def require_places(places: Mapping[str, Vec]) -> None:
     far = {name: float(np.abs(column).max()) for name, column in places.items()}
     for name, value in far.items():
         if value > MAX_PLACE:
-            hint = _unit_hint(max(far.values()), value)
-            raise bad(
-                f"column {name}", f"{value:.4g}", f"must be at most {MAX_PLACE:g} m", hint
-            )
+            rule = f"must be at most {MAX_PLACE:g} m"
+            raise _not_metres(f"column {name}", value, rule, max(far.values()))
 
 
 def require_pace(places: Mapping[str, Vec], times: Vec) -> None:
@@ -235,9 +232,7 @@ def require_pace(places: Mapping[str, Vec], times: Vec) -> None:
     speed = pace(np.column_stack(list(places.values())), dt, 50.0)
     if speed > MAX_PACE:
         rule = f"is the median speed of the pelvis; must be at most {MAX_PACE:g} m/s"
-        raise bad(
-            f"columns {', '.join(places)}", f"{speed:.4g}", rule, _unit_hint(speed, speed)
-        )
+        raise _not_metres(f"columns {', '.join(places)}", speed, rule)
 
 
 def require_height(name: str, column: Vec) -> None:
@@ -249,13 +244,21 @@ def require_height(name: str, column: Vec) -> None:
     height = float(np.median(column))
     if abs(height) > MAX_HIGH:
         rule = f"is the median height of the pelvis; must be within {MAX_HIGH:g} m of zero"
-        raise bad(f"column {name}", f"{height:.4g}", rule, _unit_hint(height, height))
+        raise _not_metres(f"column {name}", height, rule)
 
 
-def _unit_hint(largest: float, value: float) -> str:
-    """Return a value in metres, by the unit of the largest length that is none in metres."""
-    unit, per_metre = ("centimetres", 100.0) if abs(largest) <= 300.0 else ("millimetres", 1e3)
-    return f"looks like {unit}: in m that is {value / per_metre:.4g}"
+def _not_metres(
+    place: str, value: float, rule: str, largest: float | None = None
+) -> BadRecording:
+    """Return the error of a length that is not in metres.
+
+    Args:
+        largest: Largest length of the same unit, which determines the unit; None: ``value``.
+    """
+    most = abs(value if largest is None else largest)
+    unit, per_metre = ("centimetres", 100.0) if most <= 300.0 else ("millimetres", 1e3)
+    hint = f"looks like {unit}: in m that is {value / per_metre:.4g}"
+    return bad(place, f"{value:.4g}", rule, hint)
 
 
 def check_times(times: Vec, table: TextTable, good: NDArray[np.bool_]) -> Vec:

@@ -139,16 +139,12 @@ def _declared(comments: Lines) -> dict[str, str]:
     """
     found: dict[str, str] = {}
     for number, line in comments:
-        key, value = _declaration(line)
+        sides = line.replace(":", "=").strip(PADDING).lstrip("# ").partition("=")
+        key, _, value = (side.strip(PADDING).lower() for side in sides)
         if found.setdefault(key, value) != value and key in DECLARED:
             rule = f"must be {found[key][:40]}, as {key} is declared before"
             raise bad(f"line {number}, {key}", shown(value), rule)
     return found
-
-
-def _declaration(line: str) -> tuple[str, str]:
-    key, _, value = line.replace(":", "=").strip(PADDING).lstrip("# ").partition("=")
-    return key.strip(PADDING).lower(), value.strip(PADDING).lower()
 
 
 def _is_index(name: str) -> bool:

@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from app.sim.core.arrays import Vec
-from app.sim.mocap.bvh import Bvh, forward
+from app.sim.mocap.bvh import Bvh, forward, with_ancestors
 from app.sim.mocap.faults import bad
 from app.sim.mocap.joint_centres import (
     ELBOW_R,
@@ -145,18 +145,9 @@ def _resting(bvh: Bvh) -> Bvh:
     return replace(bvh, values=np.array([row]))
 
 
-def _root_path(bvh: Bvh, joints: Joints) -> set[int]:
-    """Return the pelvis and its ancestors."""
-    path, k = set(), joints["pelvis"][0]
-    while k >= 0:
-        path.add(k)
-        k = bvh.joints[k].parent
-    return path
-
-
 def _with_root_scaled(bvh: Bvh, joints: Joints, factor: float) -> Bvh:
     """Return a file with the path of the pelvis scaled."""
-    path = _root_path(bvh, joints)
+    path = with_ancestors(bvh, joints["pelvis"])
     moving = [joint in path and name.endswith("position") for joint, name in bvh.channels]
     return replace(bvh, values=np.where(moving, factor * bvh.values, bvh.values))
 
@@ -203,7 +194,7 @@ def _hips(placed: Centres) -> Vec | None:
 
 def _require_degrees(bvh: Bvh, joints: Joints) -> None:
     """Check that angles are in degrees; those of the root may exceed a full turn in radians."""
-    root = _root_path(bvh, joints)
+    root = with_ancestors(bvh, joints["pelvis"])
     turns = [
         k
         for k, (joint, name) in enumerate(bvh.channels)

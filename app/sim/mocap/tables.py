@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from app.errors import BadRecording, Fault, digits
 from app.sim.core.arrays import Vec
 from app.sim.mocap.artifacts import Artifact
-from app.sim.mocap.bvh import MAX_FRAMES, MAX_NUMBER
+from app.sim.mocap.bvh import MAX_FRAMES, MAX_NUMBER, as_number
 from app.sim.mocap.faults import MAX_FAULTS, bad, shown
 
 PADDING = ',;|\t "'
@@ -162,14 +162,12 @@ class TextTable:
     def _numbers(self, cells: Sequence[str], text: str) -> list[float]:
         """Return numbers; NaN for missing values, infinity for text."""
         if (self.decimal == "." or "." not in text) and "_" not in text:
+            is_pointed = self.decimal == "."
             try:
-                return [float(one) for one in self._pointed(cells)]
+                return [float(one if is_pointed else one.replace(",", ".")) for one in cells]
             except ValueError:
                 pass
         return [number(one, self.decimal) for one in cells]
-
-    def _pointed(self, cells: Sequence[str]) -> Sequence[str]:
-        return cells if self.decimal == "." else [one.replace(",", ".") for one in cells]
 
     def _wrong_count(self, line: int, text: str) -> Fault:
         count = len(self.split(text, 2 * MAX_COLUMNS))
@@ -189,7 +187,7 @@ class TextTable:
             if np.isnan(value) or abs(value) <= _most(name):
                 continue
             rule, hint = "must be a number", ""
-            if _number(cell.replace(self.decimal, ".")) is not None:
+            if as_number(cell.replace(self.decimal, ".")) is not None:
                 rule = f"must be a finite number of at most {digits(_most(name))}"
             if _THOUSANDS.fullmatch(cell.strip()[:MAX_NAME]) or (
                 self.decimal == "," and "." in cell
@@ -270,7 +268,7 @@ def number(cell: str, decimal: str = ".") -> float:
         return np.nan
     if decimal == ",":
         word = "" if "." in word else word.replace(",", ".")
-    value = _number(word)
+    value = as_number(word)
     return np.inf if value is None else value
 
 
@@ -319,14 +317,6 @@ def _most(name: str) -> float:
 
 def _likeness(one: str, other: str) -> float:
     return SequenceMatcher(None, plain(one), plain(other)).ratio()
-
-
-def _number(word: str) -> float | None:
-    """Return a number, None for text; unlike Python's, ``1_000`` is none."""
-    try:
-        return None if "_" in word else float(word)
-    except ValueError:
-        return None
 
 
 def _side(name: str) -> str:

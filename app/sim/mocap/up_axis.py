@@ -13,6 +13,7 @@ import numpy as np
 from app.errors import BadRecording
 from app.sim.core.arrays import Vec
 from app.sim.mocap.faults import bad
+from app.sim.mocap.joint_centres import unit
 from app.sim.mocap.read_options import UP_AXES
 
 FOUND = ("y", "z")
@@ -146,8 +147,7 @@ def _objections(motion: BodyDirections, axis: str, straight: float) -> dict[str,
 def _lean(motion: BodyDirections, axis: str) -> float:
     """Return the median lean of the trunk [deg], forward positive."""
     up = vector(axis)
-    front = np.cross(motion.across, up)
-    front /= np.maximum(np.linalg.norm(front, axis=1, keepdims=True), 1e-9)
+    front = unit(np.cross(motion.across, up))
     ahead = np.median(np.einsum("ni,ni->n", motion.trunk, front))
     return float(np.degrees(np.arctan2(ahead, np.median(motion.trunk @ up))))
 
