@@ -84,10 +84,10 @@ def random_segment(
     start, end, hand = segment
     primitive, first, count = library.segments[segment]
     person = int(rng.integers(len(library.bodies)))
-    ranges = library.of_station[person, [start, end], hand]
+    ranges = library.keyframes.of_station[person, [start, end], hand]
     keyframes = [int(one + rng.integers(some)) for one, some in ranges]
     sample = int(first + rng.integers(count))
-    weights = segment_weights(library, primitive, sample, library.postures[keyframes])
+    weights = segment_weights(library, primitive, sample, library.keyframes.postures[keyframes])
     phi = promp.basis(PHASES, promp.N_BASIS, promp.usual_width(promp.N_BASIS))
     q = phi @ weights.T
     size = library.bodies[person]
@@ -100,7 +100,7 @@ def random_segment(
         person=person,
         q=q,
         palms=palms,
-        keyframes=library.hands[keyframes],
+        keyframes=library.keyframes.hands[keyframes],
         lowest=float(heights.min()),
     )
 

@@ -67,7 +67,7 @@ def measure(cell: Cell, library: MotionLibrary) -> Json:
         "file_mb": FILE.stat().st_size / 1e6,
         "legs": LEGS,
         "people": len(library.bodies),
-        "nodes": len(library.postures),
+        "nodes": len(library.keyframes.postures),
         "end_miss_m": max(segment.end_miss for segment in segments),
         "beyond_share": float(np.mean([segment.beyond > 1e-3 for segment in segments])),
         "lowest_m": min(segment.lowest for segment in segments),

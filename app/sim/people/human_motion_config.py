@@ -135,44 +135,36 @@ def with_human_motion(shared: People, cell: Cell, settings: HumanMotionConfig) -
         tracks.spans[:, 2] = -1
         shared = shared._replace(tracks=tracks, track_share=settings.off_task)
     if settings.motion == "library":
-        return _with_library(shared, cell, settings)
-    sizes = settings.bodies or (cell.human.size,)
-    variants = REACH_VARIANTS if settings.variants is None else settings.variants
-    library = build_reach_library(cell, settings.seed, sizes, variants)
+        variants = VARIANTS if settings.variants is None else settings.variants
+        augmentation = settings.augmentation
+        library = motion_library(
+            cell, settings.seed, settings.bodies, augmentation=augmentation, variants=variants
+        )
+        drawn = library.keyframes
+        # Samples are large, and read-only everywhere.
+        shared = shared._replace(
+            source=people.LIBRARY,
+            bodies=np.array(library.bodies),
+            primitive_library=PrimitiveLibrary(
+                samples=np.ascontiguousarray(library.samples),
+                gain=np.array(library.gain),
+                segments=np.array(library.segments),
+                duration=np.array(library.duration),
+                varied=augmentation,
+            ),
+        )
+    else:
+        sizes = settings.bodies or (cell.human.size,)
+        variants = REACH_VARIANTS if settings.variants is None else settings.variants
+        drawn = build_reach_library(cell, settings.seed, sizes, variants)
+        bodies = np.stack([size.vector(cell.floor_z) for size in sizes])
+        shared = shared._replace(source=people.REACHES, bodies=bodies)
+    # Copies, because kernels are compiled separately for read-only arrays.
     return shared._replace(
-        source=people.REACHES,
-        bodies=np.stack([size.vector(cell.floor_z) for size in sizes]),
-        postures=np.array(library.postures),
-        hands=np.array(library.hands),
-        of_station=np.array(library.of_station),
-        n_cubes=library.n_cubes,
-    )
-
-
-def _with_library(shared: People, cell: Cell, settings: HumanMotionConfig) -> People:
-    library = motion_library(
-        cell,
-        settings.seed,
-        settings.bodies,
-        augmentation=settings.augmentation,
-        variants=VARIANTS if settings.variants is None else settings.variants,
-    )
-    # Copies, because kernels are compiled separately for read-only arrays. Samples are large,
-    # and read-only everywhere.
-    return shared._replace(
-        source=people.LIBRARY,
-        bodies=np.array(library.bodies),
-        postures=np.array(library.postures),
-        hands=np.array(library.hands),
-        of_station=np.array(library.of_station),
-        n_cubes=library.n_cubes,
-        primitive_library=PrimitiveLibrary(
-            samples=np.ascontiguousarray(library.samples),
-            gain=np.array(library.gain),
-            segments=np.array(library.segments),
-            duration=np.array(library.duration),
-            varied=settings.augmentation,
-        ),
+        postures=np.array(drawn.postures),
+        hands=np.array(drawn.hands),
+        of_station=np.array(drawn.of_station),
+        n_cubes=drawn.n_cubes,
     )
 
 

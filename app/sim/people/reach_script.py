@@ -1,6 +1,6 @@
 """Synthetic reaches by inverse kinematics: home, cube, dock and back.
 
-A :class:`ReachLibrary` holds postures per place and hand with random stance, elbow and grip. A
+A library holds postures per place and hand with random stance, elbow and grip. A
 script visits them at random pace with pauses (``primitives/kernels/script.py``). The other hand
 rests at the table's edge while the trunk leans.
 
@@ -11,8 +11,6 @@ Source: docs/method.md 3.2 and 3.4. Deviates: the thesis replays motion capture 
 primitives (``primitive_library.py``); these reaches are synthetic.
 """
 
-import math
-from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -23,6 +21,14 @@ from app.sim.human import model as human
 from app.sim.human.anthropometry import BodySize
 from app.sim.human.model import Hand
 from app.sim.primitives.kernels import script
+from app.sim.primitives.keyframes import (
+    PostureLibrary,
+    draw_grip_and_stance,
+    draw_home_stance,
+    draw_postures,
+    posture,
+    table_support,
+)
 
 REACH_PACE = 0.5
 """Mean palm speed of a single reach [m/s]."""
@@ -32,24 +38,10 @@ VARIANTS = 24
 """Postures per body, place and hand."""
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ReachLibrary:
-    """Postures of the work in one cell; arrays are read-only."""
-
-    postures: Vec
-    """Joint positions [m, rad], shape (n, 18)."""
-    hands: Vec
-    """Palm positions, right then left [m], shape (n, 2, 3)."""
-    of_station: script.Index
-    """First posture and count of each body, place and hand, (n_bodies, n_places, 2, 2)."""
-    n_cubes: int
-    """Number of cubes."""
-
-
 @lru_cache(maxsize=8)
 def build_reach_library(
     cell: Cell, seed: int, bodies: tuple[BodySize, ...] | None = None, variants: int = VARIANTS
-) -> ReachLibrary:
+) -> PostureLibrary:
     """Draw ``variants`` postures for each body, place and hand of a cell.
 
     Args:
@@ -58,41 +50,18 @@ def build_reach_library(
         variants: Postures per body, place and hand.
     """
     rng = np.random.default_rng(seed)
-    sizes = [size.vector(cell.floor_z) for size in bodies or (cell.human.size,)]
-    postures: list[Vec] = []
-    hands: list[Vec] = []
-    of_station = np.zeros((len(sizes), len(cell.pick_stations) + 1, 2, 2), dtype=np.int64)
-    for size, index in zip(sizes, of_station, strict=True):
-        begin = len(postures)
-        for place, station in enumerate(cell.pick_stations):
-            for column, hand in enumerate(human.HANDS):
-                index[place, column] = len(postures), variants
-                target = np.array(station.position)
-                postures.extend(
-                    _at_station(cell, size, rng, target, hand) for _ in range(variants)
-                )
-        index[-1, :] = len(postures), variants
-        postures.extend(_at_home(cell, rng) for _ in range(variants))
-        hands.extend(human.palms(q, size) for q in postures[begin:])
-    stacked, palms = np.array(postures), np.array(hands)
-    for array in (stacked, palms, of_station):
-        array.setflags(write=False)
-    n_cubes = sum(station.kind == "cube" for station in cell.pick_stations)
-    return ReachLibrary(
-        postures=stacked,
-        hands=palms,
-        of_station=of_station,
-        n_cubes=n_cubes,
-    )
+    sizes = np.array([size.vector(cell.floor_z) for size in bodies or (cell.human.size,)])
+
+    def draw(size: Vec, target: Vec | None, hand: Hand) -> Vec:
+        if target is None:
+            return _at_home(cell, rng)
+        return _at_station(cell, size, rng, target, hand)
+
+    return draw_postures(cell, sizes, variants, draw)
 
 
 def _at_home(cell: Cell, rng: np.random.Generator) -> Vec:
-    x, y, yaw = cell.human.home
-    q = human.rest_posture(
-        float(np.clip(x + rng.normal(0.0, 0.2), cell.human.x_min, cell.human.x_max)),
-        float(np.clip(y + rng.uniform(-0.08, 0.15), cell.human.y_min, cell.human.y_max)),
-        yaw + rng.normal(0.0, 0.15),
-    )
+    q = human.rest_posture(*draw_home_stance(cell, rng))
     for first in (10, 14):
         q[first : first + 4] += rng.uniform([-0.1, -0.06, -0.2, -0.25], [0.2, 0.09, 0.2, 0.65])
     return q
@@ -102,19 +71,11 @@ def _at_station(
     cell: Cell, size: Vec, rng: np.random.Generator, target: Vec, hand: Hand
 ) -> Vec:
     """Return a posture with one palm at a station and the other at the table's edge."""
-    sign = -1.0 if hand == "r" else 1.0
-    grip = target + rng.uniform([-0.03, -0.03, -0.06], [0.03, 0.03, 0.05])
-    x = 0.8 * target[0] - sign * 0.12 + rng.normal(0.0, 0.07)
-    x = float(np.clip(x, cell.human.x_min, cell.human.x_max))
-    y = cell.human.y_min + rng.uniform(0.0, 0.12)
-    yaw = cell.human.home[2] + rng.normal(0.0, 0.12) + 0.3 * math.atan2(target[0] - x, 0.5)
-    start = human.rest_posture(x, y, yaw)
-    support = np.array([x + sign * -0.25, cell.table.y_max - 0.03, 0.06])
-    support += rng.uniform(-0.04, 0.04, 3)
-    right, left = (grip, support) if hand == "r" else (support, grip)
-    swivel = float(rng.uniform(0.0, 0.9))
-    posture = human.solve_hands(start, size, right=right, left=left, swivel=swivel)
-    return posture.q
+    side = -1 if hand == "r" else 1
+    grip, pelvis = draw_grip_and_stance(cell, target, side, (0.0, 0.12), rng)
+    support = table_support(cell, pelvis[0], side) + rng.uniform(-0.04, 0.04, 3)
+    palms = np.stack([grip, support] if hand == "r" else [support, grip])
+    return posture(size, pelvis, palms, float(rng.uniform(0.0, 0.9))).q
 
 
 class ReachScript:
@@ -162,18 +123,15 @@ def reach_script(
 
 
 def standing_reach(cell: Cell, palm: Vec, hand: Hand) -> Vec:
-    """Return a posture with one palm at a point and the other at the table's edge.
+    """Return a posture (18,) with one palm at a point and the other at the table's edge.
 
     Args:
         palm: Position of the palm [m], shape (3,).
         hand: The hand.
-
-    Returns:
-        Joint positions [m, rad], shape (18,).
     """
-    sign = -1.0 if hand == "r" else 1.0
-    x = float(np.clip(0.8 * palm[0] - sign * 0.12, cell.human.x_min, cell.human.x_max))
+    side = -1 if hand == "r" else 1
+    x = float(np.clip(0.8 * palm[0] - side * 0.12, cell.human.x_min, cell.human.x_max))
     start = human.rest_posture(x, cell.human.y_min + 0.03, cell.human.home[2])
-    support = np.array([x + sign * -0.25, cell.table.y_max - 0.03, 0.06])
+    support = table_support(cell, x, side)
     right, left = (palm, support) if hand == "r" else (support, palm)
     return human.solve_hands(start, cell.body, right=right, left=left).q

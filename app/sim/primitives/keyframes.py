@@ -10,9 +10,11 @@ synthetic. Elbows hang lower, because of the cubes.
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from app.sim.cells.cell import Cell
 from app.sim.core.arrays import Vec
@@ -27,6 +29,7 @@ KEYFRAME_TRIES = 20
 
 _LOW_POINTS = (body.ELBOW_R, body.WRIST_R, body.HAND_R, body.ELBOW_L, body.WRIST_L, body.HAND_L)
 Range = tuple[float, float]
+Index = NDArray[np.int64]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -73,6 +76,61 @@ class Keyframe:
     """Joint positions [m, rad], shape (18,)."""
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PostureLibrary:
+    """Postures of the work in one cell; arrays are read-only."""
+
+    postures: Vec
+    """Joint positions [m, rad], shape (n, 18)."""
+    hands: Vec
+    """Right and left palms [m], shape (n, 2, 3)."""
+    of_station: Index
+    """First posture and count of each body, place (home last) and hand, shape (n_bodies,
+    n_places + 1, 2, 2)."""
+    n_cubes: int
+    """Number of cubes."""
+
+    def __post_init__(self) -> None:
+        for array in (self.postures, self.hands, self.of_station):
+            array.setflags(write=False)
+
+
+def draw_postures(
+    cell: Cell, sizes: Vec, variants: int, draw: Callable[[Vec, Vec | None, Hand], Vec]
+) -> PostureLibrary:
+    """Draw ``variants`` postures for each body, place and hand of a cell.
+
+    Args:
+        cell: Work cell with a worker.
+        sizes: Sizes of the bodies [m], shape (n_bodies, 12).
+        variants: Postures per body, place and hand.
+        draw: Function of a size, the point of a station [m], or None at home, and a hand, that
+            returns joint positions [m, rad], shape (18,).
+    """
+    points = [np.array(station.position) for station in cell.pick_stations]
+    of_station = np.zeros((len(sizes), len(points) + 1, 2, 2), dtype=np.int64)
+    postures: list[Vec] = []
+    palms: list[Vec] = []
+
+    def add(size: Vec, point: Vec | None, hand: Hand) -> tuple[int, int]:
+        drawn = [draw(size, point, hand) for _ in range(variants)]
+        postures.extend(drawn)
+        palms.extend(human.palms(q, size) for q in drawn)
+        return len(postures) - variants, variants
+
+    for size, of_body in zip(sizes, of_station, strict=True):
+        for place, point in enumerate(points):
+            for column, hand in enumerate(human.HANDS):
+                of_body[place, column] = add(size, point, hand)
+        of_body[-1, :] = add(size, None, human.HANDS[0])  # home has no working hand
+    return PostureLibrary(
+        postures=np.array(postures),
+        hands=np.array(palms),
+        of_station=of_station,
+        n_cubes=len(cell.stations_of("cube")),
+    )
+
+
 def draw_style(rng: np.random.Generator) -> Style:
     """Draw a style uniformly."""
     return STYLES[rng.integers(len(STYLES))]
@@ -116,32 +174,59 @@ def _keyframe(size: Vec, pelvis: Vec, palms: Vec, swivel: float) -> tuple[Keyfra
 
 
 def posture(size: Vec, pelvis: Vec, palms: Vec, swivel: float) -> human.Posture:
-    """Return the posture of a stance with given palms.
-
-    Args:
-        size: The person's size [m], shape (12,).
-        pelvis: Pelvis x [m], y [m], yaw [rad], shape (3,).
-        palms: Right and left palm [m], shape (2, 3).
-        swivel: Swivel of the elbows [rad].
-    """
+    """Return the posture of a person of a size [m] with given stance, palms and swivel."""
     x, y, yaw = (float(value) for value in pelvis)
     start = human.rest_posture(x, y, yaw)
     return human.solve_hands(start, size, right=palms[0], left=palms[1], swivel=swivel)
 
 
-def _home(
-    cell: Cell, size: Vec, style: Style, rng: np.random.Generator
-) -> tuple[Keyframe, bool]:
-    """Draw a posture at home with slightly lifted forearms."""
-    x, y, yaw = cell.human.home
-    area = cell.human
-    pelvis = np.array(
+def draw_home_stance(cell: Cell, rng: np.random.Generator) -> Vec:
+    """Draw the pelvis x [m], y [m], yaw [rad] of a person at home, shape (3,)."""
+    area, (x, y, yaw) = cell.human, cell.human.home
+    return np.array(
         [
             np.clip(x + rng.normal(0.0, 0.2), area.x_min, area.x_max),
             np.clip(y + rng.uniform(-0.08, 0.15), area.y_min, area.y_max),
             yaw + rng.normal(0.0, 0.15),
         ]
     )
+
+
+def draw_grip_and_stance(
+    cell: Cell, target: Vec, side: int, away: Range, rng: np.random.Generator
+) -> tuple[Vec, Vec]:
+    """Draw a palm [m] near a station, and the pelvis x [m], y [m], yaw [rad] that goes with it.
+
+    Args:
+        cell: Work cell with a worker.
+        target: Point of the station [m], shape (3,).
+        side: -1 for the right hand, 1 for the left.
+        away: Range of the distance from the table side of the walking area [m].
+    """
+    area = cell.human
+    grip = target + rng.uniform([-0.03, -0.03, -0.06], [0.03, 0.03, 0.05])
+    x = 0.8 * target[0] - side * 0.12 + rng.normal(0.0, 0.07)
+    x = float(np.clip(x, area.x_min, area.x_max))
+    y = min(area.y_min + rng.uniform(*away), area.y_max)
+    yaw = area.home[2] + rng.normal(0.0, 0.12) + 0.3 * math.atan2(target[0] - x, 0.5)
+    return grip, np.array([x, y, yaw])
+
+
+def table_support(cell: Cell, x: float, side: int) -> Vec:
+    """Return the place of a supporting palm at the table's edge [m], shape (3,).
+
+    Args:
+        x: Pelvis x [m].
+        side: -1 where the right hand works, 1 where the left does.
+    """
+    return np.array([x - side * 0.25, cell.table.y_max - 0.03, 0.06])
+
+
+def _home(
+    cell: Cell, size: Vec, style: Style, rng: np.random.Generator
+) -> tuple[Keyframe, bool]:
+    """Draw a posture at home with slightly lifted forearms."""
+    pelvis = draw_home_stance(cell, rng)
     palms = np.stack([_held_palm(size, pelvis, side, rng, (0.14, 0.30)) for side in (-1, 1)])
     return _keyframe(size, pelvis, palms, float(rng.uniform(*style.swivel)))
 
@@ -175,16 +260,9 @@ def _at_station(
 ) -> tuple[Keyframe, bool]:
     """Draw a posture with one palm at a station and the other supporting or free."""
     side = -1 if hand == "r" else 1
-    area = cell.human
-    grip = target + rng.uniform([-0.03, -0.03, -0.06], [0.03, 0.03, 0.05])
-    x = 0.8 * target[0] - side * 0.12 + rng.normal(0.0, 0.07)
-    x = float(np.clip(x, area.x_min, area.x_max))
-    y = min(area.y_min + rng.uniform(*style.away), area.y_max)
-    yaw = area.home[2] + rng.normal(0.0, 0.12) + 0.3 * math.atan2(target[0] - x, 0.5)
-    pelvis = np.array([x, y, yaw])
+    grip, pelvis = draw_grip_and_stance(cell, target, side, style.away, rng)
     if rng.uniform() < style.support:
-        other = np.array([x - side * 0.25, cell.table.y_max - 0.03, 0.06])
-        other += rng.uniform(-0.04, 0.04, 3)
+        other = table_support(cell, pelvis[0], side) + rng.uniform(-0.04, 0.04, 3)
     else:
         other = _held_palm(size, pelvis, -side, rng, (0.24, 0.38))
     palms = np.stack([grip, other] if hand == "r" else [other, grip])
@@ -197,24 +275,14 @@ def is_inside(q: Vec) -> bool:
 
 
 def is_over_table(cell: Cell, q: Vec, size: Vec) -> bool:
-    """Return whether palms, wrists and elbows are clear of the table.
-
-    Args:
-        cell: Work cell.
-        q: Joint positions [m, rad], shape (..., 18).
-        size: Body lengths [m], shape (N_SIZE,).
-    """
+    """Return whether palms, wrists and elbows of a posture are clear of the table."""
     named = human.joint_points(q, size)
     points = np.stack([named[human.POINT_NAMES[i]] for i in _LOW_POINTS])
     return bool((height_over_table(cell, points) >= OVER_TABLE).all())
 
 
 def height_over_table(cell: Cell, points: Vec) -> Vec:
-    """Return the height of points over the table [m], infinite beside the table, shape (...).
-
-    Args:
-        points: Points [m], shape (..., 3).
-    """
+    """Return the height of points, (..., 3), over the table [m]; infinite beside it, (...)."""
     table = cell.table
     x, y, z = points[..., 0], points[..., 1], points[..., 2]
     over = (x >= table.x_min) & (x <= table.x_max) & (y >= table.y_min) & (y <= table.y_max)

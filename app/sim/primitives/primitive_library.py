@@ -23,7 +23,6 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from app.errors import InvalidInput
 from app.sim.cells.cell import Cell, lacks_stations
@@ -31,16 +30,13 @@ from app.sim.core.arrays import Vec
 from app.sim.human import model as human
 from app.sim.human.anthropometry import BodySize, percentile_body
 from app.sim.primitives import promp
-from app.sim.primitives.keyframes import draw_keyframe
+from app.sim.primitives.keyframes import Index, PostureLibrary, draw_keyframe, draw_postures
 from app.sim.primitives.library_file import (
     HOME,
     TaskPrimitive,
-    place_of,
     primitive_for,
     segments_of,
 )
-
-Index = NDArray[np.int64]
 
 BODIES = (
     (50.0, 50.0, 50.0),
@@ -67,14 +63,8 @@ N_SAMPLES = 24
 class MotionLibrary:
     """Keyframes and primitive samples of one cell; arrays are read-only."""
 
-    postures: Vec
-    """Keyframe postures [m, rad], shape (n, 18)."""
-    hands: Vec
-    """Right and left palms of the keyframes [m], shape (n, 2, 3)."""
-    of_station: Index
-    """First keyframe and count of each body, place and hand, (n_bodies, n_places + 1, 2, 2)."""
-    n_cubes: int
-    """Number of cubes."""
+    keyframes: PostureLibrary
+    """Keyframe postures."""
     bodies: Vec
     """Sizes of the bodies [m], shape (n_bodies, 12)."""
     samples: Vec
@@ -123,43 +113,22 @@ def motion_library(
     sizes = people_sizes(cell) if bodies is None else bodies
     vectors = np.array([size.vector(cell.floor_z) for size in sizes])
     rng = np.random.default_rng(seed)
-    postures, hands, of_station = _keyframes(cell, vectors, variants, rng)
+
+    def draw(size: Vec, point: Vec | None, hand: human.Hand) -> Vec:
+        return draw_keyframe(cell, size, point, hand, rng).q
+
+    keyframes = draw_postures(cell, vectors, variants, draw)
     samples, gains, segments, duration = _segments(cell, n_samples, augmentation, rng)
-    for array in (postures, hands, of_station, vectors, samples, gains, segments, duration):
+    for array in (vectors, samples, gains, segments, duration):
         array.setflags(write=False)
     return MotionLibrary(
-        postures=postures,
-        hands=hands,
-        of_station=of_station,
-        n_cubes=len(cell.stations_of("cube")),
+        keyframes=keyframes,
         bodies=vectors,
         samples=samples,
         gain=gains,
         segments=segments,
         duration=duration,
     )
-
-
-def _keyframes(
-    cell: Cell, bodies: Vec, variants: int, rng: np.random.Generator
-) -> tuple[Vec, Vec, Index]:
-    """Draw the keyframes; return joints, palms and the index of each body, place and hand."""
-    points = [place_of(cell, station.id) for station in cell.pick_stations]
-    of_station = np.zeros((len(bodies), len(points) + 1, 2, 2), dtype=np.int64)
-    postures: list[Vec] = []
-    hands: list[Vec] = []
-    for person, size in enumerate(bodies):
-        for place, point in enumerate([*points, None]):
-            for column, hand in enumerate(human.HANDS):
-                of_station[person, place, column] = len(postures), variants
-                if point is None and column == 1:  # home has no working hand
-                    of_station[person, place, column] = of_station[person, place, 0]
-                    continue
-                for _ in range(variants):
-                    keyframe = draw_keyframe(cell, size, point, hand, rng)
-                    postures.append(keyframe.q)
-                    hands.append(human.palms(keyframe.q, size))
-    return np.array(postures), np.array(hands), of_station
 
 
 def _segments(

@@ -156,8 +156,7 @@ def of_weights(
     Args:
         weights: Weights of each demonstration, shape (n, n_joints, n_basis).
         durations: Durations [s], shape (n,).
-        width: Width of the Gaussians [phase]; None: :func:`usual_width`.
-        floor: Standard deviation added to every weight, smoothly along the phase [m, rad].
+        width: As for :func:`fit`, and so is ``floor``.
         residual: Residual of the regression [m, rad], shape (n_joints,); None: nothing.
     """
     n, n_joints, n_basis = weights.shape
@@ -205,7 +204,6 @@ def positions(promp: ProMP, weights: Vec, phase: Vec) -> Vec:
     """Return the joint positions of given weights [m, rad], shape (..., m, n_joints).
 
     Args:
-        promp: Primitive.
         weights: Weights, shape (..., n_joints, n_basis).
         phase: Phases in [0, 1], shape (m,).
     """

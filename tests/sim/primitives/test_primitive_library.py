@@ -74,7 +74,9 @@ def test_every_segment_meets_its_nodes(motions: list[SegmentMotion]) -> None:
 
 def test_every_segment_ends_in_its_keyframes_joints(cell: Cell, library: MotionLibrary) -> None:
     for motion in random_segments(cell, library, 100, 5):
-        ends = [np.abs(library.postures - motion.q[k]).max(axis=1).min() for k in (0, -1)]
+        ends = [
+            np.abs(library.keyframes.postures - motion.q[k]).max(axis=1).min() for k in (0, -1)
+        ]
         assert max(ends) < 1e-3
 
 
@@ -113,8 +115,8 @@ def test_segments_join_home_cubes_and_docks_with_both_hands(
     cell: Cell, library: MotionLibrary
 ) -> None:
     there = library.segments[..., 0] >= 0
-    home, cubes = len(cell.pick_stations), range(library.n_cubes)
-    docks = range(library.n_cubes, home)
+    home, cubes = len(cell.pick_stations), range(library.keyframes.n_cubes)
+    docks = range(library.keyframes.n_cubes, home)
     expected = np.zeros_like(there)
     for a, b in [(home, c) for c in cubes] + [(home, d) for d in docks]:
         expected[a, b] = expected[b, a] = True
@@ -136,13 +138,15 @@ def test_keyframes_of_every_body_reach_stations(cell: Cell, library: MotionLibra
     for person in range(len(library.bodies)):
         for place, station in enumerate(cell.pick_stations):
             for hand in range(2):
-                first, count = library.of_station[person, place, hand]
-                palms = library.hands[first : first + count, hand]
+                first, count = library.keyframes.of_station[person, place, hand]
+                palms = library.keyframes.hands[first : first + count, hand]
                 assert np.linalg.norm(palms - station.position, axis=1).max() < 0.09
 
 
 def test_keyframes_are_inside_the_limits(library: MotionLibrary) -> None:
-    assert (library.postures >= human.Q_MIN).all() and (library.postures <= human.Q_MAX).all()
+    assert (library.keyframes.postures >= human.Q_MIN).all() and (
+        library.keyframes.postures <= human.Q_MAX
+    ).all()
 
 
 def test_samples_keep_the_joint_limits(library: MotionLibrary) -> None:
@@ -166,7 +170,7 @@ def test_library_is_fixed_by_its_seed(cell: Cell) -> None:
     motion_library.cache_clear()
     again, other = (motion_library(cell, seed, bodies, 2, True, 1) for seed in (3, 4))
     np.testing.assert_array_equal(one.samples, again.samples)
-    np.testing.assert_array_equal(one.postures, again.postures)
+    np.testing.assert_array_equal(one.keyframes.postures, again.keyframes.postures)
     assert not np.array_equal(one.samples, other.samples)
 
 
@@ -185,9 +189,9 @@ def test_draws_that_are_missing_are_demonstrations(monkeypatch: pytest.MonkeyPat
 
 
 def test_library_cannot_be_changed(library: MotionLibrary) -> None:
-    for name in ("postures", "samples", "gain", "segments"):
+    for array in (library.keyframes.postures, library.samples, library.gain, library.segments):
         with pytest.raises(ValueError, match="read-only"):
-            getattr(library, name)[...] = 0
+            array[...] = 0
 
 
 def test_moved_cell_has_the_same_motion_elsewhere(cell: Cell) -> None:
