@@ -92,17 +92,14 @@ def _posture(cell: Cell, size: Vec, rng: np.random.Generator) -> Vec:
     """Draw a posture: reaching over the table, or standing somewhere."""
     area, yaw = cell.human, cell.human.home[2]
     x = float(rng.uniform(area.x_min, area.x_max))
-    if rng.random() >= P_OVER_TABLE:
-        y = float(rng.uniform(area.y_min, area.y_max + BACK))
-        q = human.rest_posture(x, y, yaw + rng.normal(0.0, TURN))
-        q[10:14] = rng.uniform(ARM_LOW, ARM_HIGH)
-        q[14:18] = rng.uniform(ARM_LOW, ARM_HIGH)
-        q[3:6] += rng.normal(0.0, (0.12, 0.06, 0.15))
-        return np.clip(q, human.Q_MIN, human.Q_MAX)
-    y = float(rng.uniform(area.y_min, area.y_min + 0.2))
-    q = human.rest_posture(x, y, yaw + rng.normal(0.0, 0.25))
+    stands = rng.random() >= P_OVER_TABLE
+    y = float(rng.uniform(area.y_min, area.y_max + BACK if stands else area.y_min + 0.2))
+    q = human.rest_posture(x, y, yaw + rng.normal(0.0, TURN if stands else 0.25))
     q[10:14] = rng.uniform(ARM_LOW, ARM_HIGH)
     q[14:18] = rng.uniform(ARM_LOW, ARM_HIGH)
+    if stands:
+        q[3:6] += rng.normal(0.0, (0.12, 0.06, 0.15))
+        return np.clip(q, human.Q_MIN, human.Q_MAX)
     right: Vec | None = _over_table(cell, x, -1.0, rng)
     left: Vec | None = _over_table(cell, x, 1.0, rng)
     if rng.random() >= P_BOTH:
