@@ -12,7 +12,7 @@ from typing import Literal
 
 import numpy as np
 
-from app.sim.core.arrays import Vec
+from app.sim.core.arrays import Vec, as_kernel_array
 from app.sim.geometry.capsules import ends_of
 from app.sim.human.kernels import kinematics as body
 
@@ -20,53 +20,20 @@ Hand = Literal["r", "l"]
 HANDS: tuple[Hand, Hand] = ("r", "l")
 
 JOINT_NAMES = (
-    "pelvis_x",
-    "pelvis_y",
-    "pelvis_yaw",
-    "abdomen_flex",
-    "abdomen_side",
-    "abdomen_twist",
-    "clavicle_r_protract",
-    "clavicle_r_elevate",
-    "clavicle_l_protract",
-    "clavicle_l_elevate",
-    "shoulder_r_flex",
-    "shoulder_r_abduct",
-    "shoulder_r_rotate",
-    "elbow_r",
-    "shoulder_l_flex",
-    "shoulder_l_abduct",
-    "shoulder_l_rotate",
-    "elbow_l",
+    *("pelvis_x", "pelvis_y", "pelvis_yaw", "abdomen_flex", "abdomen_side", "abdomen_twist"),
+    *("clavicle_r_protract", "clavicle_r_elevate", "clavicle_l_protract", "clavicle_l_elevate"),
+    *("shoulder_r_flex", "shoulder_r_abduct", "shoulder_r_rotate", "elbow_r"),
+    *("shoulder_l_flex", "shoulder_l_abduct", "shoulder_l_rotate", "elbow_l"),
 )
 CAPSULE_NAMES = (
-    "pelvis",
-    "abdomen",
-    "chest",
-    "head",
-    "upper_arm_r",
-    "upper_arm_l",
-    "forearm_r",
-    "forearm_l",
-    "hand_r",
-    "hand_l",
-    "leg_r",
-    "leg_l",
+    *("pelvis", "abdomen", "chest", "head"),
+    *("upper_arm_r", "upper_arm_l", "forearm_r", "forearm_l", "hand_r", "hand_l"),
+    *("leg_r", "leg_l"),
 )
 POINT_NAMES = (
-    "pelvis",
-    "waist",
-    "chest",
-    "neck",
-    "head",
-    "shoulder_r",
-    "elbow_r",
-    "wrist_r",
-    "hand_r",
-    "shoulder_l",
-    "elbow_l",
-    "wrist_l",
-    "hand_l",
+    *("pelvis", "waist", "chest", "neck", "head"),
+    *("shoulder_r", "elbow_r", "wrist_r", "hand_r"),
+    *("shoulder_l", "elbow_l", "wrist_l", "hand_l"),
     "crown",
 )
 FRAME_NAMES = ("pelvis", "torso", "upper_arm_r", "forearm_r", "upper_arm_l", "forearm_l")
@@ -110,18 +77,12 @@ def rest_posture(x: float, y: float, yaw: float) -> Vec:
     """
     q = np.zeros(18)
     q[:3] = x, y, yaw
-    q[10:14] = REST_ARM
-    q[14:18] = REST_ARM
+    q[10:14] = q[14:18] = REST_ARM
     return q
 
 
 def arm_lengths(size: Vec, hand: str) -> tuple[float, float]:
-    """Return the lengths of an arm [m]: shoulder to elbow, elbow to palm.
-
-    Args:
-        size: Body lengths [m], shape (N_SIZE,).
-        hand: ``"r"`` or ``"l"``.
-    """
+    """Return the lengths of an arm [m]: shoulder to elbow, elbow to palm."""
     side = 0 if hand == "r" else 1
     fore = size[body.FOREARM_R + side] + size[body.HAND]
     return float(size[body.UPPER_ARM_R + side]), float(fore)
@@ -129,9 +90,8 @@ def arm_lengths(size: Vec, hand: str) -> tuple[float, float]:
 
 def _forward(q: Vec, size: Vec) -> tuple[Vec, Vec]:
     points, frames = np.empty((body.N_POINTS, 3)), np.empty((body.N_FRAMES, 3, 3))
-    # A copy, because the kernel is compiled separately for read-only arrays.
-    joints, trig = np.array(q, dtype=np.float64), np.empty((3, 16))
-    body.points_and_frames(joints, np.array(size, dtype=np.float64), trig, points, frames)
+    trig = np.empty((3, 16))
+    body.points_and_frames(as_kernel_array(q), as_kernel_array(size), trig, points, frames)
     return points, frames
 
 
@@ -144,7 +104,7 @@ def capsules(q: Vec, size: Vec, floor_z: float) -> Vec:
         floor_z: Height of the floor [m] (``Cell.floor_z``).
     """
     out = body.capsule_columns(1)
-    body.capsules(*_forward(q, size), np.array(size, dtype=np.float64), floor_z, 0, out)
+    body.capsules(*_forward(q, size), as_kernel_array(size), floor_z, 0, out)
     return ends_of(out, body.N_CAPSULES)
 
 
@@ -204,24 +164,20 @@ def solve_hands(
     q = np.array(q_now, dtype=np.float64)
     if pelvis is not None:
         q[:3] = pelvis
-    targets = {"r": right, "l": left}
-    if right is not None or left is not None:
+    given = {"r": right, "l": left}
+    targets = {hand: target for hand, target in given.items() if target is not None}
+    if targets:
         q[3:6] = _lean(q, size, targets)
-    reached = True
     for hand, target in targets.items():
-        if target is not None:
-            first = 10 if hand == "r" else 14
-            q[first : first + 4] = _solve_arm(q, size, hand, target, swivel)
+        first = 10 if hand == "r" else 14
+        q[first : first + 4] = _solve_arm(q, size, hand, target, swivel)
     q = np.clip(q, Q_MIN, Q_MAX)
     points = joint_points(q, size)
-    for hand, target in targets.items():
-        if target is not None:
-            error = np.linalg.norm(points[f"hand_{hand}"] - target)
-            reached = reached and bool(error < 0.01)
-    return Posture(q=q, reached=reached)
+    errors = (np.linalg.norm(points[f"hand_{hand}"] - targets[hand]) for hand in targets)
+    return Posture(q=q, reached=all(bool(error < 0.01) for error in errors))
 
 
-def _lean(q: Vec, size: Vec, targets: dict[str, Vec | None]) -> Vec:
+def _lean(q: Vec, size: Vec, targets: dict[str, Vec]) -> Vec:
     """Return abdomen angles [rad], shape (3,), that bring the shoulders near their targets.
 
     Bends the trunk just far enough: bisection on one lean factor along the direction of the
@@ -233,8 +189,6 @@ def _lean(q: Vec, size: Vec, targets: dict[str, Vec | None]) -> Vec:
     c, s = math.cos(q[2]), math.sin(q[2])
     best = np.zeros(3)
     for hand, target in targets.items():
-        if target is None:
-            continue
         offset = target - points[f"shoulder_{hand}"]
         forward, sideways = c * offset[0] + s * offset[1], c * offset[1] - s * offset[0]
         heading = math.atan2(sideways, max(forward, 0.05))
@@ -254,7 +208,7 @@ def _lean(q: Vec, size: Vec, targets: dict[str, Vec | None]) -> Vec:
 
 def _lean_factor(q: Vec, size: Vec, hand: str, target: Vec, direction: Vec) -> float:
     trial, easy = q.copy(), EASY_REACH * sum(arm_lengths(size, hand))
-    writable, trig = np.array(size, dtype=np.float64), np.empty((3, 16))
+    writable, trig = as_kernel_array(size), np.empty((3, 16))
     points, frames = np.empty((body.N_POINTS, 3)), np.empty((body.N_FRAMES, 3, 3))
     shoulder, abdomen = points[POINT_NAMES.index(f"shoulder_{hand}")], trial[3:6]
 
@@ -325,13 +279,7 @@ def reach(
 ) -> Posture:
     """Return the posture with one palm at ``position``, the other arm as in ``q_start``.
 
-    Args:
-        hand: ``"r"`` or ``"l"``.
-        position: Target of the palm [m], shape (3,).
-        q_start: Joint positions to start from [m, rad], shape (18,).
-        size: The person's size [m], shape (12,) (``BodySize.vector``).
-        pelvis: Pelvis x [m], y [m], yaw [rad]; as it is where None.
-        swivel: Turn of the elbow outward [rad].
+    The other arguments are those of :func:`solve_hands`.
     """
     right, left = (position, None) if hand == "r" else (None, position)
     return solve_hands(q_start, size, right=right, left=left, pelvis=pelvis, swivel=swivel)
