@@ -16,7 +16,7 @@ hidden by a table, are assumed below the hips.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,11 +50,6 @@ class SafetyCylinder:
     flesh margin [m]."""
     velocity: Vec
     """Velocity of the axis [m/s], shape (2,)."""
-
-    def after(self, seconds: float, growth: float) -> "SafetyCylinder":
-        """Return the cylinder after a time at its velocity, with an increased radius [m]."""
-        center = self.center + seconds * self.velocity
-        return replace(self, center=center, radius=self.radius + growth)
 
 
 _BONES = (

@@ -93,11 +93,7 @@ class PointFilter:
         variance = (NOISE / np.maximum(confidences, 1e-3)) ** 2
         fresh = seen & ~known
         self._p[fresh], self._v[fresh] = points[fresh], 0.0
-        self._cov[fresh, 0], self._cov[fresh, 1], self._cov[fresh, 2] = (
-            variance[fresh],
-            0.0,
-            1.0,
-        )
+        self._cov[fresh], self._cov[fresh, 0] = (0.0, 0.0, 1.0), variance[fresh]
         more = seen & known
         pp, pv, vv = self._cov[more].T
         total = pp + variance[more]

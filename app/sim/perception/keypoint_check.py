@@ -133,10 +133,10 @@ def check_keypoints(
     Raises:
         InvalidInput: The values are not numbers, or have another shape.
     """
-    points = _numbers(f"{place}keypoints", keypoints, (N_KEYPOINTS, 3))
+    points = as_numbers(f"{place}keypoints", keypoints, (N_KEYPOINTS, 3))
     trust = np.ones(N_KEYPOINTS)
     if confidences is not None:
-        trust = _numbers(f"{place}confidences", confidences, (N_KEYPOINTS,))
+        trust = as_numbers(f"{place}confidences", confidences, (N_KEYPOINTS,))
     missing = np.isnan(points).all(axis=1) | np.isnan(trust)
     for placeholder in _PLACEHOLDERS:
         missing |= (points == placeholder).all(axis=1)
@@ -171,12 +171,7 @@ def check_keypoints(
 
 
 def _why_unusable(confidences: Vec, n_unusable: int) -> str:
-    """Return the reason why no key-point is usable.
-
-    Args:
-        confidences: Those outside [0, 1].
-        n_unusable: Number of unusable key-points; the others are missing.
-    """
+    """Return the reason why no key-point is usable, by the confidences outside [0, 1]."""
     if len(confidences) < n_unusable:
         return f"no key-point has three finite coordinates within {FARTHEST_M:g} m"
     low, high = (digits(float(one)) for one in (confidences.min(), confidences.max()))
@@ -188,7 +183,12 @@ def _names(indices: NDArray[np.intp]) -> tuple[str, ...]:
     return tuple(BODY_25[k] for k in indices.tolist())
 
 
-def _numbers(field: str, values: ArrayLike, shape: tuple[int, ...]) -> Vec:
+def as_numbers(field: str, values: ArrayLike, shape: tuple[int, ...]) -> Vec:
+    """Return received values as an array of a shape.
+
+    Raises:
+        InvalidInput: The values are not numbers, or have another shape.
+    """
     try:
         array = np.array(values, dtype=np.float64)
     except (TypeError, ValueError, OverflowError) as error:

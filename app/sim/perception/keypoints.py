@@ -31,19 +31,17 @@ K = {name: index for index, name in enumerate(BODY_25)}
 """Index of a key-point by its name."""
 
 Group = Literal["arms", "legs", "face"]
-GROUPS: dict[Group, tuple[int, ...]] = {
-    "arms": tuple(K[f"{part}_{s}"] for part in ("shoulder", "elbow", "wrist") for s in "rl"),
-    "legs": tuple(
-        K[f"{part}_{s}"]
-        for part in ("hip", "knee", "ankle", "big_toe", "small_toe", "heel")
-        for s in "rl"
-    ),
-    "face": tuple(K[f"{part}_{s}"] for part in ("eye", "ear") for s in "rl"),
+_PARTS: dict[Group, tuple[str, ...]] = {
+    "arms": ("shoulder", "elbow", "wrist"),
+    "legs": ("hip", "knee", "ankle", "big_toe", "small_toe", "heel"),
+    "face": ("eye", "ear"),
+}
+GROUPS: dict[Group, list[int]] = {
+    group: [K[f"{part}_{s}"] for part in parts for s in "rl"] for group, parts in _PARTS.items()
 }
 """Pairs of key-points whose sides a tracker confuses together."""
-MIRROR = np.array(
-    [K[f"{n[:-1]}{'l' if n[-1] == 'r' else 'r'}"] if n[-2:-1] == "_" else K[n] for n in BODY_25]
-)
+_OTHER_SIDE = {"r": "l", "l": "r"}
+MIRROR = np.array([K.get(n[:-1] + _OTHER_SIDE.get(n[-1], ""), k) for n, k in K.items()])
 """The same key-point of the other side, shape (25,)."""
 
 _FACE = {
@@ -100,7 +98,7 @@ def keypoints_of(q: Vec, size: Vec, floor_z: float) -> Vec:
 
 def swap_sides(values: Vec, group: Group) -> Vec:
     """Return a copy with left and right of one group exchanged, shape as given (25, ...)."""
-    out, members = values.copy(), list(GROUPS[group])
+    out, members = values.copy(), GROUPS[group]
     out[members] = values[MIRROR[members]]
     return out
 
@@ -114,7 +112,7 @@ def swapped_against(points: Vec, expected: Vec, group: Group, margin: float = 0.
         group: One of GROUPS.
         margin: Least reduction of the mean distance [m].
     """
-    members = list(GROUPS[group])
+    members = GROUPS[group]
     given = np.linalg.norm(points[members] - expected[members], axis=1)
     crossed = np.linalg.norm(points[members] - expected[MIRROR[members]], axis=1)
     both = np.isfinite(given) & np.isfinite(crossed)

@@ -51,11 +51,6 @@ class UnassignedDetection:
     """Reason why the key-points cannot be in the cell's frame; None otherwise."""
 
 
-def _by_distance(one: UnassignedDetection) -> float:
-    """Return the sort key: unknown distances last."""
-    return np.inf if one.distance_m is None else one.distance_m
-
-
 def match_people(
     expected: Sequence[Vec], seen: Sequence[Vec], gates: Sequence[float]
 ) -> list[int | None]:
@@ -242,7 +237,10 @@ class MultiPersonTracker:
             for j, frame in enumerate(frames)
             if frame.implausible or (frame.seen.any() and (j in jumps or j not in order))
         ]
-        self.unassigned = tuple(sorted(unassigned, key=_by_distance))
+        distances = [
+            math.inf if one.distance_m is None else one.distance_m for one in unassigned
+        ]
+        self.unassigned = tuple(unassigned[i] for i in np.argsort(distances, kind="stable"))
         self._waiting_since = t
         self._waiting = [frames[one.index].points for one in unassigned if not one.detail]
         self._foreign = next((frame.implausible for frame in frames if frame.implausible), None)
@@ -263,14 +261,9 @@ class MultiPersonTracker:
 
     def at(self, t: float) -> tuple[PersonEstimate, ...]:
         """Return the estimates at ``t`` [s], not earlier than the last frame."""
-        return tuple(
-            self._flagged(track.at(t), flags)
-            for track, flags in zip(self._tracks, self._flags, strict=True)
-        )
-
-    def _flagged(self, estimate: PersonEstimate, flags: tuple[Flag, ...]) -> PersonEstimate:
-        """Return the estimate of one track with the flags of the association."""
-        if not flags:
-            return estimate
-        foreign = self._foreign if "foreign-frame" in flags else estimate.implausible
-        return replace(estimate, flags=(*estimate.flags, *flags), implausible=foreign)
+        found = []
+        for track, flags in zip(self._tracks, self._flags, strict=True):
+            one = track.at(t)
+            foreign = self._foreign if "foreign-frame" in flags else one.implausible
+            found.append(replace(one, flags=(*one.flags, *flags), implausible=foreign))
+        return tuple(found)

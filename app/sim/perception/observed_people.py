@@ -218,11 +218,7 @@ def checked_people(people: Sequence[Person]) -> tuple[Person, ...]:
 def checked_and_known(
     people: Sequence[Person],
 ) -> tuple[tuple[Person, ...], tuple[Person, ...]]:
-    """Return validated people, and the same as observed by policies.
-
-    Raises:
-        InvalidInput: More than four people, or a value out of range.
-    """
+    """Return :func:`checked_people`, and the same people as observed by policies."""
     if len(people) <= MAX_PEOPLE and all(map(is_plain, people)):
         same = tuple(people)
         return same, same
@@ -248,9 +244,10 @@ def checked_person(person: Person, path: str) -> Person:
         rule = f"must lie in [-{digits(FASTEST)}, {digits(FASTEST)}] m/s"
         raise InvalidInput(f"{path}.growth", person.growth, rule)
     past = None if person.past is None else _checked_past(f"{path}.past", person.past)
+    q = checked_vector(f"{path}.q", person.q, 18, _Q_LOW, _Q_HIGH, "m or rad")
     return replace(
         person,
-        q=_checked_q(f"{path}.q", person.q),
+        q=with_known_yaw(q),
         qd=checked_vector(f"{path}.qd", person.qd, 18, -_QD_LIMIT, _QD_LIMIT, "m/s or rad/s"),
         size=size,
         cylinder=cylinder,
@@ -272,11 +269,6 @@ def is_plain(person: Person) -> bool:
         if type(part) is not np.ndarray or part.dtype is not _FLOATS or part.shape != shape:
             return False
     return _is_known(person) and abs(person.q.item(_YAW) - _FACING) <= math.pi
-
-
-def _checked_q(path: str, q: Vec) -> Vec:
-    found = checked_vector(path, q, 18, _Q_LOW, _Q_HIGH, "m or rad")
-    return with_known_yaw(found)
 
 
 def with_known_yaw(q: Vec) -> Vec:

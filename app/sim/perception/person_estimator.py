@@ -155,7 +155,8 @@ class PersonEstimator:
         self.last_points: Vec | None = None
         """Known key-points at the last frame [m], shape (25, 3); None: never seen."""
         self._measured = np.full((N_KEYPOINTS, 3), np.nan)
-        self._flags: tuple[Flag, ...] = ()
+        self.frame_flags: tuple[Flag, ...] = ()
+        """Flags of the last frame."""
         self._frame: Keypoints | None = None
         self._unfit = False
 
@@ -222,7 +223,7 @@ class PersonEstimator:
                 flags.append("restarted")
             self._seen_at = t
         self._points.update(t, points, trust)
-        self._t, self._flags, self._frame = t, tuple(flags), frame
+        self._t, self.frame_flags, self._frame = t, tuple(flags), frame
         self._remember(t)
 
     def _mirrored_for(self, t: float) -> float:
@@ -246,10 +247,10 @@ class PersonEstimator:
         expected = self._points.at(t)[0]
         for group, flag in _SWAPPED.items():
             members = GROUPS[group]
-            known = bool(np.isfinite(expected[list(members)]).any())
+            known = bool(np.isfinite(expected[members]).any())
             since = self._swapped_at.get(group, t)
             if known and t - since > SWAP_S:
-                self._points.forget(list(members))
+                self._points.forget(members)
                 del self._swapped_at[group]
                 flags.append("sides-restarted")
                 known = False
@@ -258,7 +259,7 @@ class PersonEstimator:
             else:
                 swapped = faces_backward(points, group)
             if not swapped:
-                if np.isfinite(points[list(members)]).any():
+                if np.isfinite(points[members]).any():
                     self._swapped_at.pop(group, None)
                 continue
             if known:
@@ -287,11 +288,6 @@ class PersonEstimator:
         self._center.update(t, center, np.ones(1))
         self.last_points = points
 
-    @property
-    def frame_flags(self) -> tuple[Flag, ...]:
-        """Flags of the last frame."""
-        return self._flags
-
     def unseen_s(self, t: float) -> float:
         """Return the time since the last credible key-point [s]; inf: never."""
         return max(0.0, t - self._seen_at)
@@ -313,7 +309,7 @@ class PersonEstimator:
             InvalidInput: ``t`` is earlier than the last frame, or not finite.
         """
         self._require_now(t)
-        flags, age = list(self._flags), t - self._seen_at
+        flags, age = list(self.frame_flags), t - self._seen_at
         points, speeds = self._points.at(t)
         known = np.isfinite(points).all(axis=1)
         person, held, (misfit, _, wrist_misfit) = self._person(points, speeds)
@@ -348,11 +344,7 @@ class PersonEstimator:
     def person_at(self, t: float) -> Person | None:
         """Return only joint angles and speeds of :meth:`at` at ``t`` [s]."""
         self._require_now(t)
-        if self._q is None:
-            return None
-        points, speeds = self._points.at(t)
-        q, qd, _ = joint_motion(points, speeds, self._q, self._size, QD_MAX)
-        return Person(q=q, qd=qd, size=self._size)
+        return self._person(*self._points.at(t))[0]
 
     def _person(
         self, points: Vec, speeds: Vec
@@ -372,4 +364,4 @@ class PersonEstimator:
             return safety_cylinder(points, np.nan_to_num(velocity))
         last = safety_cylinder(self.last_points)
         growth = GROWTH * max(0.0, age - HOLD_S)
-        return None if last is None else last.after(0.0, growth)
+        return None if last is None else replace(last, radius=last.radius + growth)

@@ -14,12 +14,11 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from app.errors import InvalidInput
 from app.sim.core.arrays import Vec
 from app.sim.human.person import Person
 from app.sim.perception.bounding_cylinder import SafetyCylinder, safety_cylinder
 from app.sim.perception.keypoint_angles import joint_motion
-from app.sim.perception.keypoint_check import check_keypoints
+from app.sim.perception.keypoint_check import as_numbers, check_keypoints
 from app.sim.perception.keypoints import BODY_25, N_KEYPOINTS, Group, swap_sides
 from app.sim.perception.person_estimator import QD_MAX, PersonEstimate, PersonEstimator
 
@@ -75,10 +74,7 @@ def _velocities(velocities: ArrayLike | None, place: str) -> tuple[Vec, tuple[st
     """Return velocities [m/s], (25, 3), 0 where unknown, and names of those that cannot be."""
     if velocities is None:
         return np.zeros((N_KEYPOINTS, 3)), ()
-    given = np.array(velocities, dtype=np.float64)
-    if given.shape != (N_KEYPOINTS, 3):
-        rule = f"must have the shape {(N_KEYPOINTS, 3)}"
-        raise InvalidInput(f"{place}velocities", given.shape, rule)
+    given = as_numbers(f"{place}velocities", velocities, (N_KEYPOINTS, 3))
     speeds = np.linalg.norm(np.clip(given, -1e9, 1e9), axis=1)
     known = speeds <= FASTEST_POINT  # False for NaN
     wrong = ~known & ~np.isnan(given).all(axis=1)

@@ -76,13 +76,7 @@ class StampTimeline:
         return max(later, self.time + (now - self.arrived))
 
     def accept(self, stamp: float, time: float, now: float) -> None:
-        """Make a frame the newest one.
-
-        Args:
-            stamp: As offered [s].
-            time: Time returned by :meth:`offer` [s].
-            now: As offered [s].
-        """
+        """Make a frame the newest one, with the ``time`` [s] that :meth:`offer` returned."""
         self.jumped = len(self._pending) >= N_RESYNC
         self._pending.clear()
         self.stamp, self.time, self.arrived = stamp, time, now
@@ -91,9 +85,8 @@ class StampTimeline:
         """Return the time since the newest frame [s], at least 0.
 
         Args:
-            now: The moment on the service's clock [s].
-            stamp: The same as the caller has it, tracker's clock [s]; counts where that is
-                later. None: unknown.
+            now: Present time, service's clock [s].
+            stamp: Present time, tracker's clock [s]; it counts if it is later. None: unknown.
         """
         known = max(0.0, now - self.arrived)
         if stamp is None or self.stamp is None:
