@@ -20,7 +20,7 @@ from app.sim.mocap.bvh import check_dt
 from app.sim.mocap.csv_text import CsvText, read_csv_text
 from app.sim.mocap.faults import bad, shown
 from app.sim.mocap.length_units import MAX_HIGH, MAX_PACE, pace
-from app.sim.mocap.tables import TextTable, complete_rows, missing_values
+from app.sim.mocap.tables import TextTable, complete_rows
 
 CSV_COLUMNS = ("time", *JOINT_NAMES, "pelvis_z")
 """Columns of a CSV file."""
@@ -82,9 +82,7 @@ def read_csv(text: str, names: Mapping[str, str] | None = None) -> AngleTrack:
     columns = _columns(file.table, names)
     degrees = _declared_degrees(file, columns)
     _check_units(file, columns, degrees)
-    values = file.table.values(columns)
-    good = complete_rows(values)
-    sound = {name: column[good] for name, column in values.items()}
+    sound, good, missing = complete_rows(file.table.values(columns))
     q = np.stack([sound[name] for name in JOINT_NAMES], axis=1)
     q[:, 2:] = in_radians({name: sound[name] for name in JOINT_NAMES[2:]}, degrees)
     places = {name: sound[name] for name in _PLACES if name in sound}
@@ -104,7 +102,7 @@ def read_csv(text: str, names: Mapping[str, str] | None = None) -> AngleTrack:
         pelvis_z=pelvis_z,
         frames=np.flatnonzero(good),
         n_frames=len(good),
-        missing=missing_values(values, good),
+        missing=missing,
         names=file.table.foreign(columns),
     )
 
@@ -210,11 +208,7 @@ def _continuous(angles: Vec) -> Vec:
 
 
 def require_places(places: Mapping[str, Vec]) -> None:
-    """Check that positions are in metres.
-
-    Raises:
-        BadRecording: A distance from the origin exceeds ``MAX_PLACE``.
-    """
+    """Raise BadRecording if a distance from the origin exceeds ``MAX_PLACE`` [m]."""
     far = {name: float(np.abs(column).max()) for name, column in places.items()}
     for name, value in far.items():
         if value > MAX_PLACE:
@@ -223,11 +217,7 @@ def require_places(places: Mapping[str, Vec]) -> None:
 
 
 def require_pace(places: Mapping[str, Vec], times: Vec) -> None:
-    """Check that positions are in metres by the speed of the pelvis.
-
-    Raises:
-        BadRecording: It is faster than a person in most frames.
-    """
+    """Raise BadRecording if the pelvis is faster than a person in most frames."""
     dt = float(np.median(np.diff(times)))
     speed = pace(np.column_stack(list(places.values())), dt, 50.0)
     if speed > MAX_PACE:
@@ -236,11 +226,7 @@ def require_pace(places: Mapping[str, Vec], times: Vec) -> None:
 
 
 def require_height(name: str, column: Vec) -> None:
-    """Check that the height of the pelvis over the file's zero is in metres.
-
-    Raises:
-        BadRecording: The median exceeds ``MAX_HIGH``, as that of a child in centimetres does.
-    """
+    """Raise BadRecording if the median height exceeds ``MAX_HIGH``, as a child's in cm does."""
     height = float(np.median(column))
     if abs(height) > MAX_HIGH:
         rule = f"is the median height of the pelvis; must be within {MAX_HIGH:g} m of zero"
@@ -262,16 +248,15 @@ def _not_metres(
 
 
 def check_times(times: Vec, table: TextTable, good: NDArray[np.bool_]) -> Vec:
-    """Return a column of times [s], validated.
+    """Return the times of the complete rows [s], shape (n,), validated.
 
     Args:
-        times: Times of the complete rows, shape (n,).
+        times: The same.
         table: Table with all rows.
         good: Whether each row is complete.
 
     Raises:
-        BadRecording: The times do not increase, or their interval is outside that of motion
-            capture.
+        BadRecording: They do not increase, or their interval is not that of motion capture.
     """
     dt = np.diff(times)
     stuck = np.flatnonzero(dt <= 0.0)

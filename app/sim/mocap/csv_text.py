@@ -60,11 +60,11 @@ def read_csv_text(text: str, known: Sequence[str]) -> CsvText:
         raise bad("file", "", "holds no table")
     keys = frozenset(plain(name) for name in known)
     head, rows = table[0], table[1:]
-    if not _known(head[1], keys):  # numpy.savetxt writes the names as a comment
-        named = [one for one in comments if _known(one[1].lstrip("# "), keys) > 2]
+    if not _splitter(head[1], keys)[1]:  # numpy.savetxt writes the names as a comment
+        named = [one for one in comments if _splitter(one[1].lstrip("# "), keys)[1] > 2]
         head, rows = (named[-1], table) if named else (head, rows)
     header = head[1].lstrip("# ").rstrip(",;|\t ")
-    split = _splitter(header, keys)
+    split, _ = _splitter(header, keys)
     names = named_columns(split(header, MAX_COLUMNS), head[0])
     units = {k: unit for k, name in enumerate(names) if (unit := _bracketed(name))}
     if rows and (below := _units_row(split(rows[0][1], len(names)))):
@@ -99,24 +99,20 @@ def _is_comment(line: str) -> bool:
     return start.startswith("#") and not start.startswith(_ERRORS)
 
 
-def _known(line: str, keys: frozenset[str]) -> int:
-    """Return the number of known names in a line, for the best separator."""
-    return _score(_splitter(line, keys)(line, MAX_COLUMNS), keys)
+def _splitter(line: str, keys: frozenset[str]) -> tuple[Split, int]:
+    """Return the function that splits lines at the separator and removes quotes.
 
+    Also return the number of known names in the line.
+    """
 
-def _score(cells: Iterable[str], keys: frozenset[str]) -> int:
-    return sum(plain(cell) in keys for cell in cells)
-
-
-def _splitter(line: str, keys: frozenset[str]) -> Split:
-    """Return the function that splits lines at the separator and removes quotes."""
-    found: list[tuple[int, int, Split]] = []
-    for separator in SEPARATORS:
-        split = _split_at(separator)
+    def score(split: Split) -> tuple[int, int]:
         cells = split(line, MAX_COLUMNS)
-        found.append((_score(cells, keys), len(cells), split))
-    _, n_cells, best = max(found, key=lambda one: one[:2])
-    return _split_at(None) if n_cells == 1 and len(line.split(None, 2)) > 2 else best
+        return sum(plain(cell) in keys for cell in cells), len(cells)
+
+    best = max(map(_split_at, SEPARATORS), key=score)
+    if score(best)[1] == 1 and len(line.split(None, 2)) > 2:
+        best = _split_at(None)
+    return best, score(best)[0]
 
 
 def _split_at(separator: str | None) -> Split:

@@ -152,11 +152,7 @@ def find_unit(stature: Stature) -> str:
 
 
 def require_proportions(lengths: Mapping[str, float], stature: Stature, unit: str) -> None:
-    """Check that a skeleton is human in proportion and stature.
-
-    Raises:
-        BadRecording: It is not; the fault names the segment and its length.
-    """
+    """Raise BadRecording, which names a length, if proportions or stature are not human."""
     tall = metres(unit) * stature.value
     low, high = STATED_STATURE
     if not low <= tall <= high:

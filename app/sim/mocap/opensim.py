@@ -35,7 +35,6 @@ from app.sim.mocap.tables import (
     MAX_COLUMNS,
     TextTable,
     complete_rows,
-    missing_values,
     named_columns,
 )
 
@@ -96,9 +95,7 @@ def read_opensim(text: str, names: Mapping[str, str] | None = None) -> AngleTrac
     table = _table(rows)
     _check_counts(head, table)
     columns = _columns(table, names or {})
-    values = table.values(columns)
-    good = complete_rows(values)
-    sound = {name: column[good] for name, column in values.items()}
+    sound, good, missing = complete_rows(table.values(columns))
     times = check_times(sound.pop("time"), table, good)
     places = {name: sound[name] for name in PLACES}
     require_height("pelvis_ty", places["pelvis_ty"])
@@ -112,7 +109,7 @@ def read_opensim(text: str, names: Mapping[str, str] | None = None) -> AngleTrac
         pelvis_z=sound["pelvis_ty"],
         frames=np.flatnonzero(good),
         n_frames=len(good),
-        missing=missing_values(values, good),
+        missing=missing,
         names=table.foreign(columns),
     )
 

@@ -235,11 +235,7 @@ def near_names(missing: Iterable[str], there: Iterable[str]) -> list[tuple[str, 
 
 
 def check_map(names: Mapping[str, str], ours: Sequence[str]) -> None:
-    """Check that a name map, theirs to ours, maps to known names.
-
-    Raises:
-        BadRecording: It names another one; the hint lists the choices.
-    """
+    """Raise BadRecording if a name map, theirs to ours, maps to a name outside ``ours``."""
     for theirs, own in names.items():
         if own not in ours:
             hint = f"choices: {', '.join(ours)}"
@@ -247,12 +243,7 @@ def check_map(names: Mapping[str, str], ours: Sequence[str]) -> None:
 
 
 def no_such_name(theirs: str, there: Sequence[str]) -> BadRecording:
-    """Return the error of a name map with a column that the file does not have.
-
-    Args:
-        theirs: Name in the map.
-        there: Names in the file.
-    """
+    """Return the error of a name map with a column that is not among those of the file."""
     likeness = {one: _likeness(theirs, one) for one in there}
     near = sorted(likeness, key=likeness.__getitem__, reverse=True)
     close = [one for one in near if likeness[one] >= MIN_LIKENESS]
@@ -272,11 +263,17 @@ def number(cell: str, decimal: str = ".") -> float:
     return np.inf if value is None else value
 
 
-def complete_rows(columns: Mapping[str, Vec]) -> NDArray[np.bool_]:
-    """Return which rows have all values, shape (n,).
+def complete_rows(
+    columns: Mapping[str, Vec],
+) -> tuple[dict[str, Vec], NDArray[np.bool_], tuple[Artifact, ...]]:
+    """Return columns without incomplete rows, which rows are complete, and the others.
 
     Args:
         columns: Values by name, each of shape (n,), missing ones NaN.
+
+    Returns:
+        Values by name, each of shape (n_complete,); whether each row has all values, shape
+        (n,); and the runs of incomplete rows, with their columns without a value.
 
     Raises:
         BadRecording: A column has no value, or fewer than two rows are complete.
@@ -289,25 +286,16 @@ def complete_rows(columns: Mapping[str, Vec]) -> NDArray[np.bool_]:
         value = f"<{int(good.sum())}>"
         rule = "must be at least 2 that have all values"
         raise bad("frames", value, rule, "one frame is no motion")
-    return np.asarray(good)
-
-
-def missing_values(columns: Mapping[str, Vec], good: NDArray[np.bool_]) -> tuple[Artifact, ...]:
-    """Return the runs of incomplete rows, with their columns without a value.
-
-    Args:
-        columns: Values by name, each of shape (n,), missing ones NaN.
-        good: Whether each row has all values, shape (n,).
-    """
     rows = np.flatnonzero(~good)
-    found = []
+    missing = []
     for group in np.split(rows, np.flatnonzero(np.diff(rows) > 1) + 1) if rows.size else ():
         parts = tuple(name for name, one in columns.items() if np.isnan(one[group]).any())
         also = f" and {len(parts) - 3} more" if len(parts) > 3 else ""
         reason = f"no value of {', '.join(parts[:3])}{also}"
         first, last = int(group[0]), int(group[-1])
-        found.append(Artifact(first=first, last=last, parts=parts, speed=0.0, reason=reason))
-    return tuple(found)
+        missing.append(Artifact(first=first, last=last, parts=parts, speed=0.0, reason=reason))
+    sound = {name: column[good] for name, column in columns.items()}
+    return sound, np.asarray(good), tuple(missing)
 
 
 def _most(name: str) -> float:

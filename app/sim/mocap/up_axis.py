@@ -73,11 +73,7 @@ def find_up_axis(motion: BodyDirections, rest: BodyDirections) -> str:
 
 
 def require_not_head_down(motion: BodyDirections, axis: str) -> None:
-    """Check that the trunk does not point down along an axis.
-
-    Raises:
-        BadRecording: It does in most frames.
-    """
+    """Raise BadRecording if the trunk points down along an axis in most frames."""
     if _elevation(motion.trunk, axis) < -NEAR:
         rule = f"turns the person head down: the trunk {_leaning(motion, axis)}"
         raise bad("up", axis, rule)
