@@ -1,10 +1,12 @@
 """Motion files of a person whose 18 joint angles are known: BVH, OpenSim and CSV texts."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 import numpy as np
+import pytest
 from scipy.spatial.transform import Rotation
 
+from app.errors import BadRecording
 from app.sim.core.arrays import Vec
 from app.sim.human.anthropometry import MEDIAN
 from app.sim.human.model import JOINT_NAMES, rest_posture
@@ -67,6 +69,13 @@ SKELETONS = {"tum": TUM, "cmu": CMU, "mixamo": MIXAMO, "smpl": SMPL, "xsens": XS
 
 TO_FILE = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
 """From z up to y up."""
+
+
+def fault_of(read: Callable[..., object], *args: object) -> str:
+    """Return the first fault of what a reader refuses."""
+    with pytest.raises(BadRecording) as caught:
+        read(*args)
+    return caught.value.faults[0].text
 
 
 def working(n: int = 200, dt: float = 0.02, seed: int = 0) -> Vec:

@@ -1,12 +1,13 @@
 import re
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 import pytest
 
 from app.errors import BadRecording
 from app.sim.mocap.bvh import MAX_FRAMES, MAX_JOINTS, check_dt, forward, read_bvh
-from tests.sim.recorded_person import bvh_text, working
+from tests.sim.recorded_person import bvh_text, fault_of, working
 
 ARM = """HIERARCHY
 ROOT body
@@ -31,12 +32,7 @@ Frame Time: 0.01
 """.replace("upper arm", "upper_arm")
 PERSON = bvh_text(working(5))
 FIRST = PERSON.splitlines().index("Frame Time: 0.02") + 2
-
-
-def fault(text: str) -> str:
-    with pytest.raises(BadRecording) as caught:
-        read_bvh(text)
-    return caught.value.faults[0].text
+fault = partial(fault_of, read_bvh)
 
 
 def test_points_of_a_small_skeleton_are_those_worked_out_by_hand() -> None:

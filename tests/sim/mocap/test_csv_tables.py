@@ -1,19 +1,15 @@
+from functools import partial
+
 import numpy as np
 import pytest
 
-from app.errors import BadRecording
 from app.sim.human.model import JOINT_NAMES
 from app.sim.mocap.csv_tables import read_csv
-from tests.sim.recorded_person import csv_text, working
+from tests.sim.recorded_person import csv_text, fault_of, working
 
 Q = working(30)
 TEXT = csv_text(Q)
-
-
-def fault(text: str) -> str:
-    with pytest.raises(BadRecording) as caught:
-        read_csv(text)
-    return caught.value.faults[0].text
+fault = partial(fault_of, read_csv)
 
 
 @pytest.mark.parametrize("degrees", [True, False])
@@ -73,19 +69,16 @@ def test_wrapped_angles_are_continuous(degrees: bool) -> None:
     np.testing.assert_allclose(turns, 0.0, atol=1e-8)
 
 
-def test_pelvis_height_over_the_floor_is_refused() -> None:
-    q = working(30)
-    lines = csv_text(q).splitlines()
-    lines[1:] = [f"{lines[1]},pelvis_z", *(f"{line},0.93" for line in lines[2:])]
-    message = fault("\n".join(lines))
-    assert "column pelvis_z = 0.93 is the median rise" in message
-    assert "looks like the height over the floor" in message
-
-
 def with_rise(pelvis_z: np.ndarray) -> str:
     lines = csv_text(working(len(pelvis_z))).splitlines()
     rows = [f"{line},{z:.6f}" for line, z in zip(lines[2:], pelvis_z, strict=True)]
     return "\n".join([lines[0], f"{lines[1]},pelvis_z", *rows])
+
+
+def test_pelvis_height_over_the_floor_is_refused() -> None:
+    message = fault(with_rise(np.full(30, 0.93)))
+    assert "column pelvis_z = 0.93 is the median rise" in message
+    assert "looks like the height over the floor" in message
 
 
 @pytest.mark.parametrize(

@@ -1,22 +1,17 @@
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 import pytest
 
-from app.errors import BadRecording
 from app.sim.human.model import JOINT_NAMES
 from app.sim.mocap.csv_tables import CSV_COLUMNS, read_csv
-from tests.sim.recorded_person import csv_text, working
+from tests.sim.recorded_person import csv_text, fault_of, working
 
 Q = working(30)
 TEXT = csv_text(Q)
 HEAD = TEXT.splitlines()[1]
-
-
-def fault(text: str) -> str:
-    with pytest.raises(BadRecording) as caught:
-        read_csv(text)
-    return caught.value.faults[0].text
+fault = partial(fault_of, read_csv)
 
 
 def each_row(change: Callable[[str], str], text: str = TEXT) -> str:

@@ -8,13 +8,12 @@ from app.errors import BadRecording
 from app.sim.mocap.bvh import read_bvh
 from app.sim.mocap.read_options import UNITS, ReadOptions
 from app.sim.mocap.skeletons import body_track
+from tests.sim.recorded_person import fault_of
 from tests.sim.recorded_skeleton import Person, skeleton
 
 
 def fault(who: Person, options: ReadOptions | None = None) -> str:
-    with pytest.raises(BadRecording) as caught:
-        body_track(read_bvh(skeleton(who)[0]), options or ReadOptions())
-    return caught.value.faults[0].text
+    return fault_of(lambda: body_track(read_bvh(skeleton(who)[0]), options or ReadOptions()))
 
 
 def assert_read(who: Person, unit: str, options: ReadOptions | None = None) -> None:
@@ -63,9 +62,7 @@ def test_part_out_of_proportion_is_named(offset: float, rule: str) -> None:
     at = lines.index(next(line for line in lines if line.endswith(f"JOINT {role}"))) + 2
     words = lines[at].split()
     lines[at] = " ".join([words[0], *(repr(offset * float(one)) for one in words[1:])])
-    with pytest.raises(BadRecording) as caught:
-        body_track(read_bvh("\n".join(lines)))
-    message = caught.value.faults[0].text
+    message = fault_of(lambda: body_track(read_bvh("\n".join(lines))))
     assert message.startswith(rule) and "for a stature of 1.7" in message
 
 

@@ -1,13 +1,14 @@
+from functools import partial
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from app.errors import BadRecording
 from app.sim.core.arrays import Vec
 from app.sim.human.anthropometry import MEDIAN
 from app.sim.human.model import body_frames
 from app.sim.mocap.opensim import COORDINATES, read_opensim
-from tests.sim.recorded_person import opensim_text
+from tests.sim.recorded_person import fault_of, opensim_text
 
 TO_OURS = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 """From OpenSim's x forward, y up, z right to x forward, y left, z up."""
@@ -23,10 +24,7 @@ def coordinates(n: int = 20, seed: int = 0) -> dict[str, Vec]:
     return angles
 
 
-def fault(text: str) -> str:
-    with pytest.raises(BadRecording) as caught:
-        read_opensim(text)
-    return caught.value.faults[0].text
+fault = partial(fault_of, read_opensim)
 
 
 @pytest.mark.parametrize("degrees", [True, False])

@@ -3,7 +3,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from app.errors import BadRecording
 from app.sim.human.anthropometry import BodySize
 from app.sim.mocap.bvh import forward, read_bvh
 from app.sim.mocap.inverse_kinematics import body_angles
@@ -11,7 +10,7 @@ from app.sim.mocap.joint_centres import model_points
 from app.sim.mocap.joint_names import find_joints
 from app.sim.mocap.read_options import UNITS
 from app.sim.mocap.skeletons import body_track
-from tests.sim.recorded_person import CMU, SKELETONS, TUM, bvh_text, working
+from tests.sim.recorded_person import CMU, SKELETONS, TUM, bvh_text, fault_of, working
 from tests.sim.recorded_skeleton import Person, skeleton
 
 NECK = "OFFSET 0.0 440.0 0.0"
@@ -19,9 +18,7 @@ TRUTH = model_points(working(10), np.full(10, 0.95), BodySize())
 
 
 def fault(text: str) -> str:
-    with pytest.raises(BadRecording) as caught:
-        body_track(read_bvh(text))
-    return caught.value.faults[0].text
+    return fault_of(lambda: body_track(read_bvh(text)))
 
 
 @pytest.mark.parametrize("names", SKELETONS.values(), ids=SKELETONS)

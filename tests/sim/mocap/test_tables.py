@@ -1,12 +1,13 @@
+from functools import partial
+
 import numpy as np
 import pytest
 
-from app.errors import BadRecording
 from app.sim.human.model import JOINT_NAMES
 from app.sim.mocap.csv_tables import read_csv
 from app.sim.mocap.opensim import COORDINATES, read_opensim
 from app.sim.mocap.tables import near_names, plain
-from tests.sim.recorded_person import csv_text, opensim_text, working
+from tests.sim.recorded_person import csv_text, fault_of, opensim_text, working
 
 Q = working(30)
 TEXT = csv_text(Q)
@@ -28,10 +29,7 @@ def names() -> dict[str, str]:
     return {theirs: own for own, theirs in THEIRS.items()}
 
 
-def fault(text: str, stated: dict[str, str]) -> str:
-    with pytest.raises(BadRecording) as caught:
-        read_csv(text, stated)
-    return caught.value.faults[0].text
+fault = partial(fault_of, read_csv)
 
 
 def test_name_map_says_which_column_is_which() -> None:

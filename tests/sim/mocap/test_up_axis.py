@@ -8,13 +8,12 @@ from app.sim.mocap.bvh import read_bvh
 from app.sim.mocap.read_options import UP_AXES, ReadOptions
 from app.sim.mocap.skeletons import body_track
 from app.sim.mocap.up_axis import z_up
+from tests.sim.recorded_person import fault_of
 from tests.sim.recorded_skeleton import Person, skeleton
 
 
 def fault(who: Person) -> str:
-    with pytest.raises(BadRecording) as caught:
-        body_track(read_bvh(skeleton(who)[0]))
-    return caught.value.faults[0].text
+    return fault_of(lambda: body_track(read_bvh(skeleton(who)[0])))
 
 
 def assert_read(who: Person, options: ReadOptions | None = None) -> None:
