@@ -25,6 +25,13 @@ def test_library_reaches_the_stations_inside_the_limits(stature: float) -> None:
     assert np.mean(np.array(misses) < 0.15) > 0.85
 
 
+def test_postures_stay_in_a_shallow_walking_area() -> None:
+    worker = load_cell().human
+    worker = worker.model_copy(update={"y_max": worker.y_min + 0.05})
+    shallow = load_cell().model_copy(update={"people": (worker,)})
+    assert build_reach_library(shallow, 0, variants=8).postures[:, 1].max() <= worker.y_max
+
+
 def test_library_cannot_be_changed() -> None:
     with pytest.raises(ValueError, match="read-only"):
         build_reach_library(load_cell(), 0).postures[0] = 0.0
