@@ -18,7 +18,8 @@ from app.errors import ServiceError
 from app.live import commands
 from app.live.arm import HumanGeometry, LiveArm
 from app.live.command_checks import Command, check
-from app.live.people.interfaces import MovingPeople
+from app.live.people.pedestrians import LivePedestrians
+from app.live.people.workers import LiveWorkers
 from app.live.read_model import frozen
 from app.live.resting_people import RestingPeopleControl
 from app.live.safety import explanation
@@ -52,7 +53,7 @@ STANDSTILL = 1e-3
 APART_M = 0.02
 """Separation distance from which a contact at standstill is over [m]."""
 
-P = TypeVar("P", bound=MovingPeople)
+P = TypeVar("P", bound=LivePedestrians | LiveWorkers)
 
 
 class BaseWorld(ABC, Generic[P]):

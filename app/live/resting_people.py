@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from app.live.arm import LiveArm
-from app.live.people.interfaces import MovingPeople
+from app.live.people.workers import LiveWorkers
 from app.sim.core.arrays import Vec
 from app.sim.pick.batch import target_configurations
 from app.sim.pick.resting_people import REST_S, PickTarget, RestingPeoplePlanner
@@ -44,7 +44,7 @@ class RestingPeopleControl:
 
     def unblocked(
         self,
-        people: MovingPeople,
+        people: LiveWorkers,
         policy: TaskPolicy | None,
         candidates: tuple[Candidate, ...],
         begun: str | None = None,
@@ -69,7 +69,7 @@ class RestingPeopleControl:
 
     def update(
         self,
-        people: MovingPeople,
+        people: LiveWorkers,
         policy: TaskPolicy | None,
         decision: Decision | None,
         offered: Sequence[Candidate],

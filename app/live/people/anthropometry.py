@@ -28,17 +28,13 @@ class LiveAnthropometry:
 
     def __init__(self, worker: Worker, floor_z: float) -> None:
         self._floor_z, self._pelvis = floor_z, worker.pelvis_height
-        self._percentiles = (worker.stature, worker.arms, worker.shoulders)
+        self.percentiles = (worker.stature, worker.arms, worker.shoulders)
+        """Percentiles of stature, arms and shoulders, as requested last."""
         self._recorded: BodySize | None = None
         self._lengths = self._goal = worker.size.vector(floor_z)
         self._left_s = 0.0
         self.rise = 0.0
         """Height of the pelvis relative to standing [m]."""
-
-    @property
-    def percentiles(self) -> tuple[float, float, float]:
-        """Percentiles of stature, arms and shoulders, as requested last."""
-        return self._percentiles
 
     @property
     def size(self) -> Vec:
@@ -54,7 +50,7 @@ class LiveAnthropometry:
 
     def resize(self, stature: float, arms: float, shoulders: float) -> None:
         """Change to a person of these percentiles."""
-        self._percentiles, self._recorded = (stature, arms, shoulders), None
+        self.percentiles, self._recorded = (stature, arms, shoulders), None
         self._start_change(self._requested())
 
     def use_recorded(self, recorded: BodySize | None) -> None:
@@ -63,7 +59,7 @@ class LiveAnthropometry:
         self._start_change(self._requested())
 
     def _requested(self) -> BodySize:
-        return self._recorded or percentile_body(*self._percentiles, pelvis=self._pelvis)
+        return self._recorded or percentile_body(*self.percentiles, pelvis=self._pelvis)
 
     def _start_change(self, size: BodySize) -> None:
         goal = size.vector(self._floor_z)
@@ -88,15 +84,22 @@ class LiveAnthropometry:
 
     def snapshot(self) -> AnthropometrySnapshot:
         """Return the read model of the requested dimensions."""
-        size = self._requested()
-        stature, arms, shoulders = self._percentiles
-        return AnthropometrySnapshot(
-            stature=stature,
-            arms=arms,
-            shoulders=shoulders,
-            recorded=self._recorded is not None,
-            stature_m=size.stature,
-            trunk_m=size.trunk,
-            arm_m=0.5 * (size.arm("r") + size.arm("l")),
-            shoulders_m=size.clavicle_r + size.clavicle_l,
-        )
+        recorded = self._recorded is not None
+        return anthropometry_snapshot(self._requested(), self.percentiles, recorded=recorded)
+
+
+def anthropometry_snapshot(
+    size: BodySize, percentiles: tuple[float, float, float], *, recorded: bool
+) -> AnthropometrySnapshot:
+    """Return the read model of a size and its percentiles of stature, arms and shoulders."""
+    stature, arms, shoulders = percentiles
+    return AnthropometrySnapshot(
+        stature=stature,
+        arms=arms,
+        shoulders=shoulders,
+        recorded=recorded,
+        stature_m=size.stature,
+        trunk_m=size.trunk,
+        arm_m=0.5 * (size.arm("r") + size.arm("l")),
+        shoulders_m=size.clavicle_r + size.clavicle_l,
+    )

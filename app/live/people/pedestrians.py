@@ -9,7 +9,6 @@ docs/method.md 2.1 both are per episode.
 """
 
 import math
-from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -24,8 +23,10 @@ from app.live.commands import (
     SetAnthropometry,
     SetMotion,
 )
+from app.live.people.anthropometry import anthropometry_snapshot
+from app.live.people.people_by_id import PeopleById
 from app.live.read_model import frozen
-from app.live.snapshot import AnthropometrySnapshot, CylinderSnapshot, PersonSnapshot
+from app.live.snapshot import CylinderSnapshot, PersonSnapshot
 from app.sim.cells.cell import Cell
 from app.sim.collision.contact import pedestrian_distances
 from app.sim.core.arrays import Vec
@@ -86,29 +87,22 @@ START_SPACING_M = 0.9
 """Minimum distance between the axes of two people at the start [m]."""
 DRAG_MARGIN = 0.6
 """Margin of the walking area for dragging [m]."""
-UPRIGHT = AnthropometrySnapshot(
-    stature=50.0,
-    arms=50.0,
-    shoulders=50.0,
-    recorded=False,
-    stature_m=MEDIAN.stature,
-    trunk_m=MEDIAN.trunk,
-    arm_m=0.5 * (MEDIAN.arm("r") + MEDIAN.arm("l")),
-    shoulders_m=MEDIAN.clavicle_r + MEDIAN.clavicle_l,
-)
+UPRIGHT = anthropometry_snapshot(MEDIAN, (50.0, 50.0, 50.0), recorded=False)
 """Body dimensions of the mannequin inside a cylinder."""
 
 
-class LivePedestrians:
+class LivePedestrians(PeopleById["LivePedestrian"]):
     """Pedestrians of one live reach cell; arrays are indexed by person id."""
 
     def __init__(self, cell: Cell, seed: int) -> None:
-        self._cell, self._seed = cell, seed
+        self._seed = seed
+        self.body = cell.body
+        """Body lengths of the mannequin inside a cylinder [m], shape (12,)."""
         self._arm, self._shared = arm_of(cell), people_of(cell)
         self.robot_q = np.array(self._arm.home)
         """Configuration of the robot [rad], shape (6,); people start away from it."""
-        settings = live_settings(cell)
-        self._rules = pedestrian_rules([settings] * MAX_PEOPLE)
+        self._walk = live_settings(cell)
+        self._rules = pedestrian_rules([self._walk] * MAX_PEOPLE)
         self._own_kind = float(self._rules.rows[0, KIND])
         self.height = max([one.height for one in cell.cylinders], default=2.0)
         """Height of the cylinders [m]."""
@@ -122,20 +116,6 @@ class LivePedestrians:
         self._people: dict[int, LivePedestrian] = {}
         for id in range(len(cell.people)):
             self._add(id)
-
-    def __iter__(self) -> Iterator["LivePedestrian"]:
-        return iter(self._people.values())
-
-    def __len__(self) -> int:
-        return len(self._people)
-
-    def __getitem__(self, id: int) -> "LivePedestrian":
-        return self._people[id]
-
-    @property
-    def ids(self) -> tuple[int, ...]:
-        """Ids of the people, ascending."""
-        return tuple(self._people)
 
     @property
     def rows(self) -> Vec:
@@ -222,12 +202,12 @@ class LivePedestrians:
 
     def draw_target(self, rng: np.random.Generator) -> Vec:
         """Draw a point of the walking area [m], shape (2,)."""
-        walk = live_settings(self._cell)
+        walk = self._walk
         return rng.uniform([walk.x_min, walk.y_min], [walk.x_max, walk.y_max])
 
     def walkable(self, x: float, y: float) -> tuple[float, float]:
         """Return the point nearest to (x, y) [m] inside the area for dragging."""
-        walk = live_settings(self._cell)
+        walk = self._walk
         return (
             min(max(x, walk.x_min - DRAG_MARGIN), walk.x_max + DRAG_MARGIN),
             min(max(y, walk.y_min - DRAG_MARGIN), walk.y_max + DRAG_MARGIN),
@@ -235,13 +215,8 @@ class LivePedestrians:
 
     def is_outside(self, x: float, y: float) -> bool:
         """Return whether (x, y) [m] is outside the walking area."""
-        walk = live_settings(self._cell)
+        walk = self._walk
         return not (walk.x_min <= x <= walk.x_max and walk.y_min <= y <= walk.y_max)
-
-    @property
-    def body(self) -> Vec:
-        """Body lengths of the mannequin inside a cylinder [m], shape (12,)."""
-        return self._cell.body
 
 
 class LivePedestrian:
@@ -329,12 +304,7 @@ class LivePedestrian:
         return np.asarray(velocity * min(1.0, DRAG_SPEED / max(speed, 1e-9)))
 
     def snapshot(self, clearance_m: float, *, nearest: bool) -> PersonSnapshot:
-        """Return the read model of the person.
-
-        Args:
-            clearance_m: Distance to the robot [m].
-            nearest: Whether this is the person nearest to the robot.
-        """
+        """Return the read model of the person at a distance to the robot [m]."""
         row, among = self.row, self._among
         x, y, vx, vy = (float(row[i]) for i in (X, Y, VX, VY))
         qd = np.zeros(18)

@@ -107,13 +107,9 @@ class LiveWorker:
         self.mode, self._joining = mode, mode != "manual"
         self._limbs.place(self.q, self._limbs.qd)
         if mode == "auto":
-            self._begin_work()
+            self.begin_work()
         if mode != "manual":
             self._limbs.turn_near(float(self._source_at(self._t)[0][2]))
-
-    def leave_case(self) -> None:
-        """Return from a case study to the work loop."""
-        self._begin_work()
 
     def move_to(self, place: Cell) -> None:
         """Set another home and other stations."""
@@ -121,7 +117,7 @@ class LiveWorker:
             return
         self._place = place
         if self.mode == "auto":
-            self._begin_work()
+            self.begin_work()
         elif self.mode == "still":
             self._joining = True
 
@@ -147,7 +143,8 @@ class LiveWorker:
         if command.recorded and self.mode == "recorded" and self._played is not None:
             self.body.use_recorded(self._played.size)
 
-    def _begin_work(self) -> None:
+    def begin_work(self) -> None:
+        """Start the work loop, for the present dimensions and place."""
         self._work = self._new_work()
         self._t, self._joining = 0.0, self.mode == "auto"
 
@@ -192,7 +189,7 @@ class LiveWorker:
         if self.mode == "manual":
             self._limbs.drag(MovePerson(), self.size)
         elif self.mode == "auto" and self.body.settled and isinstance(self._work, WorkLoop):
-            self._begin_work()
+            self.begin_work()
         return True
 
     def _after_source(self, dt: float) -> None:
@@ -223,12 +220,7 @@ class LiveWorker:
         self._limbs.qd = self._limbs.qd * 0.0
 
     def snapshot(self, clearance_m: float, *, nearest: bool) -> PersonSnapshot:
-        """Return the read model of the person.
-
-        Args:
-            clearance_m: Distance to the robot [m].
-            nearest: Whether this is the person nearest to the robot.
-        """
+        """Return the read model of the person at a distance to the robot [m]."""
         observed = self.as_observed()
         played = self._played if self.mode == "recorded" else None
         return PersonSnapshot(

@@ -4,14 +4,13 @@ Homes lie side by side along the walking area. A new person starts at a free pos
 to work; work areas are divided again when people come or leave. People do not avoid each other.
 """
 
-from collections.abc import Iterator
-
 import numpy as np
 
 from app.live.arm import HumanGeometry
 from app.live.command_checks import people_after
 from app.live.commands import FIRST, AddPerson, RemovePerson
 from app.live.people.dragging import STEP_BACK
+from app.live.people.people_by_id import PeopleById
 from app.live.people.worker import LiveWorker
 from app.sim.cells.cell import Cell
 from app.sim.cells.parts import Station
@@ -29,7 +28,7 @@ SEED_STEP = 7919
 """Difference between the seeds of two people."""
 
 
-class LiveWorkers:
+class LiveWorkers(PeopleById[LiveWorker]):
     """Workers of one live cell.
 
     Args:
@@ -39,47 +38,20 @@ class LiveWorkers:
 
     def __init__(self, cell: Cell, seed: int) -> None:
         self._cell, self._seed = cell, seed
-        self._people = {FIRST: LiveWorker(cell, place_of(cell, 0, 1), FIRST, seed)}
-
-    def __iter__(self) -> Iterator[LiveWorker]:
-        return iter(self._people.values())
-
-    def __len__(self) -> int:
-        return len(self._people)
-
-    def __getitem__(self, id: int) -> LiveWorker:
-        return self._people[id]
-
-    @property
-    def ids(self) -> tuple[int, ...]:
-        """Ids of the people, ascending."""
-        return tuple(self._people)
-
-    @property
-    def q(self) -> Vec:
-        """Joint positions [m, rad], shape (n, 18)."""
-        return np.array([one.q for one in self]).reshape(-1, 18)
-
-    @property
-    def qd(self) -> Vec:
-        """Joint speeds [m/s, rad/s], shape (n, 18)."""
-        return np.array([one.qd for one in self]).reshape(-1, 18)
-
-    @property
-    def sizes(self) -> Vec:
-        """Body lengths [m], shape (n, N_SIZE)."""
-        return np.array([one.size for one in self]).reshape(-1, N_SIZE)
+        self.only_first()
 
     @property
     def geometry(self) -> HumanGeometry:
         """Collision geometry: capsules only."""
-        return HumanGeometry(self.q, self.qd, self.sizes, NO_CYLINDERS, NO_CYLINDERS)
+        q = np.array([one.q for one in self]).reshape(-1, 18)
+        qd = np.array([one.qd for one in self]).reshape(-1, 18)
+        sizes = np.array([one.size for one in self]).reshape(-1, N_SIZE)
+        return HumanGeometry(q, qd, sizes, NO_CYLINDERS, NO_CYLINDERS)
 
-    def only_first(self) -> LiveWorker:
-        """Replace all people by the worker of the cell, and return it."""
-        place = place_of(self._cell, 0, 1)
-        self._people = {FIRST: LiveWorker(self._cell, place, FIRST, self._seed)}
-        return self._people[FIRST]
+    def only_first(self) -> None:
+        """Replace all people by the worker of the cell."""
+        first = LiveWorker(self._cell, place_of(self._cell, 0, 1), FIRST, self._seed)
+        self._people = {FIRST: first}
 
     def change(self, command: AddPerson | RemovePerson) -> None:
         """Add or remove a person and divide the work areas again."""
@@ -87,18 +59,12 @@ class LiveWorkers:
         places = [place_of(self._cell, k, len(ids)) for k in range(len(ids))]
         people = {}
         for id, place in zip(ids, places, strict=True):
-            known = self._people.get(id)
-            if known is None:
-                known = LiveWorker(
-                    self._cell,
-                    place,
-                    id,
-                    self._seed + SEED_STEP * id,
-                    self._entrance(place.human),
-                )
+            if id in self._people:
+                people[id] = self._people[id]
+                people[id].move_to(place)
             else:
-                known.move_to(place)
-            people[id] = known
+                seed, start = self._seed + SEED_STEP * id, self._entrance(place.human)
+                people[id] = LiveWorker(self._cell, place, id, seed, start)
         self._people = people
 
     def _entrance(self, worker: Worker) -> Vec:
@@ -109,7 +75,7 @@ class LiveWorkers:
             (x, y),
             *((x + dx, back) for dx in (0.0, SPACING, -SPACING, 2 * SPACING, -2 * SPACING)),
         ]
-        others = self.q[:, :2]
+        others = self.geometry.q[:, :2]
 
         def clearance(spot: tuple[float, float]) -> float:
             gaps = np.linalg.norm(others - np.array(spot), axis=1)

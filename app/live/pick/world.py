@@ -110,7 +110,7 @@ class LivePickWorld(BaseWorld[LiveWorkers]):
         self._case, self._selected = None, self._own_choice
         self.safety.suspended = False
         for person in self.people:
-            person.leave_case()
+            person.begin_work()
         self._refresh()
 
     def _choose_among(self, ids: set[str]) -> None:

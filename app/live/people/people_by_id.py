@@ -1,0 +1,26 @@
+"""What workers and pedestrians of a live cell share: people by their ids."""
+
+from collections.abc import Iterator
+from typing import Generic, TypeVar
+
+P = TypeVar("P")
+
+
+class PeopleById(Generic[P]):
+    """People of one live cell, in the order of their ids."""
+
+    _people: dict[int, P]
+
+    def __iter__(self) -> Iterator[P]:
+        return iter(self._people.values())
+
+    def __len__(self) -> int:
+        return len(self._people)
+
+    def __getitem__(self, id: int) -> P:
+        return self._people[id]
+
+    @property
+    def ids(self) -> tuple[int, ...]:
+        """Ids of the people, ascending."""
+        return tuple(self._people)
