@@ -6,7 +6,7 @@ settings of the cell. If disabled, it states the override without applying it.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -16,19 +16,11 @@ from app.live.read_model import frozen
 from app.live.safety.snapshot import SafetySnapshot
 from app.sim.cells.cell import Cell
 from app.sim.collision.checker import Shapes
+from app.sim.core.arrays import Vec
 from app.sim.robot.trajectory_segment import TrajectorySegment
 from app.sim.safety.decision import SafetyDecision, SeparationTerms
 from app.sim.safety.layer import SafetyLayer, SafetySettings, safety_settings
 from app.sim.safety.separation_zone import separation_zone
-
-
-@dataclass(frozen=True, slots=True)
-class _Plan:
-    """Decision for the next period, and the state that it belongs to."""
-
-    decided: SafetyDecision
-    terms: tuple[int, SeparationTerms] | None
-    zone: np.ndarray
 
 
 class LiveSafety:
@@ -42,6 +34,10 @@ class LiveSafety:
         self.suspended = False
         """Whether the layer is disabled for a case study."""
         self._enabled = True
+        # Decision for the next period, with the terms of S_p and the zone of the same state.
+        self._decided: SafetyDecision
+        self._terms: tuple[int, SeparationTerms] | None
+        self._zone: Vec
         self._robot = robot
         self._layer = SafetyLayer(robot.arm, safety_settings(cell))
         self.reset()
@@ -59,7 +55,7 @@ class LiveSafety:
     @property
     def override(self) -> float:
         """Executed override of the planned motion, in [0, 1]."""
-        return self._plan.decided.override if self.on else 1.0
+        return self._decided.override if self.on else 1.0
 
     def change(self, command: SetSafety) -> None:
         """Enable or disable the layer, and change its settings."""
@@ -87,11 +83,8 @@ class LiveSafety:
         """
         robot, layer = self._robot, self._layer
         decided = layer.decide(robot.q, robot.qd, wanted.c, wanted.d, people)
-        self._plan = _Plan(
-            decided,
-            layer.terms(decided, robot.qd, people),
-            frozen(separation_zone(robot.arm, layer.settings, robot.q, robot.qd)),
-        )
+        self._decided, self._terms = decided, layer.terms(decided, robot.qd, people)
+        self._zone = frozen(separation_zone(robot.arm, layer.settings, robot.q, robot.qd))
         return self._executed(decided) if self.on else wanted
 
     def _executed(self, decided: SafetyDecision) -> TrajectorySegment:
@@ -111,8 +104,8 @@ class LiveSafety:
         Args:
             ids: Ids of the people, workers first.
         """
-        settings, decided = self.settings, self._plan.decided
-        person, terms = (None, None) if self._plan.terms is None else self._plan.terms
+        settings, decided = self.settings, self._decided
+        person, terms = (None, None) if self._terms is None else self._terms
         return SafetySnapshot(
             on=self.on,
             override=self.override,
@@ -137,5 +130,5 @@ class LiveSafety:
             moving_s=self._moving_s,
             slowed_s=self._slowed_s,
             stopped_s=self._stopped_s,
-            zone=self._plan.zone,
+            zone=self._zone,
         )

@@ -5,8 +5,6 @@ The interferences of a test are simulated.
 Source: docs/method.md 1.5; ``benchmark_tasks.py``.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from app.errors import InvalidInput
@@ -37,16 +35,6 @@ def random_task(shape: SortingShape, fail: Vec, seed: int, number: int) -> Sorti
     batch = SortingBatch(shape, fail, 1, seed + TASK_SEED * number, settings)
     batch.reset()
     return batch.state_of(0)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class AppliedInterference:
-    """An interference that was applied."""
-
-    state: SortingState
-    """State after it."""
-    text: str
-    """Description for people."""
 
 
 class SortingTestRun:
@@ -91,12 +79,15 @@ class SortingTestRun:
 
     def interfere(
         self, state: SortingState, moves: int, idle_s: float
-    ) -> AppliedInterference | None:
-        """Apply the next interference if it is due; return None otherwise.
+    ) -> tuple[SortingState, str] | None:
+        """Apply the next interference if it is due.
 
         Args:
             state: Present state, without a held block.
             idle_s: Time for which the robot has been idle [s].
+
+        Returns:
+            State after it and its description for people; None where none was applied.
         """
         if not self._waiting:
             return None
@@ -106,9 +97,7 @@ class SortingTestRun:
             return None
         now, self._moves = self._waiting.pop(0), moves
         try:
-            return AppliedInterference(
-                state=now.change(state, self._shape, self._rng), text=now.text
-            )
+            return now.change(state, self._shape, self._rng), now.text
         except InvalidInput:  # Made impossible by a visitor.
             self._spoilt = "an interference of the test was not possible"
             return None

@@ -8,7 +8,7 @@ Source: docs/method.md 1.1 and 1.2.
 """
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -100,6 +100,10 @@ class SortingTable:
             return self.clutter[position]
         return self.towers[position - k][-1] if self.towers[position - k] else None
 
+    def code(self, colour: str, size: str) -> int:
+        """Return the code of a colour and a size of this cell."""
+        return self.shape.code(self.names.colours.index(colour), self.names.sizes.index(size))
+
     def place_of(self, block: Block) -> tuple[int, int]:
         """Return position and level of a block that is not held."""
         for k, one in enumerate(self.clutter):
@@ -110,23 +114,14 @@ class SortingTable:
                 return self.shape.n_cells + c, tower.index(block)
         raise InvalidInput("id", block.id, "is held by the gripper")
 
-    def level_at(self, position: int) -> int:
-        """Return the level of the next block at a position."""
-        k = self.shape.n_cells
-        return 0 if position < k else len(self.towers[position - k])
-
-    def is_free(self, position: int) -> bool:
-        """Return whether a block can be placed at a position."""
-        k = self.shape.n_cells
-        return position >= k or self.clutter[position] is None
-
     def point(self, position: int, level: int) -> Vec:
         """Return the top centre of a block at a position and level [m], shape (3,)."""
         return np.asarray(self.cell.station(self.names.stations[position]).points()[level])
 
     def point_at(self, position: int) -> Vec:
         """Return the top centre of the next block at a position [m], shape (3,)."""
-        return self.point(position, self.level_at(position))
+        k = self.shape.n_cells
+        return self.point(position, 0 if position < k else len(self.towers[position - k]))
 
     def point_of(self, block: Block) -> Vec | None:
         """Return the top centre of a block [m], shape (3,); None if held or removed."""
@@ -136,11 +131,12 @@ class SortingTable:
 
     # Changes by the robot.
 
-    def lift(self, position: int) -> Block:
+    def lift(self, position: int) -> None:
         """Grasp the topmost block of a position."""
-        block = self._take(position)
+        block = self.top(position)
+        assert block is not None
+        self._detach(block)
         self.held, self._origin = block, position
-        return block
 
     def drop(self, position: int) -> None:
         """Place the held block at a position."""
@@ -149,26 +145,20 @@ class SortingTable:
         self.held = None
         self._assign_goal()
 
-    # Changes by people.
+    # Changes by people. The words of a command are known: see ``command_checks.py``.
 
-    def add(self, colour: str, size: str, at: str | None) -> Block:
+    def add(self, colour: str, size: str, at: str | None) -> None:
         """Add a block.
 
         Raises:
-            InvalidInput: An unknown word, no free place, or as many blocks as clutter slots.
+            InvalidInput: No free place, or as many blocks as clutter slots.
         """
-        names = self.names
-        code = self.shape.code(
-            _index("colour", colour, names.colours), _index("size", size, names.sizes)
-        )
         if len(self.blocks) >= self.shape.n_cells:
             rule = f"would be more than {self.shape.n_cells} blocks, one per clutter slot"
             raise InvalidInput("blocks", len(self.blocks) + 1, rule)
         position = self._free_cell() if at is None else self._free("at", at)
-        block = self._new(code)
-        self._put(block, position)
+        self._put(self._new(self.code(colour, size)), position)
         self._changed()
-        return block
 
     def remove(self, id: str) -> Block:
         """Remove a block, and goal blocks that no block matches any more.
@@ -182,18 +172,17 @@ class SortingTable:
         self._changed()
         return block
 
-    def move(self, id: str, to: str) -> Block:
+    def move(self, id: str, to: str) -> None:
         """Move a block, also one below others or a held one.
 
         Raises:
-            InvalidInput: No such block or place, or the place is occupied.
+            InvalidInput: No such block, or the place is occupied.
         """
         block = self._known(id)
         position = self._free("to", to, block)
         self._detach(block)
         self._put(block, position)
         self._changed()
-        return block
 
     def set_goal(self, towers: Mapping[str, Iterable[str]]) -> None:
         """Set the goal; towers that are not named are empty in it.
@@ -202,18 +191,16 @@ class SortingTable:
             towers: Sizes from the bottom, by tower.
 
         Raises:
-            InvalidInput: An unknown word, too many levels, or blocks are missing.
+            InvalidInput: Too many levels, or blocks are missing.
         """
         goal = np.zeros_like(self.goal)
         for name, sizes in towers.items():
-            c = _index("towers", name, self.names.towers)
-            wanted = list(sizes)
+            c, wanted = self.names.towers.index(name), list(sizes)
             if len(wanted) > self.shape.n_cells:
                 rule = f"must have at most {self.shape.n_cells} levels"
                 raise InvalidInput(f"towers.{name}", len(wanted), rule)
             for level, size in enumerate(wanted):
-                field = f"towers.{name}[{level}]"
-                goal[c, level] = self.shape.code(c, _index(field, size, self.names.sizes))
+                goal[c, level] = self.shape.code(c, self.names.sizes.index(size))
         self._require_matches(goal)
         self.goal, self._goal_ids = goal, ()
         self._changed()
@@ -235,8 +222,7 @@ class SortingTable:
             more = [one for one in there if one not in marked][:1]
             now = marked + more if more else []
         others = [int(one) for one in self.goal.ravel() if one not in (NULL, code)]
-        own_towers_only = sorted_goal([*others, *[code] * len(now)], self.shape)
-        self.goal = own_towers_only
+        self.goal = sorted_goal([*others, *[code] * len(now)], self.shape)
         self._goal_ids = tuple(one for one in self._goal_ids if one not in there) + tuple(now)
         self._changed()
 
@@ -278,15 +264,6 @@ class SortingTable:
         self._next += 1
         return block
 
-    def _take(self, position: int) -> Block:
-        k = self.shape.n_cells
-        if position >= k:
-            return self.towers[position - k].pop()
-        block = self.clutter[position]
-        assert block is not None
-        self.clutter[position] = None
-        return block
-
     def _put(self, block: Block, position: int) -> None:
         k = self.shape.n_cells
         if position >= k:
@@ -314,55 +291,43 @@ class SortingTable:
     def _kind(self, id: str) -> int:
         colour, _, size = id.partition("-")
         if colour in self.names.colours and size in self.names.sizes:
-            return self.shape.code(
-                self.names.colours.index(colour), self.names.sizes.index(size)
-            )
+            return self.code(colour, size)
         return self._known(id).code
 
     def _free_cell(self) -> int:
         taken = self.held_position if self.held is not None else None
-        free = [k for k in range(self.shape.n_cells) if self.is_free(k) and k != taken]
+        free = [k for k, one in enumerate(self.clutter) if one is None and k != taken]
         if not free:
             raise InvalidInput("at", None, "has no default: no clutter slot is free")
         return free[0]
 
     def _free(self, field: str, place: str, block: Block | None = None) -> int:
-        position = _index(field, place, self.names.stations)
+        position = self.names.stations.index(place)
         if position < self.shape.n_cells:
             there = self.clutter[position]
             if there is not None:
                 own = there == block
                 rule = "is where it is already" if own else f"is taken by {there.id}"
-                raise InvalidInput(field, place, rule, self._free_names())
+                free = zip(self.names.cells, self.clutter, strict=True)
+                known = [*(name for name, one in free if one is None), *self.names.towers]
+                raise InvalidInput(field, place, rule, known)
         elif self.top(position) == block and block is not None:
             raise InvalidInput(field, place, "is where it is already")
         return position
 
-    def _free_names(self) -> list[str]:
-        free = [name for k, name in enumerate(self.names.cells) if self.is_free(k)]
-        return [*free, *self.names.towers]
-
     def _require_matches(self, goal: Codes) -> None:
-        unmatched = self._unmatched(goal)
-        if unmatched:
-            counts = {code: unmatched.count(code) for code in sorted(set(unmatched))}
-            words = ", ".join(f"{n} x {self.names.kind(code)}" for code, n in counts.items())
+        lack = missing(replace(self.state, goal=goal), self.shape)
+        if lack.any():
+            words = [
+                f"{lack[code]} x {self.names.kind(int(code))}" for code in np.flatnonzero(lack)
+            ]
             rule = "must be met by the blocks: these are missing"
-            raise InvalidInput("towers", words, rule)
-
-    def _unmatched(self, goal: Codes) -> list[int]:
-        state = self.state
-        counts = missing(
-            SortingState(
-                clutter=state.clutter, towers=state.towers, goal=goal, fail=state.fail
-            ),
-            self.shape,
-        )
-        return [code for code, n in enumerate(counts.tolist()) for _ in range(n)]
+            raise InvalidInput("towers", ", ".join(words), rule)
 
     def _shrink_goal(self) -> None:
         """Remove goal blocks that no block matches, from the top."""
-        for code in self._unmatched(self.goal):
+        lack = missing(self.state, self.shape)
+        for code in np.repeat(np.arange(len(lack)), lack):
             c, level = (int(found[-1]) for found in np.nonzero(self.goal == code))
             self.goal[c, level:-1] = self.goal[c, level + 1 :]
             self.goal[c, -1] = NULL
@@ -387,9 +352,3 @@ class SortingTable:
                 counts[codes[id]] -= 1
                 wanted.append(id)
         self._goal_ids = tuple(wanted)
-
-
-def _index(field: str, word: str, words: tuple[str, ...]) -> int:
-    if word not in words:
-        raise InvalidInput(field, word, "is not known here", words)
-    return words.index(word)

@@ -34,7 +34,7 @@ from app.live.sorting.controller import MoveChoice, SortController, has_safer_du
 from app.live.sorting.explanation import WITHOUT_MOVE, StatusMessages
 from app.live.sorting.snapshot import Phase, SortingCounters
 from app.live.sorting.table import SortingTable
-from app.live.sorting.task_snapshot import SnapshotInputs, is_solved, task_snapshot
+from app.live.sorting.task_snapshot import is_solved, task_snapshot
 from app.live.sorting.vertical_approach import VerticalApproach
 from app.sim.cells.cell import Cell
 from app.sim.core.arrays import Vec
@@ -311,8 +311,9 @@ class LiveSortingWorld(BaseWorld[LiveWorkers]):
         idle_s = self.status_s if self._choice is None else 0.0
         done = self._test.interfere(self._table.state, self._counts.moves, idle_s)
         if done is not None:
-            self._table.adopt(done.state)
-            self.set_message(done.text)
+            state, text = done
+            self._table.adopt(state)
+            self.set_message(text)
             self._replan()
 
     # Deciding.
@@ -373,10 +374,10 @@ class LiveSortingWorld(BaseWorld[LiveWorkers]):
         """Return the read model of the present state."""
         status = self._shown_status()
         closing = self._vertical is not None and self._vertical.step == "hold"
-        inputs = SnapshotInputs(
-            table=self._table,
-            controller=self._controller,
-            choice=self._chosen(),
+        task = task_snapshot(
+            self._table,
+            self._controller,
+            self._chosen(),
             phase=self._phase,
             counters=replace(
                 self._counts, planner_fallbacks=self._controller.planner_fallbacks
@@ -388,7 +389,7 @@ class LiveSortingWorld(BaseWorld[LiveWorkers]):
             status,
             self._message(status),
             gripping=self._table.held is not None or (closing and self._phase == "grasp"),
-            sorting=task_snapshot(inputs),
+            sorting=task,
             verdict=None
             if self._test is None
             else self._test.verdict(solved=is_solved(self._table), moves=self._counts.moves),

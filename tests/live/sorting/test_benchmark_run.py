@@ -32,7 +32,7 @@ def test_person_acts_once_the_goal_was_shown_for_a_while() -> None:
     assert trial.interfere(done, 5, 0.5 * PAUSE_S) is None
     acted = trial.interfere(done, 5, PAUSE_S)
     assert acted is not None
-    assert acted.state.n_objects == 6
+    assert acted[0].n_objects == 6
     assert trial.interfere(done, 5, PAUSE_S) is None
 
 
@@ -67,7 +67,7 @@ def test_goal_that_is_reached_is_a_verdict_only_after_the_last_interference(name
         now = replace(state, towers=towers, clutter=without(state.clutter, towers))
         acted = trial.interfere(now, 5, PAUSE_S)
         assert acted is not None
-        state = acted.state
+        state = acted[0]
     end = trial.verdict(solved=True, moves=7)
     assert end.as_expected is True
     assert "7 moves" in end.observed

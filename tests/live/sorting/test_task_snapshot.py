@@ -4,7 +4,7 @@ import pytest
 from app.live.sorting.controller import MoveChoice, SortController
 from app.live.sorting.snapshot import MAX_RANKED, SortingCounters, SortingSnapshot
 from app.live.sorting.table import SortingTable
-from app.live.sorting.task_snapshot import SnapshotInputs, task_snapshot
+from app.live.sorting.task_snapshot import task_snapshot
 from app.sim.cells.cell import load_cell
 from app.sim.sorting.state import Move
 
@@ -23,16 +23,15 @@ def shown(table: SortingTable, controller: SortController, move: Move) -> Sortin
     """Return the snapshot while the robot makes a move."""
     block = table.top(move.pick)
     assert block is not None
-    inputs = SnapshotInputs(
-        table=table,
-        controller=controller,
-        choice=MoveChoice(move=move, block=block, options=((block, move),)),
+    return task_snapshot(
+        table,
+        controller,
+        MoveChoice(move=move, block=block, options=((block, move),)),
         phase="approach",
         counters=SortingCounters(),
         test=None,
         tcp=np.zeros(3),
     )
-    return task_snapshot(inputs)
 
 
 @pytest.mark.parametrize("place", [0, MAX_RANKED - 1, MAX_RANKED, -1])
