@@ -22,24 +22,22 @@ class WorldHandle:
     """
 
     def __init__(self, id: str, cell: Cell, first: WorldSnapshot) -> None:
-        self._id, self._cell, self._last = id, cell, first
+        self.id = id
+        """Name of the world in URLs."""
+        self._cell, self._last = cell, first
         self._published_at = time.monotonic()
         self._queue: queue.SimpleQueue[Command] = queue.SimpleQueue()
         self._lock = threading.Lock()
         self._is_open = True
         self._submitted = 0
-        self._choices = 0
+        self.choices = 0
+        """Number of submitted commands that choose a policy."""
         # People after all queued commands.
         self._people = tuple(person.id for person in first.people)
         # Numbers of the last commands that change the table, and the policy.
         self._table_changed = self._policy_changed = 0
         # Checkpoints of commands that no snapshot shows yet, with the numbers of the commands.
         self._chosen: list[tuple[int, str]] = []
-
-    @property
-    def id(self) -> str:
-        """Name of the world in URLs."""
-        return self._id
 
     def submit(self, command: Command, choices: int | None = None) -> int:
         """Queue one command and return its number; never waits.
@@ -57,8 +55,8 @@ class WorldHandle:
         """
         with self._lock:
             if not self._is_open:
-                raise Conflict(f"the world {self._id!r} was stopped before it took the command")
-            if choices not in (None, self._choices):
+                raise Conflict(f"the world {self.id!r} was stopped before it took the command")
+            if choices not in (None, self.choices):
                 raise Conflict("another policy was chosen")
             last = self._last
             if last.commands == self._submitted:
@@ -79,7 +77,7 @@ class WorldHandle:
         if isinstance(command, TableCommand | Reset | StartTest):
             self._table_changed = self._submitted
         if isinstance(command, SetPolicy | SetSortingPolicy):
-            self._choices += 1
+            self.choices += 1
             self._policy_changed = self._submitted
             if command.loaded is not None:
                 self._chosen.append((self._submitted, command.loaded.checkpoint))
@@ -88,11 +86,6 @@ class WorldHandle:
         """Refuse further commands: the world has been stopped."""
         with self._lock:
             self._is_open = False
-
-    @property
-    def choices(self) -> int:
-        """Number of submitted commands that choose a policy."""
-        return self._choices
 
     @property
     def acting(self) -> frozenset[str]:

@@ -1,6 +1,6 @@
 """Collision capsules over the drawn bodies: translucent, red in contact."""
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 
 import numpy as np
 import trimesh
@@ -21,7 +21,6 @@ class CapsulesView:
     """Capsules placed by their end points, and stretched when their length changes.
 
     Args:
-        server: Where to draw.
         owner: Name of the body that they belong to; part of the names of their nodes.
     """
 
@@ -33,23 +32,24 @@ class CapsulesView:
         self._ends: Vec | None = None
         self._placed = False
 
-    def clear(self) -> None:
-        """Remove all capsules."""
-        for handle in (*self._handles.values(), *self._hits.values()):
-            handle.remove()
-        self._handles, self._hits, self._sizes, self._ends = {}, {}, {}, None
-
-    def add(self, name: str, radius: float, length: float) -> None:
-        """Add a capsule, hidden at first.
+    def fit(self, names: Sequence[str], radii: Vec, ends: Vec) -> None:
+        """Replace all capsules by others, hidden at first.
 
         Args:
-            name: Name, unique in this view.
-            radius: Radius [m].
-            length: Distance of its ends [m].
+            names: Names, unique in this view.
+            radii: Radii [m], shape (n,).
+            ends: End points, of which only the distances count [m], shape (n, 2, 3).
         """
-        self._sizes[name] = radius, length
-        self._handles[name] = self._add(f"{SHAPES}/{self._owner}/{name}", name, SHAPE, OPACITY)
-        self._handles[name].visible = False
+        for handle in (*self._handles.values(), *self._hits.values()):
+            handle.remove()
+        self._handles, self._hits, self._ends = {}, {}, None
+        lengths = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+        pairs = zip(radii.tolist(), lengths.tolist(), strict=True)
+        self._sizes = dict(zip(names, pairs, strict=True))
+        for name in names:
+            node = f"{SHAPES}/{self._owner}/{name}"
+            self._handles[name] = self._add(node, name, SHAPE, OPACITY)
+            self._handles[name].visible = False
 
     def _add(
         self, node: str, name: str, color: tuple[int, int, int], opacity: float
@@ -70,7 +70,7 @@ class CapsulesView:
         """Place the capsules; poses are sent only while the capsules are shown.
 
         Args:
-            ends: End points in world [m], shape (n, 2, 3), in the order they were added.
+            ends: End points in world [m], shape (n, 2, 3), in the order of their names.
         """
         self._ends, self._placed = ends, False
 

@@ -50,14 +50,7 @@ FRAME_S = 0.04
 
 
 class LiveCell:
-    """A live work cell with its viewer.
-
-    Args:
-        policy: Initial policy for task selection; None: the robot is idle.
-        seed: Seed of the human motion.
-        sorting_policy: Policy of a sorting cell; None: the planner selects every move.
-        reach_policy: Policy of a reach cell; None: straight motion to the goals.
-    """
+    """A live work cell with its viewer; the arguments are those of :func:`new_world`."""
 
     def __init__(
         self,
@@ -69,7 +62,8 @@ class LiveCell:
         sorting_policy: SortingValues | None = None,
         reach_policy: LiveReachPolicy | None = None,
     ) -> None:
-        self._cell = cell
+        self.cell = cell
+        """Its work cell."""
         # Compile the kernels that are not cached.
         new_world(cell, policy, seed, id, sorting_policy, reach_policy).step()
         self._world = new_world(cell, policy, seed, id, sorting_policy, reach_policy)
@@ -88,11 +82,6 @@ class LiveCell:
         self._thread: threading.Thread | None = None
 
     @property
-    def cell(self) -> Cell:
-        """Its work cell."""
-        return self._cell
-
-    @property
     def viewer_address(self) -> Path:
         """Unix socket of the viewer."""
         if self._server is None:
@@ -103,8 +92,8 @@ class LiveCell:
         """Start viewer and thread."""
         rich.get_console().quiet = True  # viser would print its own address
         self._server = ViewerServer()
-        views = ViewSettings(self._server, self._cell)
-        scene = CellScene(self._server, self._cell, self._submit)
+        views = ViewSettings(self._server, self.cell)
+        scene = CellScene(self._server, self.cell, self._submit)
         scene.draw(self.handle.snapshot(), 0.0)
         draw = partial(self._draw, self._server, scene, views)
         self._thread = threading.Thread(
@@ -125,7 +114,7 @@ class LiveCell:
             self._server = None
 
     def _run(self, draw: Callable[[WorldSnapshot], None]) -> None:
-        dt = self._cell.robot.dt
+        dt = self.cell.robot.dt
         due = time.monotonic() + dt
         while not self._stop.wait(max(due - time.monotonic(), 0.0)):
             self.lateness.add(max(0.0, time.monotonic() - due))

@@ -27,9 +27,6 @@ class Gizmos:
     """Gizmos of one person; poses are written by the live cell's thread only.
 
     Args:
-        server: Viser server of the scene.
-        person: Id of the person.
-        submit: Called with the command of a drag.
         jointed: Whether the person has hands and a yaw (a worker).
     """
 
@@ -72,8 +69,8 @@ class Gizmos:
     def _listen(self) -> None:
         @self._pelvis.on_update
         async def _(event: viser.TransformControlsEvent) -> None:
-            self._hold("pelvis", event.phase)
-            x, y, _ = _within_range(self._pelvis.position)
+            self._released["pelvis"] = release_time(event.phase)
+            x, y, _ = clipped(self._pelvis.position)
             self._submit(
                 MovePerson(person=self._person, pelvis=(x, y, yaw_of(self._pelvis.wxyz)))
             )
@@ -84,15 +81,12 @@ class Gizmos:
     def _listen_to_hand(self, name: str, gizmo: viser.TransformControlsHandle) -> None:
         @gizmo.on_update
         async def _(event: viser.TransformControlsEvent) -> None:
-            self._hold(name, event.phase)
-            point = _within_range(gizmo.position)
+            self._released[name] = release_time(event.phase)
+            point = clipped(gizmo.position)
             if name == "right":
                 self._submit(MovePerson(person=self._person, right=point))
             else:
                 self._submit(MovePerson(person=self._person, left=point))
-
-    def _hold(self, name: str, phase: str) -> None:
-        self._released[name] = time.monotonic() + (SETTLE_S if phase == "end" else HOLD_S)
 
     def _free(self, name: str) -> bool:
         return time.monotonic() >= self._released.get(name, 0.0)
@@ -111,22 +105,30 @@ class Gizmos:
             return
         points = human.joint_points(person.posture, person.size)
         if self._free("pelvis"):
-            _move(self._pelvis, points["pelvis"], upright(float(person.posture[2])))
+            move(self._pelvis, points["pelvis"], upright(float(person.posture[2])))
         for name, gizmo in self._hands.items():
             if self._free(name):
-                _move(gizmo, points[HANDS[name]])
+                move(gizmo, points[HANDS[name]])
 
 
-def _within_range(position: Vec) -> tuple[float, float, float]:
+def release_time(phase: str) -> float:
+    """Return the time of the monotonic clock [s] from which a dragged gizmo is free again."""
+    return time.monotonic() + (SETTLE_S if phase == "end" else HOLD_S)
+
+
+def clipped(
+    position: Vec, low: Vec | float = -FARTHEST_M, high: Vec | float = FARTHEST_M
+) -> tuple[float, float, float]:
     """Return the nearest position that a command accepts [m].
 
     A gizmo that is dragged toward the horizon is kilometres away.
     """
-    x, y, z = np.clip(position, -FARTHEST_M, FARTHEST_M).tolist()
+    x, y, z = np.clip(position, low, high).tolist()
     return x, y, z
 
 
-def _move(gizmo: viser.TransformControlsHandle, position: Vec, wxyz: Vec | None = None) -> None:
+def move(gizmo: viser.TransformControlsHandle, position: Vec, wxyz: Vec | None = None) -> None:
+    """Move a gizmo that is not held; sends nothing where it is there already."""
     if np.abs(gizmo.position - position).max() > 1e-3:
         gizmo.position = position
     if wxyz is not None and np.abs(gizmo.wxyz - wxyz).max() > 1e-3:

@@ -19,12 +19,7 @@ SAME_M = 2e-3
 
 
 class PedestriansView:
-    """Draws the cylinders; used by the live cell's thread only.
-
-    Args:
-        server: Viser server of the scene.
-        cell: Work cell with the height of the floor.
-    """
+    """Draws the cylinders; used by the live cell's thread only."""
 
     def __init__(self, server: viser.ViserServer, cell: Cell) -> None:
         self._scene, self._floor = server.scene, cell.floor_z

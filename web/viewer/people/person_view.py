@@ -69,10 +69,7 @@ class PersonView:
         ]
         upright = human.rest_posture(0.0, 0.0, 0.0)
         ends = human.capsules(upright, person.size, self._cell.floor_z)
-        radii = human.capsule_radii(person.size)
-        self._capsules.clear()
-        for name, radius, (start, end) in zip(human.CAPSULE_NAMES, radii, ends, strict=True):
-            self._capsules.add(name, float(radius), float(np.linalg.norm(end - start)))
+        self._capsules.fit(human.CAPSULE_NAMES, human.capsule_radii(person.size), ends)
         self._drawn = None
 
     def _add_skin(

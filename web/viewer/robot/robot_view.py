@@ -39,15 +39,9 @@ class RobotView:
         else:
             self._fingers = self._add_gripper(scene, cell)
         self._capsules = CapsulesView(server, "robot")
-        self._shapes = load_robot_capsules(tool.tool_length, tool.tool_radius)
-        for name, radius, p0, p1 in zip(
-            self._shapes.name,
-            self._shapes.radius,
-            self._shapes.p0,
-            self._shapes.p1,
-            strict=True,
-        ):
-            self._capsules.add(name, float(radius), float(np.linalg.norm(p1 - p0)))
+        shapes = load_robot_capsules(tool.tool_length, tool.tool_radius)
+        self._shape_links, self._ends = shapes.link, np.stack([shapes.p0, shapes.p1], axis=1)
+        self._capsules.fit(shapes.name, shapes.radius, self._ends)
 
     def _add_gripper(
         self, scene: viser.SceneApi, cell: Cell
@@ -87,11 +81,9 @@ class RobotView:
         tcp = self._robot.tcp_pose(q)
         self._tool.wxyz = orientation(tcp[:3, :3])
         self._tool.position = tcp[:3, 3] - self._robot.tool_length * tcp[:3, 2]
-        frames = poses[self._shapes.link]
-        ends = np.stack([self._shapes.p0, self._shapes.p1], axis=1)
-        self._capsules.place(
-            np.einsum("nij,nkj->nki", frames[:, :3, :3], ends) + frames[:, None, :3, 3]
-        )
+        frames = poses[self._shape_links]
+        turned = np.einsum("nij,nkj->nki", frames[:, :3, :3], self._ends)
+        self._capsules.place(turned + frames[:, None, :3, 3])
 
     def show_capsules(self, visible: bool, touched: Collection[str]) -> None:
         """Show or hide the collision capsules; those in contact are always shown, in red."""

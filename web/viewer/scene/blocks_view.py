@@ -17,9 +17,7 @@ MIN_SHIFT_M = 2e-4
 class BlocksView:
     """Draws all blocks; used by the live cell's thread only.
 
-    Args:
-        server: Viser server of the scene.
-        submit: Called with the command of a click: add the block to the goal, or remove it.
+    A click on a block adds it to the goal, or removes it.
     """
 
     def __init__(

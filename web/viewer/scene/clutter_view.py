@@ -27,12 +27,7 @@ def tray_height(cell: Cell) -> float:
 
 
 class ClutterView:
-    """Draws the clutter slots; used by the live cell's thread only.
-
-    Args:
-        server: Viser server of the scene.
-        cell: Work cell with the slots.
-    """
+    """Draws the clutter slots; used by the live cell's thread only."""
 
     def __init__(self, server: viser.ViserServer, cell: Cell) -> None:
         scene, height = server.scene, tray_height(cell)
@@ -42,7 +37,7 @@ class ClutterView:
         body = tray(points, height, 0.5 * max(width, depth) + 0.002)
         scene.add_glb("/clutter", body, cast_shadow=False)
         mesh = tile(width - GAP, depth - GAP)
-        self._tiles, self._labels = [], []
+        self._slots: list[tuple[viser.MeshHandle, viser.LabelHandle]] = []
         for index, (x, y) in enumerate(points.tolist()):
             surface = scene.add_mesh_simple(
                 f"/clutter/{index}",
@@ -61,8 +56,7 @@ class ClutterView:
                 font_screen_scale=0.7,
                 depth_test=True,
             )
-            self._tiles.append(surface)
-            self._labels.append(label)
+            self._slots.append((surface, label))
         self._shown: tuple[float, ...] | None = None
 
     def draw(self, failure: tuple[float, ...]) -> None:
@@ -70,7 +64,7 @@ class ClutterView:
         if failure == self._shown:
             return
         self._shown = failure
-        for surface, label, chance in zip(self._tiles, self._labels, failure, strict=True):
+        for (surface, label), chance in zip(self._slots, failure, strict=True):
             surface.color = failure_color(chance)
             label.text = percent_text(chance)
 

@@ -7,15 +7,13 @@ the goal; one that is dragged out of the goal region returns to its boundary.
 import time
 from collections.abc import Callable
 
-import numpy as np
 import viser
 
 from app.live.reach.commands import MoveGoal, goal_box
 from app.live.reach.snapshot import ReachSnapshot
 from app.sim.cells.cell import Cell
-from web.viewer.people.gizmos import HOLD_S, SETTLE_S
+from web.viewer.people.gizmos import clipped, move, release_time
 from web.viewer.people.mannequin import Rgb
-from web.viewer.poses import Vec
 
 POINT_M = 0.028
 GOAL: Rgb = (11, 127, 119)
@@ -28,8 +26,8 @@ class GoalGizmo:
     def __init__(
         self, server: viser.ViserServer, cell: Cell, submit: Callable[[MoveGoal], object]
     ) -> None:
-        scene, self._submit = server.scene, submit
-        self._low, self._high = goal_box(cell)
+        scene = server.scene
+        low, high = goal_box(cell)
         self._free_at = 0.0
         self._handle = scene.add_transform_controls(
             "/goal/handle",
@@ -55,14 +53,9 @@ class GoalGizmo:
 
         @self._handle.on_update
         async def _(event: viser.TransformControlsEvent) -> None:
-            self._free_at = time.monotonic() + (SETTLE_S if event.phase == "end" else HOLD_S)
+            self._free_at = release_time(event.phase)
             if event.phase != "start":
-                self._submit(MoveGoal(position=self._inside(self._handle.position)))
-
-    def _inside(self, position: Vec) -> tuple[float, float, float]:
-        """Return the point of the goal region nearest to the handle [m]."""
-        x, y, z = np.clip(position, self._low, self._high).tolist()
-        return x, y, z
+                submit(MoveGoal(position=clipped(self._handle.position, low, high)))
 
     def draw(self, view: ReachSnapshot, *, reached: bool) -> None:
         """Show the goal, and move the handle to it unless a visitor holds the handle."""
@@ -71,5 +64,4 @@ class GoalGizmo:
         self._around.scale = view.tolerance
         self._point.color = self._around.color = color
         if time.monotonic() >= self._free_at:
-            if np.abs(self._handle.position - view.goal).max() > 1e-3:
-                self._handle.position = view.goal
+            move(self._handle, view.goal)

@@ -4,6 +4,7 @@ In the zone on the floor a person is nearer than the protective separation dista
 colour and the ring around the robot's base show the speed override.
 """
 
+import itertools
 from collections import deque
 from collections.abc import Callable
 
@@ -23,6 +24,7 @@ from web.viewer.poses import Vec
 from web.viewer.scene.arc import Arc
 from web.viewer.scene.color_scale import ColorScale, blend
 from web.viewer.scene.goal_gizmo import GoalGizmo
+from web.viewer.scene.solid_meshes import fan
 from web.viewer.scene.stations_view import MARK
 
 OVERRIDES: ColorScale = (
@@ -43,19 +45,11 @@ BACK: Rgb = (226, 230, 235)
 
 def override_color(safety: SafetySnapshot) -> Rgb:
     """Return the colour of the override; grey while the safety layer is disabled."""
-    if not safety.on:
-        return OFF
-    return blend(OVERRIDES, safety.override)
+    return blend(OVERRIDES, safety.override) if safety.on else OFF
 
 
 class ReachScene:
-    """Draws goal, targets, trail and zone; used by the live cell's thread only.
-
-    Args:
-        server: Viser server of the scene.
-        cell: Reach cell.
-        submit: Called with the command of a drag of the goal.
-    """
+    """Draws goal, targets, trail and zone; used by the live cell's thread only."""
 
     def __init__(
         self, server: viser.ViserServer, cell: Cell, submit: Callable[[MoveGoal], object]
@@ -98,7 +92,7 @@ class _Zone:
         square = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
         self._area = server.scene.add_mesh_simple(
             "/zone/area",
-            *_fan(square, self._z),
+            *fan(square, self._z),
             color=OFF,
             opacity=0.22,
             side="double",
@@ -120,7 +114,7 @@ class _Zone:
         if not visible or key == self._key:
             return
         self._key = key
-        vertices, faces = _fan(outline, self._z)
+        vertices, faces = fan(outline, self._z)
         self._area.faces = faces.astype(np.uint32)
         self._area.vertices = vertices.astype(np.float32)
         self._area.color = color
@@ -193,28 +187,17 @@ class _Trail:
         self._lines.colors = np.stack([faded[:-1], faded[1:]], axis=1)
 
 
-def _fan(outline: Vec, z: float) -> tuple[Vec, Vec]:
-    """Return vertices [m] and faces of the area inside an outline, shape (n, 2)."""
-    n = len(outline)
-    middle = np.array([*outline.mean(axis=0), z])
-    rim = np.column_stack([outline, np.full(n, z)])
-    index = np.arange(n)
-    faces = np.column_stack([np.full(n, n), index, (index + 1) % n])
-    return np.vstack([rim, middle]), faces
-
-
 def _add_targets(server: viser.ViserServer, cell: Cell) -> None:
     """Add the outline of the goal region and its targets."""
     low, high = goal_box(cell)
-    corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])
-    pairs = [
-        (a, b)
-        for a in range(8)
-        for b in range(a + 1, 8)
-        if np.abs(corners[a] - corners[b]).sum() == 1
+    corners = np.array(list(itertools.product((0, 1), repeat=3)))
+    edges = [
+        pair
+        for pair in itertools.combinations(corners, 2)
+        if np.abs(pair[0] - pair[1]).sum() == 1
     ]
-    places = low + corners * (high - low)
-    server.scene.add_line_segments("/goals/box", places[np.array(pairs)], EDGE, thickness=0.004)
+    box = low + np.array(edges) * (high - low)
+    server.scene.add_line_segments("/goals/box", box, EDGE, thickness=0.004)
     server.scene.add_point_cloud(
         "/goals/targets",
         goal_region_of(cell).targets().astype(np.float32),

@@ -114,9 +114,13 @@ def torus(radius: float, thickness: float) -> tuple[Vec, Vec]:
 
 def disc(radius: float) -> tuple[Vec, Vec]:
     """Return vertices [m] and faces of a disc in the xy plane, facing up."""
-    sections = 64
-    angles = np.linspace(0.0, 2.0 * np.pi, sections, endpoint=False)
-    rim = radius * np.column_stack([np.cos(angles), np.sin(angles), np.zeros(sections)])
-    index = np.arange(sections)
-    faces = np.column_stack([np.full(sections, sections), index, (index + 1) % sections])
-    return np.vstack([rim, np.zeros(3)]), faces
+    angles = np.linspace(0.0, 2.0 * np.pi, 64, endpoint=False)
+    return fan(radius * np.column_stack([np.cos(angles), np.sin(angles)]), 0.0)
+
+
+def fan(outline: Vec, z: float) -> tuple[Vec, Vec]:
+    """Return vertices [m] and faces of the area in an outline, shape (n, 2), at a height."""
+    n = len(outline)
+    vertices = np.column_stack([[*outline, outline.mean(axis=0)], np.full(n + 1, z)])
+    index = np.arange(n)
+    return vertices, np.column_stack([np.full(n, n), index, (index + 1) % n])

@@ -26,13 +26,7 @@ RING_M = 0.078
 
 
 class SortingScene:
-    """Draws slots, towers, blocks and move; used by the live cell's thread only.
-
-    Args:
-        server: Viser server of the scene.
-        cell: Sorting cell.
-        submit: Called with the command of a click on a block.
-    """
+    """Draws slots, towers, blocks and move; used by the live cell's thread only."""
 
     def __init__(
         self, server: viser.ViserServer, cell: Cell, submit: Callable[[ToggleGoal], object]

@@ -42,13 +42,7 @@ HIT: Rgb = (214, 52, 46)
 
 
 class StationsView:
-    """Draws the stations of one cell; used by the live cell's thread only.
-
-    Args:
-        server: Viser server of the scene.
-        cell: Work cell with the stations.
-        submit: Called with the command of a click.
-    """
+    """Draws the stations of one cell; used by the live cell's thread only."""
 
     def __init__(
         self, server: viser.ViserServer, cell: Cell, submit: Callable[[ToggleCandidate], object]
@@ -122,9 +116,8 @@ class StationsView:
         values = list(snapshot.values.values())
         for index, station in enumerate(self._stations):
             candidate = offered.get(station.id)
-            color = IDLE if candidate is None else GOALS[index % len(GOALS)]
             body, label = self._bodies[station.id], self._labels[station.id]
-            body.color = color
+            body.color = IDLE if candidate is None else GOALS[index % len(GOALS)]
             label.text = _text(station, candidate, values)
             label.visible = candidate is not None
         self._mark(snapshot.chosen if snapshot.chosen in self._bodies else None)

@@ -13,12 +13,7 @@ Kind = tuple[str, tuple[float, ...], tuple[float, ...]]
 
 
 class TowersView:
-    """Draws the towers of one cell; used by the live cell's thread only.
-
-    Args:
-        server: Viser server of the scene.
-        cell: Work cell with the towers.
-    """
+    """Draws the towers of one cell; used by the live cell's thread only."""
 
     def __init__(self, server: viser.ViserServer, cell: Cell) -> None:
         self._scene = server.scene
