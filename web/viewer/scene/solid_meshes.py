@@ -56,8 +56,8 @@ def slab(
         bevel: Width of the chamfer at top and bottom [m].
         sections: Points around the outline, a multiple of four.
     """
-    half, count = 0.5 * np.asarray(size, dtype=np.float64), sections
-    angles = 2.0 * np.pi * (np.arange(count) + 0.5) / count
+    half = 0.5 * np.asarray(size, dtype=np.float64)
+    angles = 2.0 * np.pi * (np.arange(sections) + 0.5) / sections
     outline = np.column_stack([np.cos(angles), np.sin(angles)])
     middle = np.sign(outline) * (half[:2] - radius)
     levels = (
@@ -66,23 +66,8 @@ def slab(
         (radius, half[2] - bevel),
         (radius - bevel, half[2]),
     )
-    rings = [np.column_stack([middle + r * outline, np.full(count, z)]) for r, z in levels]
-    i, j = np.arange(count), (np.arange(count) + 1) % count
-    faces = []
-    for level in range(len(levels) - 1):
-        low, high = level * count, (level + 1) * count
-        faces += [
-            np.column_stack([low + i, low + j, high + j]),
-            np.column_stack([low + i, high + j, high + i]),
-        ]
-    bottom, top = len(levels) * count, len(levels) * count + 1
-    last = (len(levels) - 1) * count
-    faces += [
-        np.column_stack([np.full(count, bottom), j, i]),
-        np.column_stack([np.full(count, top), last + i, last + j]),
-    ]
-    tips = [[0.0, 0.0, -half[2]], [0.0, 0.0, half[2]]]
-    mesh = trimesh.Trimesh(np.vstack([*rings, tips]), np.vstack(faces), process=False)
+    rings = [np.column_stack([middle + r * outline, np.full(sections, z)]) for r, z in levels]
+    mesh: trimesh.Trimesh = trimesh.convex.convex_hull(np.vstack(rings))
     mesh.apply_translation(center)
     mesh.unmerge_vertices()  # so that edges stay crisp
     return mesh
