@@ -23,12 +23,9 @@ class PeopleView:
         self._hidden: dict[int, PersonView] = {}
 
     def draw(self, snapshot: WorldSnapshot, dt: float, *, shapes: bool) -> None:
-        """Show the people of a snapshot.
+        """Show the people of a snapshot, ``dt`` [s] after the last one.
 
-        Args:
-            snapshot: Snapshot to show.
-            dt: Time since the last call [s].
-            shapes: Whether the collision capsules are shown.
+        With ``shapes`` their collision capsules are shown.
         """
         here = {person.id for person in snapshot.people}
         for id in self._drawn.keys() - here:
@@ -43,7 +40,7 @@ class PeopleView:
             view, gizmos = self._drawn[person.id]
             view.draw(person, dt)
             touched = contact is not None and contact.person == person.id
-            view.show_capsules(shapes, contact.body if contact and touched else None)
+            view.capsules.show(shapes, (contact.body,) if contact and touched else ())
             gizmos.draw(person)
 
     def _add(self, person: PersonSnapshot) -> tuple[PersonView, Gizmos]:

@@ -34,14 +34,15 @@ class PersonView:
         self._drawn: tuple[Vec, Vec] | None = None
         self._frame = self._scene.add_frame(self._root, show_axes=False)
         self._solids: list[tuple[viser.MeshHandle, str]] = []
-        self._capsules = CapsulesView(server, f"people/{person.id}")
+        self.capsules = CapsulesView(server, f"people/{person.id}")
+        """Its collision capsules."""
         self._lengths = self._fitted = _lengths(person.size)
         self._fit(person)
 
     def hide(self) -> None:
         """Hide the person."""
         self._frame.visible = False
-        self.show_capsules(False, None)
+        self.capsules.show(False, ())
 
     def show(self, person: PersonSnapshot) -> None:
         """Show a hidden person, or another person with the same number."""
@@ -69,7 +70,7 @@ class PersonView:
         ]
         upright = human.rest_posture(0.0, 0.0, 0.0)
         ends = human.capsules(upright, person.size, self._cell.floor_z)
-        self._capsules.fit(human.CAPSULE_NAMES, human.capsule_radii(person.size), ends)
+        self.capsules.fit(human.CAPSULE_NAMES, human.capsule_radii(person.size), ends)
         self._drawn = None
 
     def _add_skin(
@@ -97,12 +98,7 @@ class PersonView:
         )
 
     def draw(self, person: PersonSnapshot, dt: float) -> None:
-        """Show the person in a posture.
-
-        Args:
-            person: Read model of the person.
-            dt: Time since the last call [s], for the steps of the feet.
-        """
+        """Show the person; the feet step on for ``dt`` [s], the time since the last call."""
         self._follow_size(person)
         q, size = person.posture, person.size
         pelvis = human.body_frames(q, size)["pelvis"]
@@ -120,7 +116,7 @@ class PersonView:
         for solid, name in self._solids:
             solid.wxyz = orientation(bones[name][:3, :3])
             solid.position = bones[name][:3, 3]
-        self._capsules.place(human.capsules(q, size, self._cell.floor_z))
+        self.capsules.place(human.capsules(q, size, self._cell.floor_z))
 
     def _follow_size(self, person: PersonSnapshot) -> None:
         """Fit the skin when the size is constant; before that only the bones move."""
@@ -128,10 +124,6 @@ class PersonView:
         self._lengths = lengths
         if _same(lengths, before) and not _same(lengths, self._fitted):
             self._fit(person)
-
-    def show_capsules(self, visible: bool, touched: str | None) -> None:
-        """Show or hide the collision capsules; the one in contact is always shown, in red."""
-        self._capsules.show(visible, () if touched is None else (touched,))
 
 
 def _lengths(size: Vec) -> Vec:

@@ -1,7 +1,5 @@
 """The robot in the scene: link meshes at the poses of Pinocchio, and gripper or magnet."""
 
-from collections.abc import Collection
-
 import numpy as np
 import viser
 
@@ -38,10 +36,11 @@ class RobotView:
             self._lamp = self._add_magnet(scene, cell)
         else:
             self._fingers = self._add_gripper(scene, cell)
-        self._capsules = CapsulesView(server, "robot")
+        self.capsules = CapsulesView(server, "robot")
+        """Its collision capsules."""
         shapes = load_robot_capsules(tool.tool_length, tool.tool_radius)
         self._shape_links, self._ends = shapes.link, np.stack([shapes.p0, shapes.p1], axis=1)
-        self._capsules.fit(shapes.name, shapes.radius, self._ends)
+        self.capsules.fit(shapes.name, shapes.radius, self._ends)
 
     def _add_gripper(
         self, scene: viser.SceneApi, cell: Cell
@@ -83,11 +82,7 @@ class RobotView:
         self._tool.position = tcp[:3, 3] - self._robot.tool_length * tcp[:3, 2]
         frames = poses[self._shape_links]
         turned = np.einsum("nij,nkj->nki", frames[:, :3, :3], self._ends)
-        self._capsules.place(turned + frames[:, None, :3, 3])
-
-    def show_capsules(self, visible: bool, touched: Collection[str]) -> None:
-        """Show or hide the collision capsules; those in contact are always shown, in red."""
-        self._capsules.show(visible, touched)
+        self.capsules.place(turned + frames[:, None, :3, 3])
 
     def grip(self, closed: bool) -> None:
         """Open or close the fingers, or switch the magnet."""

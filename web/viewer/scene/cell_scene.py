@@ -68,7 +68,7 @@ class CellScene:
         with self._server.atomic():
             self._robot.draw(snapshot.robot_q)
             self._robot.grip(snapshot.gripping)
-            self._robot.show_capsules(shapes, _touched_capsules(snapshot))
+            self._robot.capsules.show(shapes, _touched_capsules(snapshot))
             self._people.draw(snapshot, dt, shapes=shapes)
             self._stations.draw(snapshot)
             if self._sorting is not None:
