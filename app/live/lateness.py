@@ -1,6 +1,7 @@
 """Histogram of the lateness of a live world's ticks."""
 
 from bisect import bisect_left
+from itertools import accumulate
 
 BOUNDS_S = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2)
 """Upper bounds of the buckets [s]."""
@@ -21,8 +22,5 @@ class Lateness:
 
     def buckets(self) -> list[tuple[str, float]]:
         """Return the upper bound of each bucket as text and the ticks up to it."""
-        found, ticks = [], 0
-        for bound, count in zip((*map(str, BOUNDS_S), "+Inf"), self._counts, strict=True):
-            ticks += count
-            found.append((bound, float(ticks)))
-        return found
+        bounds = (*map(str, BOUNDS_S), "+Inf")
+        return list(zip(bounds, map(float, accumulate(self._counts)), strict=True))

@@ -87,11 +87,7 @@ class PlayedMotion:
         return float(np.interp(t, self._times, self._rise))
 
     def _between(self, t: float) -> Vec:
-        k = int(np.searchsorted(self._times, t, side="right")) - 1
-        k = min(max(k, 0), len(self._times) - 2)
-        share = (t - self._times[k]) / (self._times[k + 1] - self._times[k])
-        share = min(max(float(share), 0.0), 1.0)
-        return np.asarray(self._q[k] + share * (self._q[k + 1] - self._q[k]))
+        return np.array([np.interp(t, self._times, joint) for joint in self._q.T])
 
     def turn_near(self, yaw: float) -> None:
         """Shift the yaw by full turns so that the run starts near ``yaw`` [rad]."""
@@ -113,12 +109,7 @@ class PlayedMotion:
 
 
 def is_outside(q: Vec, worker: Worker) -> bool:
-    """Return whether a pelvis is outside a walking area by more than 0.02 m.
-
-    Args:
-        q: Joint positions [m, rad], shape (18,).
-        worker: Person with the walking area.
-    """
+    """Return whether the pelvis of a posture is outside a walking area by more than 0.02 m."""
     x, y, slack = float(q[0]), float(q[1]), 0.02
     inside_x = worker.x_min - slack <= x <= worker.x_max + slack
     return not (inside_x and worker.y_min - slack <= y <= worker.y_max + slack)

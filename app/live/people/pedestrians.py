@@ -220,13 +220,7 @@ class LivePedestrians(PeopleById["LivePedestrian"]):
 
 
 class LivePedestrian:
-    """One pedestrian; a view of its row of the shared state.
-
-    Args:
-        among: All pedestrians of the cell.
-        id: Number of the person.
-        row: State, shape (N_STATE,); changed in place.
-    """
+    """One pedestrian; changes its row of the shared state, shape (N_STATE,), in place."""
 
     def __init__(self, among: LivePedestrians, id: int, row: Vec) -> None:
         self._among, self.id, self.row = among, id, row
@@ -286,8 +280,7 @@ class LivePedestrian:
         if self.mode == "manual":
             step = self._velocity() * dt
             moved = bool(np.abs(step).max() > 1e-6)
-            self.row[X] += step[0]
-            self.row[Y] += step[1]
+            self.row[[X, Y]] += step
             self.row[VX], self.row[VY] = self._velocity()
             if self.row[AGE] == 0.0:
                 self.row[PAST_SPEED] = math.hypot(self.row[VX], self.row[VY])

@@ -5,7 +5,6 @@ and size change continuously between them.
 """
 
 import math
-from typing import Protocol
 
 import numpy as np
 
@@ -21,6 +20,7 @@ from app.sim.core.arrays import Vec
 from app.sim.human import model as human
 from app.sim.human.anthropometry import percentile_body
 from app.sim.human.person import Person
+from app.sim.people.reach_script import ReachScript
 from app.sim.pick.cases import Case, script_of
 from app.sim.primitives.primitive_library import VARIANTS
 
@@ -28,13 +28,6 @@ FEWER_VARIANTS = 4
 """Keyframes per place and hand of people other than the worker of the cell."""
 THERE_M = 0.005
 """Tolerance of the pelvis height at arrival [m]."""
-
-
-class PostureSource(Protocol):
-    """Trajectory of a working person: a work loop or the script of a case study."""
-
-    def at(self, t: float) -> tuple[Vec, Vec]:
-        """Return joint positions [m, rad] and speeds [m/s, rad/s] at ``t`` [s], (18,) each."""
 
 
 class LiveWorker:
@@ -56,7 +49,7 @@ class LiveWorker:
         """Body dimensions."""
         self._cell, self._place, self._seed = cell, place, seed
         self._played: PlayedMotion | None = None
-        self._work: PostureSource = self._new_work()
+        self._work: WorkLoop | ReachScript = self._new_work()
         self._t, self._joining = 0.0, q is not None
         self._limbs = DraggedPerson(cell, self._work.at(0.0)[0] if q is None else q)
 
@@ -80,10 +73,9 @@ class LiveWorker:
 
         The yaw is within half a turn of the home yaw.
         """
-        q, full = self._limbs.q.copy(), 2.0 * math.pi
+        q, full = self.q.copy(), 2.0 * math.pi
         q[2] -= full * round((q[2] - self._cell.human.home[2]) / full)
-        q = np.clip(q, human.Q_MIN, human.Q_MAX)
-        return Person(q=q, qd=self._limbs.qd, size=self.size)
+        return Person(q=np.clip(q, human.Q_MIN, human.Q_MAX), qd=self.qd, size=self.size)
 
     # Motion source.
 
