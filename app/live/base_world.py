@@ -57,11 +57,7 @@ P = TypeVar("P", bound=LivePedestrians | LiveWorkers)
 
 
 class BaseWorld(ABC, Generic[P]):
-    """Clock, people and robot of one live cell; scenarios fill in the hooks.
-
-    Args:
-        policy: Selects and executes tasks; None: the robot is idle.
-    """
+    """Clock, people and robot of one live cell; scenarios fill in the hooks."""
 
     def __init__(self, cell: Cell, policy: TaskPolicy | None, id: str, people: P) -> None:
         self.cell, self.id, self.policy = cell, id, policy
@@ -105,11 +101,7 @@ class BaseWorld(ABC, Generic[P]):
 
     @abstractmethod
     def _move_robot(self, before: HumanGeometry) -> None:
-        """Execute one control period of the robot.
-
-        Args:
-            before: The people at the start of the period.
-        """
+        """Execute one control period of the robot; ``before`` are the people at its start."""
 
     @abstractmethod
     def _wanted(self) -> TrajectorySegment:
@@ -239,11 +231,7 @@ class BaseWorld(ABC, Generic[P]):
         self._planned = self.safety.plan(self._wanted(), self.robot.shapes(self.people))
 
     def follow_plan(self, before: HumanGeometry) -> bool:
-        """Execute the planned motion; return whether a contact ended the episode.
-
-        Args:
-            before: The people at the start of the period.
-        """
+        """Execute the planned motion; return whether a contact ended the episode."""
         speeds = np.concatenate([self.robot.qd, self._planned.qd])
         at_standstill = bool(np.abs(speeds).max() < STANDSTILL)
         found = self.robot.follow(self._planned, self.people, before)

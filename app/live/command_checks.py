@@ -67,11 +67,7 @@ def scenario_of(cell: Cell) -> Scenario:
 
 
 def check(command: Command, cell: Cell, people: Sequence[int]) -> None:
-    """Compare a command with a work cell.
-
-    Args:
-        cell: Work cell of the world.
-        people: Ids of the people in the cell.
+    """Compare a command with a work cell and the ids of the people in it.
 
     Raises:
         InvalidInput: No command of this scenario, an unknown name or person, a point outside
@@ -187,11 +183,7 @@ def _require(field: str, word: str, known: Sequence[str], rule: str) -> None:
 
 
 def people_after(command: Command, people: tuple[int, ...]) -> tuple[int, ...]:
-    """Return the ids of the people in a cell after a valid command, in order.
-
-    Args:
-        people: Ids before it.
-    """
+    """Return the ids of the people in a cell after a valid command, in order."""
     match command:
         case AddPerson():
             free = next(id for id in range(MAX_PEOPLE) if id not in people)

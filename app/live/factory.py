@@ -26,8 +26,9 @@ def new_world(
 
     Args:
         cell: Work cell that :func:`lacks_for_live` accepts.
-        policy: Moves the robot of a pick or sorting cell; None: the robot is idle.
-        seed: Seed of people and tasks.
+        policy: Moves the robot of a pick or sorting cell, and selects its target or among equal
+            moves; None: the robot is idle.
+        seed: Seed of people, tasks and grasps.
         sorting_policy: Policy of a sorting cell; None: the planner selects every move.
         reach_policy: Policy of a reach cell; None: straight motion to the goals.
     """

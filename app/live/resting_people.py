@@ -14,11 +14,7 @@ from app.sim.robot.trajectory_segment import TrajectorySegment
 
 
 class RestingPeopleControl:
-    """Candidates and planned action of the next period.
-
-    Args:
-        robot: The robot it moves.
-    """
+    """Candidates and planned action of the next period."""
 
     def __init__(self, robot: LiveArm) -> None:
         self._robot = robot
@@ -33,11 +29,7 @@ class RestingPeopleControl:
         acts."""
 
     def message(self, goal: str) -> str | None:
-        """Return what the robot does beside people at rest; None where the policy acts.
-
-        Args:
-            goal: Name of its target.
-        """
+        """Return how the robot moves to ``goal`` beside people at rest; None: by the policy."""
         if self.act is not None:
             return f"Moving to {goal} on a planned path: nobody has moved for {REST_S:.0f} s."
         return f"Waiting: a person at rest blocks {goal}." if self._planner.blocked else None
@@ -51,11 +43,7 @@ class RestingPeopleControl:
     ) -> tuple[Candidate, ...]:
         """Return the candidates that people at rest do not block; all where nobody is at rest.
 
-        Args:
-            people: The people in the cell.
-            policy: The policy that chooses.
-            candidates: The stations that the robot may choose.
-            begun: The candidate whose pick has begun; it stays.
+        The candidate ``begun``, whose pick has begun, stays.
         """
         if not self._rested or policy is None or len(candidates) < 2:
             return candidates

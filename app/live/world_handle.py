@@ -14,12 +14,7 @@ from app.sim.cells.cell import Cell
 
 
 class WorldHandle:
-    """Commands in, immutable snapshots out; for use from any thread.
-
-    Args:
-        cell: Work cell, against which commands are checked.
-        first: Initial snapshot.
-    """
+    """Commands in, immutable snapshots out; for use from any thread."""
 
     def __init__(self, id: str, cell: Cell, first: WorldSnapshot) -> None:
         self.id = id

@@ -19,12 +19,7 @@ RISE_RATE = 0.6
 
 
 class LiveAnthropometry:
-    """Body lengths and pelvis height of one live person.
-
-    Args:
-        worker: Person with the initial dimensions.
-        floor_z: Height of the floor [m].
-    """
+    """Body lengths and pelvis height of one live person, those of ``worker`` at first."""
 
     def __init__(self, worker: Worker, floor_z: float) -> None:
         self._floor_z, self._pelvis = floor_z, worker.pelvis_height

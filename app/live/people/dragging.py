@@ -20,11 +20,7 @@ STEP_BACK, STEP_ASIDE = 0.8, 0.6
 
 
 class DraggedPerson:
-    """Joint positions and speeds of one person that follows targets.
-
-    Args:
-        q: Initial posture [m, rad], shape (18,).
-    """
+    """Joint positions and speeds of one person that follows targets."""
 
     def __init__(self, cell: Cell, q: Vec) -> None:
         self._cell = cell
@@ -52,11 +48,9 @@ class DraggedPerson:
         self._target = np.array(q)
 
     def drag(self, command: MovePerson, size: Vec) -> None:
-        """Set the target from dragged points; hands dragged before keep their targets.
+        """Set the target of a person of body lengths ``size`` [m], shape (12,).
 
-        Args:
-            command: Dragged points.
-            size: Body lengths [m], shape (12,).
+        Hands that were dragged before keep their targets.
         """
         pelvis = (
             self._walkable(command.pelvis)

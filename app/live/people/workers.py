@@ -29,12 +29,7 @@ SEED_STEP = 7919
 
 
 class LiveWorkers(PeopleById[LiveWorker]):
-    """Workers of one live cell.
-
-    Args:
-        cell: Work cell with at least one worker.
-        seed: Seed of the first person.
-    """
+    """Workers of one live cell, which has at least one."""
 
     def __init__(self, cell: Cell, seed: int) -> None:
         self._cell, self._seed = cell, seed
@@ -104,12 +99,9 @@ class LiveWorkers(PeopleById[LiveWorker]):
 
 
 def place_of(cell: Cell, index: int, count: int) -> Cell:
-    """Return a cell restricted to one person: home, stations and walking area.
+    """Return a cell restricted to one person of ``count``: home, stations and walking area.
 
-    Args:
-        cell: Work cell with at least one worker.
-        index: Index of the person, from left to right.
-        count: Number of people.
+    ``index`` counts the people from left to right.
     """
     worker = cell.human
     if count == 1:

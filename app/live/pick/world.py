@@ -29,12 +29,7 @@ from app.sim.robot.trajectory_segment import TrajectorySegment
 
 
 class LivePickWorld(BaseWorld[LiveWorkers]):
-    """One live pick-and-place cell.
-
-    Args:
-        policy: Selects and executes tasks; None: the robot is idle.
-        seed: Seed of the human motion.
-    """
+    """One live pick-and-place cell; the arguments are those of ``factory.new_world``."""
 
     def __init__(
         self, cell: Cell, policy: TaskPolicy | None, seed: int, id: str = "main"

@@ -32,12 +32,7 @@ TIME_LIMIT_S = 5.0
 
 
 class ReachController:
-    """Queries a policy for the live state.
-
-    Args:
-        cell: Cell with a goal region.
-        policy: Moves the robot; None moves straight to the goal.
-    """
+    """Queries a policy for the live state; None moves straight to the goal."""
 
     def __init__(self, cell: Cell, policy: LiveReachPolicy | None) -> None:
         self._cell = cell

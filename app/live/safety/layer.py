@@ -24,11 +24,7 @@ from app.sim.safety.separation_zone import separation_zone
 
 
 class LiveSafety:
-    """Safety layer of a live world.
-
-    Args:
-        cell: Work cell with the settings at the start.
-    """
+    """Safety layer of a live world, with the settings of its cell at the start."""
 
     def __init__(self, robot: LiveArm, cell: Cell) -> None:
         self.suspended = False
@@ -76,11 +72,7 @@ class LiveSafety:
         self._stopped_s += dt if self.override <= 0.0 else 0.0
 
     def plan(self, wanted: TrajectorySegment, people: Shapes) -> TrajectorySegment:
-        """Return the motion of the next period.
-
-        Args:
-            wanted: Motion without the layer.
-        """
+        """Return the motion of the next period; ``wanted`` is the one without the layer."""
         robot, layer = self._robot, self._layer
         decided = layer.decide(robot.q, robot.qd, wanted.c, wanted.d, people)
         self._decided, self._terms = decided, layer.terms(decided, robot.qd, people)
@@ -101,8 +93,7 @@ class LiveSafety:
     def snapshot(self, ids: Sequence[int]) -> SafetySnapshot:
         """Return the decision for the present state with the terms of S_p.
 
-        Args:
-            ids: Ids of the people, workers first.
+        ``ids`` are those of the people, workers first.
         """
         settings, decided = self.settings, self._decided
         person, terms = (None, None) if self._terms is None else self._terms

@@ -51,15 +51,11 @@ class MoveChoice:
 
 
 class SortController:
-    """Chooses moves, monitors progress and falls back to the planner.
-
-    Args:
-        policy: Sorting policy; None: the planner selects every move.
-    """
+    """Chooses moves, monitors progress and falls back to the planner."""
 
     def __init__(self, policy: SortingValues | None) -> None:
         self.policy = policy
-        """The policy."""
+        """Sorting policy; None: the planner selects every move."""
         self.decision: SortingDecision | None = None
         """The last decision."""
         self.planner_fallbacks = 0

@@ -36,14 +36,8 @@ def task_snapshot(
 ) -> SortingSnapshot:
     """Return the read model of the sorting task.
 
-    Args:
-        table: Blocks and goal.
-        controller: Controller with the last decision.
-        choice: Present move.
-        phase: Phase of the move.
-        counters: Events since the task began.
-        test: Id of the running test.
-        tcp: Tool centre point [m], shape (3,), the top of a held block.
+    ``choice`` is the present move, ``test`` the id of the running test, and ``tcp`` the tool
+    centre point [m], shape (3,).
     """
     decision, policy = controller.decision, controller.policy
     return SortingSnapshot(

@@ -49,14 +49,7 @@ SHORT_M = 0.35
 
 
 class LiveSortingWorld(BaseWorld[LiveWorkers]):
-    """One live sorting cell.
-
-    Args:
-        cell: Sorting cell, see ``layout.lacks_for_sorting``.
-        policy: Moves the robot and selects among equal moves; None: the robot is idle.
-        seed: Seed of tasks, grasps and human motion.
-        sorting_policy: Sorting policy; None: the planner selects every move.
-    """
+    """One live sorting cell; the arguments are those of ``factory.new_world``."""
 
     def __init__(
         self,

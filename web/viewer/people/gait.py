@@ -21,11 +21,7 @@ SWING_S, LIFT = 0.26, 0.06
 
 
 class Gait:
-    """Two feet that follow a pelvis.
-
-    Args:
-        floor_z: Height of the floor [m].
-    """
+    """Two feet that follow a pelvis."""
 
     def __init__(self, floor_z: float) -> None:
         self._floor_z = floor_z

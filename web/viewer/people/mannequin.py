@@ -126,14 +126,10 @@ def color_of(part: Part, person: int) -> Rgb:
 
 
 def fitted(part: Part, size: Vec) -> Vec:
-    """Return a soft part's vertices for a person of another size [m], shape (n, 3).
+    """Return a soft part's vertices [m], shape (n, 3), for a size [m], shape (12,).
 
     Each vertex is moved and scaled with its bones by its skin weights, so that the surface is
     connected between two bones.
-
-    Args:
-        part: A soft part.
-        size: The person's size [m], shape (12,).
     """
     median, own = skeleton.bind_bones(), skeleton.bind_bones(size)
     right, left = skeleton.scales(size, "r"), skeleton.scales(size, "l")

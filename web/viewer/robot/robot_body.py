@@ -116,12 +116,7 @@ def gripper_finger(tool_length: float) -> bytes:
 
 @lru_cache(maxsize=4)
 def magnet_body(tool_length: float, tool_radius: float) -> bytes:
-    """Return a round lifting magnet in the frame of ``tool0``, as binary glTF.
-
-    Args:
-        tool_length: From flange to the magnet's face along z [m].
-        tool_radius: Radius of the simulator's tool capsule [m].
-    """
+    """Return a round lifting magnet; sizes and frame as in :func:`gripper_body`."""
     face = 0.022
     neck = tool_length - face - 0.022
     return painted(

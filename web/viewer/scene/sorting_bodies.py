@@ -70,21 +70,16 @@ def _block(half_size: tuple[float, float, float]) -> trimesh.Trimesh:
 def tower_plate(color: Rgb, height: float) -> bytes:
     """Return the plate under a tower: grey, with a top in the tower's colour, as glTF.
 
-    Args:
-        height: Its top over the table [m].
+    Its top is ``height`` [m] over the table.
     """
     side, top = PLATE_SIDE, 0.004
-    soft = (
-        round(0.72 * color[0] + 66),
-        round(0.72 * color[1] + 66),
-        round(0.72 * color[2] + 66),
-    )
+    red, green, blue = (round(0.72 * channel + 66) for channel in color)
     return painted(
         [
             (slab((side, side, height), (0.0, 0.0, 0.5 * height), 0.02, 0.002), RIM),
             (
                 slab((side - 0.012, side - 0.012, top), (0.0, 0.0, height), 0.016, 0.001),
-                material(soft, roughness=0.65),
+                material((red, green, blue), roughness=0.65),
             ),
         ]
     )
