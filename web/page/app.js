@@ -11,6 +11,7 @@ import { isActive } from "./training/jobactions.js";
 import { useJobs } from "./training/jobs.js";
 import { useCell, WORLD } from "./live/world-stream.js";
 import { goalColours } from "./palette.js";
+import { useMedia } from "./plots.js";
 import { ReachDecision } from "./reach/reach.js";
 import { SignIn } from "./signin.js";
 import { SortingDecision } from "./sorting/sorting.js";
@@ -97,17 +98,6 @@ function CellTitle({ cell: { cell, cells, show } }) {
 
 function stamp(jobs) {
   return (jobs ?? []).map((j) => `${j.id}:${j.state}`).join(",");
-}
-
-function useMedia(condition) {
-  const query = useMemo(() => matchMedia(condition), [condition]);
-  const [matches, setMatches] = useState(query.matches);
-  useEffect(() => {
-    const update = () => setMatches(query.matches);
-    query.addEventListener("change", update);
-    return () => query.removeEventListener("change", update);
-  }, [query]);
-  return matches;
 }
 
 /** Live, stale or what else; commands that wait longer than a moment are shown here. */
@@ -238,8 +228,9 @@ function veil(link, reason) {
 function Decision({ cell, checkpoints, jobs }) {
   const goals = useGoals(cell);
   if (!cell.world) return html`<div class="skeleton tall" aria-busy="true"></div>`;
+  if (cell.world.sorting && !cell.cell) return html`<${StatusPanel} world=${cell.world} /><${Safety} world=${cell.world} />`;
   if (cell.world.sorting) {
-    return !cell.cell ? html`<${StatusPanel} world=${cell.world} /><${Safety} world=${cell.world} />` : html`<${SortingDecision} world=${cell.world} cell=${cell.cell} send=${cell.send}
+    return html`<${SortingDecision} world=${cell.world} cell=${cell.cell} send=${cell.send}
       checkpoints=${checkpoints} jobs=${jobs} />`;
   }
   if (cell.world.reach) return html`<${ReachDecision} world=${cell.world} />`;

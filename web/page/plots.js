@@ -9,16 +9,22 @@ const [LEAST_NAME, MOST_NAME] = [58, 120];
 const FONT = "11px Inter, system-ui, sans-serif";
 const LABEL_GAP = 10; // between the labels of an axis and its line, and beside them [px]
 
-/** The page's colours; changes with the system's light and dark. */
-export function useTheme() {
-  const [theme, setTheme] = useState(themeColours);
+/** Whether a media query holds at present. */
+export function useMedia(condition) {
+  const query = useMemo(() => matchMedia(condition), [condition]);
+  const [matches, setMatches] = useState(query.matches);
   useEffect(() => {
-    const query = matchMedia("(prefers-color-scheme: dark)");
-    const update = () => setTheme(themeColours());
+    const update = () => setMatches(query.matches);
     query.addEventListener("change", update);
     return () => query.removeEventListener("change", update);
-  }, []);
-  return theme;
+  }, [query]);
+  return matches;
+}
+
+/** The page's colours; changes with the system's light and dark. */
+export function useTheme() {
+  const isDark = useMedia("(prefers-color-scheme: dark)");
+  return useMemo(themeColours, [isDark]);
 }
 
 /** One uPlot in a box that gives its width; `options` must be stable between data changes. */
@@ -55,7 +61,7 @@ export function axis(theme, more) {
 }
 
 /** A vertical axis of numbers, at least `size` pixels wide and as wide as its labels need. */
-export function numberAxis(theme, { size, ...more }) {
+function numberAxis(theme, { size, ...more }) {
   return axis(theme, {
     size: (plot, labels, k, cycle) => (cycle > 1 ? plot.axes[k]._size
       : Math.max(size, Math.ceil(widest(labels ?? [], FONT)) + LABEL_GAP)),
@@ -72,7 +78,7 @@ function widest(texts, font) {
 }
 
 /** Labels of an axis of rates. */
-export function percents(_, values) {
+function percents(_, values) {
   return format.ticks(values.map((v) => 100 * v)).map((text) => `${text} %`);
 }
 
@@ -133,15 +139,22 @@ export function CurvePlot({ rows, lines, height, label, unit, range, sync, onHov
   const hover = useRef(onHover);
   hover.current = onHover;
   const key = lines.map((l) => l.key).join("|");
-  const options = useMemo(
-    () => curveOptions(theme, lines, unit, range, sync, hover), [key, theme, unit, sync]);
+  const options = useMemo(() => stepOptions(theme, hover, {
+    y: { range: range ?? ((_, low, high) => padded(low, high, 0.2)) }, size: 46, unit, sync,
+    series: [{}, ...lines.map((l) => (
+      { label: l.label, stroke: theme[l.colour] ?? l.colour, width: 1.75, points: FEW }))],
+  }), [key, theme, unit, sync]);
   const data = useMemo(
     () => [rows.map((r) => r.step), ...lines.map((l) => rows.map((r) => format.finite(r[l.key])))],
     [rows, key]);
   return html`<${Plot} options=${options} data=${data} height=${height} label=${label} />`;
 }
 
-function curveOptions(theme, lines, unit, range, sync, hover) {
+/** Dots of a curve that has too few points for a line. */
+export const FEW = { show: (plot) => plot.data[0].length < 3, size: 5 };
+
+/** Options of curves against environment steps; `size` is the least width of the vertical axis. */
+export function stepOptions(theme, hover, { y, size, unit, sync, ...more }) {
   return {
     legend: { show: false },
     padding: [8, 16, 0, 0],
@@ -153,21 +166,13 @@ function curveOptions(theme, lines, unit, range, sync, hover) {
     },
     scales: {
       x: { time: false, range: (_, low, high) => [Math.min(0, low ?? 0), Math.max(high ?? 1, 1)] },
-      y: { range: range ?? ((_, low, high) => padded(low, high, 0.2)) },
+      y,
     },
     axes: [
       axis(theme, { size: 24, space: 64, values: (_, t) => t.map((v) => (v ? format.steps(v) : "0")) }),
-      numberAxis(theme, { size: 46, space: 30, ...(unit === "%" && { values: percents }) }),
-    ],
-    series: [
-      {},
-      ...lines.map((l) => ({
-        label: l.label,
-        stroke: theme[l.colour] ?? l.colour,
-        width: 1.75,
-        points: { show: (plot) => plot.data[0].length < 3, size: 5 },
-      })),
+      numberAxis(theme, { size, space: 30, ...(unit === "%" && { values: percents }) }),
     ],
     hooks: { setCursor: [(plot) => hover.current?.(plot.cursor.idx)] },
+    ...more,
   };
 }

@@ -3,7 +3,7 @@ import { html, useEffect, useMemo, useRef, useState } from "../vendor/htm-preact
 import * as format from "../format.js";
 import { Alert, Close } from "../icons.js";
 import { GOALS } from "../palette.js";
-import { axis, numberAxis, percents, Plot, useTheme } from "../plots.js";
+import { FEW, Plot, stepOptions, useTheme } from "../plots.js";
 import { FieldName, fieldOf, fieldValue, presetTitle } from "./fieldnames.js";
 import { useAnswer } from "./formfields.js";
 
@@ -122,26 +122,13 @@ function GroupPlot({ found, onHover }) {
 function groupOptions(theme, { groups, quantity }, hover) {
   const rate = RATES.has(quantity);
   const edge = { points: { show: false }, width: 0, spanGaps: true };
-  return {
-    legend: { show: false },
-    padding: [8, 16, 0, 0],
-    cursor: { y: false, drag: { setScale: false, x: false, y: false }, points: { size: 5 } },
-    scales: {
-      x: { time: false, range: (_, low, high) => [Math.min(0, low ?? 0), Math.max(high ?? 1, 1)] },
-      y: rate ? { range: [0, 1] } : {},
-    },
-    axes: [
-      axis(theme, { size: 24, space: 64, values: (_, t) => t.map((v) => (v ? format.steps(v) : "0")) }),
-      numberAxis(theme, { size: 52, space: 30, ...(rate && { values: percents }) }),
-    ],
+  return stepOptions(theme, hover, {
+    y: rate ? { range: [0, 1] } : {}, size: 52, unit: rate ? "%" : "",
     series: [{}, ...groups.flatMap((group, i) => [
-      { stroke: colour(i), width: 2, dash: patternOf(i), spanGaps: true,
-        points: { show: (plot) => plot.data[0].length < 3, size: 5 } },
-      edge, edge,
+      { stroke: colour(i), width: 2, dash: patternOf(i), spanGaps: true, points: FEW }, edge, edge,
     ])],
     bands: groups.map((_, i) => ({ series: [3 * i + 2, 3 * i + 3], fill: colour(i, 0.16) })),
-    hooks: { setCursor: [(plot) => hover.current(plot.cursor.idx)] },
-  };
+  });
 }
 
 /** The fields that differ: a column for each job. */
