@@ -1,6 +1,7 @@
 // Hint over the scene on the first visit: what to try, and a button that sets it up.
 import { html, useState } from "./vendor/htm-preact-standalone.module.js";
 import { Close } from "./icons.js";
+import { keep, kept } from "./kept.js";
 
 const KEPT = "tandem-tried";
 const BESIDE_M = 0.3;
@@ -38,7 +39,7 @@ const TRIES = {
 };
 
 export function FirstUse({ world, cell, send }) {
-  const [tried, setTried] = useState(kept);
+  const [tried, setTried] = useState(() => [kept("localStorage", KEPT) ?? []].flat());
   const kind = world.sorting ? "sorting" : world.reach ? "reach" : "choice";
   if (tried.includes(kind)) return null;
   const { text, button, ask } = TRIES[kind];
@@ -50,28 +51,11 @@ export function FirstUse({ world, cell, send }) {
   const dismiss = () => {
     const now = [...tried, kind];
     setTried(now);
-    keep(now);
+    keep("localStorage", KEPT, now);
   };
   return html`<p class="first-use" data-role="first-use"><span><b>Try it.</b> ${text}</span>
     ${commands.length > 0 && html`<button type="button" class="tool" data-action="try"
       onClick=${start}>${button}</button>`}
     <${Close} label="Do not show this again" data-action="dismiss-first-use"
       onClick=${dismiss} /></p>`;
-}
-
-function kept() {
-  try {
-    const found = JSON.parse(localStorage.getItem(KEPT));
-    return Array.isArray(found) ? found : [];
-  } catch {
-    return [];
-  }
-}
-
-function keep(kinds) {
-  try {
-    localStorage.setItem(KEPT, JSON.stringify(kinds));
-  } catch {
-    // A browser that keeps nothing shows the line again.
-  }
 }

@@ -2,6 +2,7 @@
 // hidden; what was chosen here is kept for this window, and sent to every new viewer.
 import { html, useEffect, useRef, useState } from "./vendor/htm-preact-standalone.module.js";
 import { Icon } from "./icons.js";
+import { keep, kept } from "./kept.js";
 
 const KEPT = "tandem-view";
 const HELP = {
@@ -28,7 +29,7 @@ export function ViewMenu({ frame }) {
     const listen = ({ source, data }) => {
       if (source !== frame.current?.contentWindow || data?.tag !== "view-settings") return;
       setItems(data.items);
-      const wanted = kept();
+      const wanted = kept("sessionStorage", KEPT) ?? {};
       for (const { name, shown } of data.items) {
         if ((wanted[name] ?? shown) !== shown) set(name, wanted[name]);
       }
@@ -51,7 +52,7 @@ export function ViewMenu({ frame }) {
   }, [open]);
   if (items.length === 0) return null;
   const pick = (name, shown) => {
-    keep({ ...kept(), [name]: shown });
+    keep("sessionStorage", KEPT, { ...kept("sessionStorage", KEPT), [name]: shown });
     setItems((now) => now.map((one) => (one.name === name ? { name, shown } : one)));
     set(name, shown);
   };
@@ -64,20 +65,4 @@ export function ViewMenu({ frame }) {
           onChange=${(e) => pick(name, e.target.checked)} />${name}</label>`)}
     </div>`}
   </div>`;
-}
-
-function kept() {
-  try {
-    return JSON.parse(sessionStorage.getItem(KEPT)) ?? {};
-  } catch {
-    return {};
-  }
-}
-
-function keep(choice) {
-  try {
-    sessionStorage.setItem(KEPT, JSON.stringify(choice));
-  } catch {
-    // A browser that keeps nothing: the choice holds until the viewer is loaded again.
-  }
 }
