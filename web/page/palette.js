@@ -33,7 +33,7 @@ export const OVERRIDES = [
   [1.0, [38, 166, 104]],
 ];
 
-/** The terms of the protective separation distance; as in live/safety.css. */
+/** The terms of the protective separation distance. */
 export const TERMS = { person: "rgb(240 176 92)", robot: "rgb(104 150 210)", margin: "rgb(160 172 184)" };
 
 /** Colour of a robot that goes at this share of its speed. */

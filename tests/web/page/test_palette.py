@@ -53,11 +53,3 @@ def test_people_have_the_colours_of_their_vests() -> None:
 
 def test_page_and_scene_use_one_ramp_of_overrides() -> None:
     assert ramp("OVERRIDES") == OVERRIDES
-
-
-def test_terms_of_the_separation_have_one_colour_in_plot_and_legend() -> None:
-    line = next(one for one in PALETTE.read_text().splitlines() if "const TERMS" in one)
-    style = (PALETTE.parent / "live/safety.css").read_text()
-    plotted = dict(re.findall(r"(\w+): \"(rgb\([\d ]+\))\"", line))
-    assert plotted == dict(re.findall(r"--term-(\w+): (rgb\([\d ]+\))", style))
-    assert len(plotted) == 3

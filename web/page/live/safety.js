@@ -1,7 +1,7 @@
 // Panel of the safety layer: override, separation distance with the terms of S_p, both over time.
 import { html, useRef } from "../vendor/htm-preact-standalone.module.js";
 import * as format from "../format.js";
-import { overrideColour } from "../palette.js";
+import { overrideColour, TERMS } from "../palette.js";
 import { nameOf } from "./people.js";
 import { SAFETY_SPAN_S, SafetyHistory } from "./safetyhistory.js";
 import { OverridePlot, SeparationPlot } from "./safetyplots.js";
@@ -91,7 +91,7 @@ function Terms({ safety, people }) {
       <dt>${subject} to ${LINKS[link] ?? "robot"}</dt>
       <dd data-role="separation">${format.gap(separation)}</dd></div>
     <div class="terms-top"><dt>Protective separation distance S<sub>p</sub></dt><dd data-role="required">${format.length(required)}</dd></div>
-    ${rows.map(([key, label, value]) => html`<div key=${key}><dt><i class=${`term term-${key}`}></i><span>${label}</span></dt>
+    ${rows.map(([key, label, value]) => html`<div key=${key}><dt><i class="term" style=${{ background: TERMS[key] }}></i><span>${label}</span></dt>
       <dd>${format.length(value)}</dd></div>`)}
   </dl>`;
 }

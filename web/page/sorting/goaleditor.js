@@ -3,6 +3,7 @@
 import { html, useState } from "../vendor/htm-preact-standalone.module.js";
 import { Block, kindOf, nameOf } from "./block-icon.js";
 import * as format from "../format.js";
+import { BLOCKS } from "../palette.js";
 
 export function GoalEditor({ sorting, cell, send, picked, onPick }) {
   const [goal, setGoal] = useGoal(sorting, send);
@@ -60,7 +61,7 @@ function Tower({ tower, sorting, sizes, onPut, picked, onPick }) {
         ${sizes.length === 0 && html`<span class="stack-empty">empty</span>`}
       </div>
     </div>
-    <div class="plate" style=${{ "--plate": `var(--tower-${colour})` }}><span>now</span><span>goal</span></div>
+    <div class="plate" style=${{ "--plate": BLOCKS[colour] }}><span>now</span><span>goal</span></div>
     <div class="offers" role="group" aria-label=${`Add to the goal of the ${colour} tower`}>
       ${[...sorting.sizes].reverse().map((size) => html`<${Offer} key=${size} colour=${colour}
         size=${size} sizes=${sorting.sizes} sorting=${sorting} asked=${sizes}
