@@ -74,17 +74,19 @@ function Clearance({ metres, people, safety }) {
 
 /** Counters, training range and provenance. */
 export function SmallPrint({ world }) {
-  const counters = world.counters ?? {};
   return html`<section class="card small-print" aria-label="Counters and provenance">
-    <dl class="tiles">
-      ${[["reached", "Picked"], ["broken_off", "Broken off"], ["contacts", "Contacts"],
-        ["contacts_at_rest", "Contacts at standstill"], ["timeouts", "Timed out"],
-        ["switches", "Target switches"]].map(([key, label]) => html`<div key=${key}>
-          <dt>${label}</dt><dd data-counter=${key}>${counters[key] ?? 0}</dd></div>`)}
-    </dl>
+    <${Tiles} counters=${world.counters ?? {}} names=${{ reached: "Picked", broken_off: "Broken off",
+      contacts: "Contacts", contacts_at_rest: "Contacts at standstill", timeouts: "Timed out",
+      switches: "Target switches" }} />
     <${TrainingRange} world=${world} />
     <${Provenance} world=${world} />
   </section>`;
+}
+
+/** Counters by the names of `names`, in its order. */
+export function Tiles({ counters, names }) {
+  return html`<dl class="tiles">${Object.entries(names).map(([key, label]) => html`<div key=${key}>
+    <dt>${label}</dt><dd data-counter=${key}>${counters[key] ?? 0}</dd></div>`)}</dl>`;
 }
 
 /** Whether the inputs of the last decision lie within the training range, and those that do not. */

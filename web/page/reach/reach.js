@@ -3,7 +3,7 @@ import { html } from "../vendor/htm-preact-standalone.module.js";
 import * as format from "../format.js";
 import { Icon } from "../icons.js";
 import { Safety } from "../live/safety.js";
-import { Provenance, StatusPanel, TrainingRange } from "../live/status.js";
+import { Provenance, StatusPanel, Tiles, TrainingRange } from "../live/status.js";
 
 export function ReachDecision({ world }) {
   return html`<${StatusPanel} world=${world} />
@@ -18,17 +18,9 @@ export function ReachDecision({ world }) {
 /** Outcome counters, training range and provenance. */
 function Outcomes({ world }) {
   const { counters, reach } = world;
-  const tiles = [
-    ["reached", "Reached", counters.reached],
-    ["contacts", "Contacts", counters.contacts],
-    ["contacts_at_rest", "Contacts at standstill", counters.contacts_at_rest],
-    ["timeouts", "Timed out", counters.timeouts],
-  ];
   return html`<section class="card small-print" aria-label="Outcomes and provenance">
-    <dl class="tiles">
-      ${tiles.map(([key, label, value]) => html`<div key=${key}>
-        <dt>${label}</dt><dd data-counter=${key}>${value}</dd></div>`)}
-    </dl>
+    <${Tiles} counters=${counters} names=${{ reached: "Reached", contacts: "Contacts",
+      contacts_at_rest: "Contacts at standstill", timeouts: "Timed out" }} />
     <dl class="facts">
       <div><dt>Mean time to a goal</dt><dd>${counters.reached
         ? format.seconds(reach.counters.reaching_s / counters.reached) : "–"}</dd></div>

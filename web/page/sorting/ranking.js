@@ -3,6 +3,7 @@ import { html } from "../vendor/htm-preact-standalone.module.js";
 import { Block, nameOf, placeName } from "./block-icon.js";
 import { TaskPlanner } from "../training/checkpoints.js";
 import * as format from "../format.js";
+import { Tiles } from "../live/status.js";
 
 const PHASES = {
   approach: "moving to it",
@@ -103,14 +104,10 @@ function Order({ order, send }) {
 /** Counters, the task planner and the order of equal moves. */
 export function SortingSmallPrint({ world, cell, checkpoints, jobs, send }) {
   const counters = { ...world.sorting.counters, ...world.counters };
-  const shown = [["attempts", "Grasps"], ["failures", "Failed"], ["moves", "Moves"],
-    ["planner_fallbacks", "Planner fallbacks"], ["contacts", "Contacts"],
-    ["contacts_at_rest", "Contacts at standstill"]];
   return html`<section class="card small-print" aria-label="Counters and provenance">
-    <dl class="tiles">
-      ${shown.map(([key, label]) => html`<div key=${key}>
-        <dt>${label}</dt><dd data-counter=${key}>${counters[key]}</dd></div>`)}
-    </dl>
+    <${Tiles} counters=${counters} names=${{ attempts: "Grasps", failures: "Failed", moves: "Moves",
+      planner_fallbacks: "Planner fallbacks", contacts: "Contacts",
+      contacts_at_rest: "Contacts at standstill" }} />
     <${TaskPlanner} sorting=${world.sorting} cell=${cell} checkpoints=${checkpoints} jobs=${jobs}
       send=${send} />
     <${Order} order=${world.sorting.order} send=${send} />
