@@ -1,12 +1,12 @@
 // The people in the cell: who is there, who moves each, what is played, how large each is.
 import { html, useEffect, useState } from "../vendor/htm-preact-standalone.module.js";
-import { get, inTurn } from "../api.js";
 import { Segmented } from "../choice.js";
 import * as format from "../format.js";
 import { Icon } from "../icons.js";
 import { ImportForm } from "./importform.js";
 import { VESTS } from "../palette.js";
-import { PedestrianControls, removePerson } from "./walkers.js";
+import { useAnswer } from "../training/formfields.js";
+import { PedestrianControls, RemovePerson } from "./walkers.js";
 
 const MAX_PEOPLE = 4;
 const MODES = [
@@ -70,7 +70,8 @@ function Observed({ people, most }) {
 function MotionSource({ person, send, sized, onSized }) {
   const { id, mode } = person;
   const [open, setOpen] = useState(false);
-  const { list, error, refresh } = useMotions();
+  const { answer, error, refresh } = useAnswer("v1/recordings");
+  const list = error ? null : answer?.items ?? null;
   const playing = mode === "recorded";
   const shown = playing || open;
   useEffect(() => {
@@ -94,10 +95,7 @@ function MotionSource({ person, send, sized, onSized }) {
       <div class="transport" role="group" aria-label=${`${nameOf(id)} in the cell`}>
         <button type="button" class="tool" aria-expanded=${String(sized)} data-action="size"
           aria-label="Size" title="Stature, arms and shoulders of this person" onClick=${onSized}><${Icon} name="ruler" /><span>Size</span></button>
-        <button type="button" class="tool" data-action="remove-person"
-          aria-label=${`Remove ${nameOf(id)}`} title=${`${nameOf(id)} leaves the cell`}
-          onClick=${(event) => removePerson(event, id, send)}>
-          <${Icon} name="close" /><span>Remove</span></button>
+        <${RemovePerson} person=${id} name=${nameOf(id)} send=${send} />
       </div>
     </div>
     ${shown && html`<${Recording} person=${person} list=${list} error=${error} onAgain=${refresh} send=${send} />
@@ -107,7 +105,7 @@ function MotionSource({ person, send, sized, onSized }) {
 /** Stored recordings to choose from, and the one that plays. */
 function Recording({ person, list, error, onAgain, send }) {
   const { id, motion } = person;
-  if (error) return html`<${Note}>${format.sentence(`The recordings could not be listed: ${error}`)}
+  if (error) return html`<${Note}>${format.sentence(`The recordings could not be listed: ${error.message}`)}
       ${" "}<button type="button" class="text-button" onClick=${onAgain}>Try again</button></${Note}>`;
   if (list === null) return html`<${Note}>Looking for recordings …</${Note}>`;
   if (list.length === 0 && !motion) {
@@ -191,16 +189,6 @@ function Size({ person, send }) {
 function Note({ children, role }) {
   return html`<div class="dock-row"><span class="dock-label">Recording</span>
     <p class="dock-note" data-role=${role}>${children}</p></div>`;
-}
-
-/** The stored recordings; null until they are known. */
-function useMotions() {
-  const [found, setFound] = useState({ list: null, error: null });
-  const [ask] = useState(() => inTurn(() => get("v1/recordings").then(
-    (answer) => setFound({ list: answer.items, error: null }),
-    (problem) => setFound({ list: null, error: problem.message }))));
-  useEffect(() => void ask.run(), [ask]);
-  return { ...found, refresh: ask.run };
 }
 
 /** Calls `act(name, value)` at most every SEND_MS, and with each name's last value in the end. */

@@ -12,8 +12,11 @@ const SPEEDS = [["", "Variable"], ["0.25", "0.25 m/s"], ["0.5", "0.5 m/s"], ["1"
   ["1.6", "1.6 m/s"]];
 
 /** A person leaves; the second click of a double one would remove the next person. */
-export function removePerson({ detail }, person, send) {
-  if (detail < 2) send({ tag: "remove-person", person });
+export function RemovePerson({ person, name, send }) {
+  return html`<button type="button" class="tool" data-action="remove-person" aria-label=${`Remove ${name}`}
+    title=${`${name} leaves the cell`}
+    onClick=${({ detail }) => detail < 2 && send({ tag: "remove-person", person })}>
+    <${Icon} name="close" /><span>Remove</span></button>`;
 }
 
 export function PedestrianControls({ person, name, world, send }) {
@@ -32,9 +35,7 @@ export function PedestrianControls({ person, name, world, send }) {
         ${!known && html`<option value=${String(speed)}>${speed} m/s</option>`}
       </select></label>
     <div class="transport" role="group" aria-label=${`${name} in the cell`}>
-      <button type="button" class="tool" data-action="remove-person" aria-label=${`Remove ${name}`}
-        title=${`${name} leaves the cell`} onClick=${(event) => removePerson(event, id, send)}>
-        <${Icon} name="close" /><span>Remove</span></button>
+      <${RemovePerson} person=${id} name=${name} send=${send} />
     </div>
   </div>`;
 }

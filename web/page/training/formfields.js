@@ -79,7 +79,7 @@ export function useLoaded(link, load, cause = null) {
   return state;
 }
 
-/** The answer of a route, asked for again whenever one of `causes` has changed. */
+/** The answer of a route, asked for again by `refresh` and whenever one of `causes` has changed. */
 export function useAnswer(path, ...causes) {
   const [state, setState] = useState({ answer: null, error: null });
   const { ask, stop } = useMemo(() => {
@@ -91,7 +91,7 @@ export function useAnswer(path, ...causes) {
   }, [path]);
   useEffect(() => () => stop.abort(), [stop]);
   useEffect(() => void ask.run(), [ask, ...causes]);
-  return state;
+  return { ...state, refresh: ask.run };
 }
 
 /** What a form shows while its choices are loaded, or could not be. */
