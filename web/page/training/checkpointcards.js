@@ -5,7 +5,7 @@ import { inTurn, postFile, put, remove } from "../api.js";
 import * as format from "../format.js";
 import { Alert, Icon } from "../icons.js";
 import { answers } from "../live/world-stream.js";
-import { Facts, FieldName, fieldValue, presetTitle } from "./fieldnames.js";
+import { dotted, Facts, FieldName, fieldValue, presetTitle } from "./fieldnames.js";
 import { PURPOSES, protocolTitle } from "./formfields.js";
 import { useListFocus } from "./listfocus.js";
 import { measuresOf } from "./measures.js";
@@ -162,41 +162,40 @@ function Delete({ one, onChanged }) {
 
 /** Manifest and tensors, chosen together, as one body: the manifest's line, then the tensors. */
 function Upload({ onDone }) {
-  const [answer, setAnswer] = useState({});
-  const send = async (event) => {
+  const [stored, setStored] = useState(null);
+  const { busy, error, run } = useAction((made) => {
+    setStored(made);
+    onDone(made);
+  });
+  const send = (event) => {
     const files = [...event.target.files];
     event.target.value = "";
-    const manifest = files.find((file) => file.name.endsWith(".json"));
-    const tensors = files.find((file) => file.name.endsWith(".safetensors"));
-    if (!manifest || !tensors || files.length !== 2) {
-      setAnswer({ error: "Choose two files: the manifest (.json) and the tensors (.safetensors)." });
-      return;
-    }
-    setAnswer({ busy: true });
-    try {
+    setStored(null);
+    run(async () => {
+      const manifest = files.find((file) => file.name.endsWith(".json"));
+      const tensors = files.find((file) => file.name.endsWith(".safetensors"));
+      if (!manifest || !tensors || files.length !== 2) {
+        throw new Error("Choose two files: the manifest (.json) and the tensors (.safetensors).");
+      }
       // Line ends stand between members only; the text of the numbers is part of the id.
       const line = (await manifest.text()).replace(/[\r\n]+/g, " ");
-      const stored = await postFile("v1/checkpoints", new Blob([line, "\n", tensors]));
-      setAnswer({ stored });
-      onDone(stored);
-    } catch (problem) {
-      setAnswer({ error: problem.message });
-    }
+      return postFile("v1/checkpoints", new Blob([line, "\n", tensors]));
+    });
   };
   return html`<div class="job-actions upload">
     <label class="tool" title="The manifest (.json) and the tensors (.safetensors), at most 16 MiB">
       <input class="sr" type="file" multiple accept=".json,.safetensors" data-role="checkpoint-files"
-        disabled=${Boolean(answer.busy)} onChange=${send} />
-      <${Icon} name="plus" />${answer.busy ? "Checking …" : "Upload"}</label>
-    ${answer.stored && html`<span class="faint" role="status">Stored ${format.short(answer.stored.sha256)}.</span>`}
-    ${answer.error && html`<span class="field-error" role="alert">${format.sentence(answer.error)}</span>`}</div>`;
+        disabled=${busy} onChange=${send} />
+      <${Icon} name="plus" />${busy ? "Checking …" : "Upload"}</label>
+    ${stored && html`<span class="faint" role="status">Stored ${format.short(stored.sha256)}.</span>`}
+    <${Fault} error=${error} /></div>`;
 }
 
 /** Facts, preset fields and evaluations of two checkpoints: those that differ. */
 function Comparison({ pair, jobs, presets, onClose }) {
   const columns = pair.map((one) => ({
     Purpose: PURPOSES[one.purpose] ?? one.purpose, ...facts(one),
-    ...flat({ ...one.manifest.preset, name: undefined, cell: undefined }), ...latestRates(one, jobs),
+    ...shownFields({ ...one.manifest.preset, name: undefined, cell: undefined }), ...latestRates(one, jobs),
   }));
   const names = [...new Set(columns.flatMap(Object.keys))]
     .filter((name) => columns[0][name] !== columns[1][name]);
@@ -210,12 +209,8 @@ function Comparison({ pair, jobs, presets, onClose }) {
       </button></div></div>`;
 }
 
-function flat(value, prefix = "") {
-  return Object.fromEntries(Object.entries(value).flatMap(([key, one]) => {
-    const name = prefix ? `${prefix}.${key}` : key;
-    return one !== null && typeof one === "object" && !Array.isArray(one)
-      ? Object.entries(flat(one, name)) : [[name, fieldValue(one)]];
-  }));
+function shownFields(preset) {
+  return Object.fromEntries(dotted(preset).map(([name, v]) => [name, fieldValue(v)]));
 }
 
 function latestRates(one, jobs) {

@@ -45,6 +45,13 @@ export function Facts({ entries }) {
     <div key=${hint ?? name}><dt title=${hint}>${name}</dt><dd>${text}</dd></div>`)}</dl>`;
 }
 
+/** Nested fields as pairs of a dotted name and a value. */
+export function dotted(fields, prefix = "") {
+  return Object.entries(fields ?? {}).flatMap(([key, value]) =>
+    (value && typeof value === "object" && !Array.isArray(value)
+      ? dotted(value, `${prefix}${key}.`) : [[`${prefix}${key}`, value]]));
+}
+
 /** A field's value; numbers with all their digits. */
 export function fieldValue(v) {
   return v === null || v === undefined ? "–" : format.grouped(v);

@@ -1,9 +1,10 @@
-// What can be done with a job: cancel, resume, retry, clone, delete, name, notes, priority.
+// What every open job shows, and what can be done with it: cancel, resume, retry, clone, delete, name, notes,
+// priority.
 import { html } from "../vendor/htm-preact-standalone.module.js";
 import { Ask, Fault, useAction } from "../action.js";
 import { patch, post, remove } from "../api.js";
 import * as format from "../format.js";
-import { Icon } from "../icons.js";
+import { Alert, Icon } from "../icons.js";
 import { BUDGETS, budgetBody, budgetTexts } from "./budgets.js";
 import { parsed, useForm } from "./formfields.js";
 
@@ -13,15 +14,30 @@ const LABELS = [
   { name: "priority", default: 0, help: "Waiting jobs of a higher priority start first",
     minimum: -100, maximum: 100 },
 ];
-const COMPOSITE_KINDS = new Set(["sweep", "report"]); // resumed from their parts
+const COMPOSITE_KINDS = new Set(["sweep", "report"]); // made of jobs: no worker, resumed from their parts
 const REPEATABLE = new Set(["failed", "cancelled"]);
 
 export function isActive(job) {
   return !FINAL.has(job.state);
 }
 
+/** Its fault, the children, its notes, `actions` beside those of any job, and its labels. */
+export function JobFrame({ job, error, actions, children, onChanged, onOpen, onClone }) {
+  const fault = job.error ?? error?.message;
+  return html`<div class="job-detail">
+    ${fault && html`<${Alert}>${format.sentence(fault)}</${Alert}>`}
+    ${children}
+    ${job.notes && html`<p class="notes" data-role="notes">${job.notes}</p>`}
+    <div class="job-actions">${actions}
+      ${!COMPOSITE_KINDS.has(job.kind) && html`<a class="tool" data-action="log" target="_blank" rel="noopener"
+        href=${`v1/jobs/${job.id}/log`}>Output</a>`}
+      <${JobActions} ...${{ job, onChanged, onOpen, onClone }} /></div>
+    <${Labels} job=${job} onChanged=${onChanged} />
+  </div>`;
+}
+
 /** Buttons of a job; `onOpen` shows a job, `onClone` opens the form with its values. */
-export function JobActions({ job, onChanged, onOpen, onClone }) {
+function JobActions({ job, onChanged, onOpen, onClone }) {
   const again = useAction((made) => {
     onChanged();
     onOpen(made.id);
@@ -67,7 +83,7 @@ function Delete({ job, onDone }) {
 }
 
 /** Name, priority, budgets and notes of a job, changed together. */
-export function Labels({ job, onChanged }) {
+function Labels({ job, onChanged }) {
   const shown = { name: job.name ?? "", notes: job.notes ?? "", priority: String(job.priority),
     ...budgetTexts(job) };
   const fields = job.kind === "train" && job.state !== "succeeded" ? [...LABELS, ...BUDGETS] : LABELS;

@@ -1,16 +1,16 @@
 // Jobs: the list, and for the open one its learning curves, numbers and what can be done.
 import { html, useCallback, useEffect, useRef, useState } from "../vendor/htm-preact-standalone.module.js";
+import { Fault, useAction } from "../action.js";
 import { follow, get, inTurn } from "../api.js";
 import { answers } from "../live/world-stream.js";
 import * as format from "../format.js";
 import { Alert, Icon } from "../icons.js";
 import { CurvePlot } from "../plots.js";
 import { EndedByBudget } from "./budgets.js";
-import { Facts, fieldOf, fieldValue, presetTitle } from "./fieldnames.js";
+import { dotted, Facts, fieldOf, fieldValue, presetTitle } from "./fieldnames.js";
 import { MAX_JOBS } from "./compare.js";
 import { protocolTitle } from "./formfields.js";
-import { isActive } from "./jobactions.js";
-import { JobFrame } from "./jobframe.js";
+import { isActive, JobFrame } from "./jobactions.js";
 import { measuresOf } from "./measures.js";
 import { Follow } from "./follow.js";
 import { ReportDetail } from "./report.js";
@@ -252,25 +252,20 @@ function JobDetail({ job, presets, onChanged, onOpen, onClone, onAct, acting }) 
 /** Lets the job's newest checkpoint act: which one that is, the server says at the click. */
 function Act({ job, newest, acting, onAct }) {
   const [loaded, setLoaded] = useState(null);
-  const [error, setError] = useState(null);
-  const act = async () => {
-    try {
-      const { items } = await get(`v1/checkpoints?job_id=${job.id}&limit=1`);
-      if (items.length === 0) throw new Error("its checkpoints are gone");
-      await onAct(items[0]);
-      setLoaded(items[0]);
-      setError(null);
-    } catch (problem) {
-      setError(problem);
-    }
-  };
+  const { error, run } = useAction(setLoaded);
+  const act = () => run(async () => {
+    const { items } = await get(`v1/checkpoints?job_id=${job.id}&limit=1`);
+    if (items.length === 0) throw new Error("its checkpoints are gone");
+    await onAct(items[0]);
+    return items[0];
+  });
   const acts = loaded && acting.includes(loaded.sha256);
   return html`<button type="button" class="tool" data-action="act"
       disabled=${acting.includes(newest) && !isActive(job)} onClick=${act}>
       ${acts && isActive(job) ? "Load its newest checkpoint" : "Deploy to cell"}</button>
     ${acts && html`<span class="faint" role="status" data-role="acts">Deployed,
       with ${format.count(loaded.step, "step")}.</span>`}
-    ${error && html`<span class="field-error" role="alert">${format.sentence(error.message)}</span>`}`;
+    <${Fault} error=${error} />`;
 }
 
 /** A rate of a point, with its interval where it is known of how many episodes. */
@@ -304,9 +299,7 @@ function Legend({ lines, row, show }) {
 }
 
 function Speed({ job, row, presets }) {
-  const changed = Object.entries(job.overrides ?? {}).flatMap(([group, value]) =>
-    typeof value === "object" && value !== null
-      ? Object.entries(value).map(([name, v]) => [`${group}.${name}`, v]) : [[group, value]]);
+  const changed = dotted(job.overrides);
   const shown = (name, v) => {
     const { title, unit } = fieldOf(presets, name, job.preset);
     return [title, [fieldValue(v), unit].filter(Boolean).join(" "), name];

@@ -2,8 +2,7 @@
 import { html } from "../vendor/htm-preact-standalone.module.js";
 import * as format from "../format.js";
 import { useAnswer } from "./formfields.js";
-import { isActive } from "./jobactions.js";
-import { JobFrame } from "./jobframe.js";
+import { isActive, JobFrame } from "./jobactions.js";
 
 export function ReportDetail({ job, ...rest }) {
   // The evaluations, oldest first, asked for again whenever the list of jobs was.

@@ -4,8 +4,7 @@ import * as format from "../format.js";
 import { axis, Plot, useTheme } from "../plots.js";
 import { FieldName, fieldValue } from "./fieldnames.js";
 import { useAnswer } from "./formfields.js";
-import { isActive } from "./jobactions.js";
-import { JobFrame } from "./jobframe.js";
+import { isActive, JobFrame } from "./jobactions.js";
 
 const LABELS = { success: "success", collision: "collision", timeout: "timeout" };
 

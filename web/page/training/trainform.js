@@ -4,7 +4,7 @@ import { post } from "../api.js";
 import { count, grouped } from "../format.js";
 import { Alert, Icon } from "../icons.js";
 import { BUDGETS, budgetBody, budgetTexts } from "./budgets.js";
-import { byGroup, presetFor, shownCell } from "./fieldnames.js";
+import { byGroup, dotted, presetFor, shownCell } from "./fieldnames.js";
 import { changed, Loading, OWN, parsed, presetField, StartForm, useForm } from "./formfields.js";
 
 const FIRST_FIELDS = ["cell", "learning.total_steps", "learning.n_envs", "learning.lr_start"];
@@ -75,10 +75,7 @@ function overrides(preset, texts) {
 
 /** A job's overrides as the texts of the form's fields, by dotted name. */
 function texts(overrides) {
-  return Object.fromEntries(Object.entries(overrides ?? {}).flatMap(([group, value]) =>
-    value && typeof value === "object" && !Array.isArray(value)
-      ? Object.entries(value).map(([name, v]) => [`${group}.${name}`, grouped(v)])
-      : [[group, grouped(value)]]));
+  return Object.fromEntries(dotted(overrides).map(([name, v]) => [name, grouped(v)]));
 }
 
 /** The merge patch that makes `wanted` of the overrides `now`: null removes a member. */
