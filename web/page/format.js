@@ -8,12 +8,12 @@ const DAY_S = 24 * 3600;
 
 /** A finite number; null for anything else. */
 export function finite(v) {
-  return typeof v === "number" && Number.isFinite(v) ? v : null;
+  return Number.isFinite(v) ? v : null;
 }
 
 /** A critic's value with two decimals and a true minus sign. */
 export function value(v) {
-  if (v === null || v === undefined || !Number.isFinite(v)) return "–";
+  if (!Number.isFinite(v)) return "–";
   const text = Math.abs(v).toFixed(2);
   return v < 0 && Number(text) !== 0 ? MINUS + text : text;
 }
@@ -23,7 +23,7 @@ export function value(v) {
  * `length_text` in app/live/status_messages.py.
  */
 export function length(metres) {
-  if (metres === null || metres === undefined || !Number.isFinite(metres)) return "–";
+  if (!Number.isFinite(metres)) return "–";
   const mm = Math.round(metres * 1000);
   if (mm >= 10) return `${metres.toFixed(2)}${NB}m`;
   if (mm > 0) return `${mm}${NB}mm`;
@@ -50,7 +50,7 @@ export function count(n, one, many = `${one}s`) {
 
 /** A rate in [0, 1] as percent. */
 export function percent(rate, digits = 1) {
-  if (rate === null || rate === undefined || !Number.isFinite(rate)) return "–";
+  if (!Number.isFinite(rate)) return "–";
   return `${(rate * 100).toFixed(digits)}${NB}%`;
 }
 
@@ -76,7 +76,7 @@ export function size(bytes) {
 
 /** A time span in seconds: 8 s, 2 min 10 s, 1 h 05 min. */
 export function duration(seconds) {
-  if (seconds === null || seconds === undefined || !Number.isFinite(seconds)) return "–";
+  if (!Number.isFinite(seconds)) return "–";
   const s = Math.max(0, Math.round(seconds));
   if (s < 60) return `${s}${NB}s`;
   if (s < 3600) return `${Math.floor(s / 60)}${NB}min ${pad(s % 60)}${NB}s`;
@@ -98,8 +98,7 @@ export function ago(iso, now = serverTime()) {
 
 /** A plain number with at most `digits` significant digits; whole ones in groups from 10 000 on. */
 export function number(v, digits = 3) {
-  return typeof v === "number" && Number.isFinite(v)
-    ? grouped(Number(v.toPrecision(digits))) : String(v ?? "–");
+  return Number.isFinite(v) ? grouped(Number(v.toPrecision(digits))) : String(v ?? "–");
 }
 
 /** A number with its unit. */
