@@ -10,12 +10,13 @@ from app.live.people.workers import LiveWorkers, place_of
 from app.live.pick.world import LivePickWorld
 from app.live.playback import PlayedMotion, Recording
 from app.live.snapshot import PersonSnapshot, WorldSnapshot
-from app.sim.cells.cell import Cell, load_cell
+from app.sim.cells.cell import Cell
 from app.sim.collision.contact import clearance
 from app.sim.human import model as human
 from app.sim.human.anthropometry import percentile_body
 from app.sim.human.kernels.kinematics import PELVIS_Z, capsule_columns
 from app.sim.scene.scene import NO_CYLINDERS, arm_of, people_of
+from tests.live.pick.pick_scenes import run
 from tests.sim.recorded_motion import recorded
 from tests.support.straight_policy import StraightPolicy
 
@@ -23,19 +24,8 @@ DT = 0.05
 
 
 @pytest.fixture
-def cell() -> Cell:
-    return load_cell()
-
-
-@pytest.fixture
 def world(cell: Cell) -> LivePickWorld:
     return LivePickWorld(cell, StraightPolicy(cell), seed=3)
-
-
-def run(world: LivePickWorld, ticks: int) -> WorldSnapshot:
-    for _ in range(ticks):
-        world.step()
-    return world.snapshot()
 
 
 def play(world: LivePickWorld, person: int = 0, **how: float) -> WorldSnapshot:

@@ -6,14 +6,9 @@ import pytest
 from app.live.command_checks import Command
 from app.live.commands import SetCandidates, SetMode, StartCase
 from app.live.pick.world import LivePickWorld
-from app.sim.cells.cell import Cell, load_cell
+from app.sim.cells.cell import Cell
 from tests.live.pick.pick_scenes import until
 from tests.support.straight_policy import StraightPolicy
-
-
-@pytest.fixture
-def cell() -> Cell:
-    return load_cell()
 
 
 @pytest.fixture

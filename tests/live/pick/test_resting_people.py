@@ -8,16 +8,11 @@ import pytest
 
 from app.live import commands
 from app.live.pick.world import LivePickWorld
-from app.sim.cells.cell import Cell, load_cell
+from app.sim.cells.cell import Cell
 from app.sim.core.arrays import Vec
 from app.sim.pick.task_policy import Decision
 from app.sim.robot.actions import ActionSettings
 from tests.support.straight_policy import StraightPolicy
-
-
-@pytest.fixture
-def cell() -> Cell:
-    return load_cell()
 
 
 def run(world: LivePickWorld, ticks: int) -> Vec:

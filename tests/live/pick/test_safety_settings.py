@@ -1,8 +1,8 @@
 from app.live import commands
 from app.live.pick.world import LivePickWorld
-from tests.live.pick.test_world import cell, run, world
+from tests.live.pick.test_world import run, world
 
-__all__ = ["cell", "world"]
+__all__ = ["world"]
 
 
 def test_layer_starts_with_the_settings_of_the_cell_and_takes_others(

@@ -7,17 +7,12 @@ from app.live import commands
 from app.live.command_checks import Command
 from app.live.pick.world import LivePickWorld
 from app.live.snapshot import PICK_PHASES, WorldSnapshot
-from app.sim.cells.cell import Cell, load_cell
+from app.sim.cells.cell import Cell
 from app.sim.human import model as human
 from app.sim.human.person import Person
 from app.sim.pick.task_policy import Candidate, PickProgress
 from tests.live.pick.pick_scenes import run, until
 from tests.support.straight_policy import StraightPolicy
-
-
-@pytest.fixture
-def cell() -> Cell:
-    return load_cell()
 
 
 @pytest.fixture
