@@ -98,8 +98,6 @@ def check(command: Command, cell: Cell, people: Sequence[int]) -> None:
             _require("id", command.id, tests, "is no sorting test that fits this cell")
         case AddBlock() | MoveBlock() | SetGoal():
             _check_table_words(command, cell)
-        case _:
-            pass
 
 
 def check_state(command: Command, cell: Cell, snapshot: WorldSnapshot) -> None:

@@ -89,8 +89,6 @@ class LivePickWorld(BaseWorld[LiveWorkers]):
                     self._reset()
             case commands.StartCase():
                 self._start_case(find_case(command.id))
-            case _:
-                pass
 
     def _start_case(self, case: Case) -> None:
         self._case, self.paused = case, False

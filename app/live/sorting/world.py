@@ -106,8 +106,6 @@ class LiveSortingWorld(BaseWorld[LiveWorkers]):
                 self._replan()
             case _ if isinstance(command, TableCommand):
                 self._change_table(command)
-            case _:
-                pass
 
     def _change_table(self, command: TableCommand) -> None:
         try:
