@@ -7,11 +7,17 @@ import numpy as np
 from pydantic import Field
 
 from app.api.schemas.examples import MOTION, shows
-from app.api.schemas.numbers import Answer, Body, Data, Vector3, Vector6
+from app.api.schemas.numbers import Answer, Body, Data, Vector3, Vector6, Word
 from app.api.schemas.people import PersonInput, PersonUse
 from app.api.schemas.robot_state import ROS_NAMES, ArmState
 from app.api.schemas.separation import Override, SafetyInput
-from app.api.schemas.task_selection import FRAME_TEXT, FrameName, OutOfRangeInput, Stamp
+from app.api.schemas.task_selection import (
+    FRAME_TEXT,
+    FrameName,
+    OutOfRangeInput,
+    Stamp,
+    TimeLeft,
+)
 from app.sim.core.arrays import Vec
 from app.sim.human.person import Person
 from app.sim.perception.multi_person_tracker import MAX_SKELETONS
@@ -61,7 +67,7 @@ class MotionRequest(Body):
         "of predicted motion, and replaced where that ends in a contact; null: where the "
         "policy supports it",
     )
-    time_left_s: Annotated[float, Field(ge=-1e9, le=1e9)] = Field(
+    time_left_s: TimeLeft = Field(
         5.0,
         description="time left to reach the goal [s]; clamped to 0 to 5 for the policy; up to "
         "4, alternatives are simulated as with `elapsed_s` from 1 on",
@@ -81,11 +87,8 @@ class MotionRequest(Body):
         description="age of the observations beyond `tracker_delay` [s]; the age of a "
         "tracker's observation is added",
     )
-    checkpoint: str | None = Field(
-        None,
-        min_length=1,
-        max_length=64,
-        description="SHA-256 or alias; the shipped policy if null",
+    checkpoint: Word | None = Field(
+        None, description="SHA-256 or alias; the shipped policy if null"
     )
 
     def to_domain(
@@ -146,13 +149,7 @@ class SegmentPublic(Answer):
         parts = [q, qd, segment.c]
         if segment.d.any():
             parts.append(segment.d)
-        return {
-            "coefficients": np.array(parts).T.tolist(),
-            "until": dt,
-            "q": segment.q.tolist(),
-            "qd": segment.qd.tolist(),
-            "qdd": segment.qdd.tolist(),
-        }
+        return SegmentPublic._data(np.array(parts).T, dt, segment)
 
     @staticmethod
     def executed(safe: SafetyDecision, query: MotionQuery, dt: float) -> Data:
@@ -161,12 +158,16 @@ class SegmentPublic(Answer):
         used = np.flatnonzero(powers.any(axis=0))
         n = max(3, int(used[-1]) + 1 if used.size else 0)
         until = dt if safe.path_deceleration * dt <= 1.0 else 1.0 / safe.path_deceleration
+        return SegmentPublic._data(powers[:, :n], until, safe)
+
+    @staticmethod
+    def _data(powers: Vec, until: float, end: TrajectorySegment | SafetyDecision) -> Data:
         return {
-            "coefficients": powers[:, :n].tolist(),
+            "coefficients": powers.tolist(),
             "until": until,
-            "q": safe.q.tolist(),
-            "qd": safe.qd.tolist(),
-            "qdd": safe.qdd.tolist(),
+            "q": end.q.tolist(),
+            "qd": end.qd.tolist(),
+            "qdd": end.qdd.tolist(),
         }
 
 
@@ -263,11 +264,8 @@ class MotionAnswer(Answer):
         stamp: Stamp,
     ) -> Data:
         """Return the data of the answer of a decision."""
-        segment, safe = (
-            SegmentPublic.commanded(decision.segment, query.q, query.qd, dt),
-            decision.safe,
-        )
-        commanded = segment
+        segment = SegmentPublic.commanded(decision.segment, query.q, query.qd, dt)
+        commanded, safe = segment, decision.safe
         if safe is not None and safe.override < 1.0:
             segment = SegmentPublic.executed(safe, query, dt)
         to_people, to_cell, to_itself = decision.clearance

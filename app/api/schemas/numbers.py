@@ -9,6 +9,8 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Time = Annotated[float, Field(ge=-1e10, le=1e10)]
 """Time on a clock of the caller [s], from any origin."""
+Word = Annotated[str, Field(min_length=1, max_length=64)]
+"""A name in a request: of a colour or place, or SHA-256 or alias of a checkpoint."""
 Vector3 = Annotated[list[Finite], Field(min_length=3, max_length=3)]
 Vector6 = Annotated[list[Finite], Field(min_length=6, max_length=6)]
 Vector18 = Annotated[list[Finite], Field(min_length=18, max_length=18)]

@@ -1,22 +1,26 @@
 """``POST /v1/plan``: sorting task, robot and people in; next move and motion out."""
 
 from collections.abc import Sequence
-from typing import Annotated, Literal, Self
+from typing import Annotated, Self
 
 from pydantic import Field
 
 from app.api.schemas.examples import PLAN, shows
 from app.api.schemas.motion import SegmentPublic
-from app.api.schemas.numbers import Answer, Data, Vector3
+from app.api.schemas.numbers import Answer, Data, Vector3, Word
 from app.api.schemas.people import PersonInput, PersonUse
 from app.api.schemas.robot_state import ArmState
-from app.api.schemas.sorting import SortingFields, SortingMove, Word, move_of
+from app.api.schemas.sorting import SortingFields, SortingMove, move_of
 from app.api.schemas.task_selection import (
     FRAME_TEXT,
+    ClosingTime,
     FrameName,
     Outcome,
     OutOfRangeInput,
+    Phase,
     Stamp,
+    TimeLeft,
+    progress_of,
 )
 from app.errors import InvalidInput
 from app.policies.inference.sorting_plan import (
@@ -32,7 +36,7 @@ from app.sim.core.arrays import Vec
 from app.sim.human.person import Person
 from app.sim.perception.multi_person_tracker import MAX_SKELETONS
 from app.sim.pick.kernels.grasp import LIFT
-from app.sim.pick.task_policy import Objective, PickProgress
+from app.sim.pick.task_policy import Objective
 from app.sim.sorting.names import SortingNames
 from app.sim.sorting.near_optimal_moves import MARGIN, MAX_MARGIN
 from app.sim.sorting.state import SortingState
@@ -60,13 +64,13 @@ class PlanRequest(SortingFields):
         description="station of the last answer's motion, for hysteresis: that of `pick`, or "
         "of `place` while an object is held; null: none",
     )
-    phase: Literal["approach", "descend", "lift"] = Field(
+    phase: Phase = Field(
         "approach", description="phase of the motion to `previous`, as in `/v1/task-selection`"
     )
-    closing_s: Annotated[float, Field(ge=0.0, le=60.0)] = Field(
+    closing_s: ClosingTime = Field(
         0.0, description="time for which the tool has been held there [s]"
     )
-    time_left_s: Annotated[float, Field(ge=-1e9, le=1e9)] = Field(
+    time_left_s: TimeLeft = Field(
         10.0, description="time left for the motion [s]; clamped to 0 to 60 for the policy"
     )
     objective: Objective = Field(
@@ -76,25 +80,25 @@ class PlanRequest(SortingFields):
         MARGIN,
         description="expected attempts by which a move may be worse than the planner's own",
     )
-    checkpoint: str | None = Field(
-        None,
-        min_length=1,
-        max_length=64,
-        description="SHA-256 or alias of a pick policy; the shipped policy if null",
+    checkpoint: Word | None = Field(
+        None, description="SHA-256 or alias of a pick policy; the shipped policy if null"
     )
 
     def to_domain(self, names: SortingNames, fail: Vec, people: Sequence[Person]) -> PlanQuery:
         """Return the query.
 
         Args:
-            names: Names of the task.
             fail: The cell's failure probabilities, shape (K,).
-            people: People that the policy may observe.
 
         Raises:
             InvalidInput: An impossible state, with the field.
         """
-        self._check_previous(names)
+        if self.previous not in names.stations and (
+            self.previous is not None or self.phase == "lift"
+        ):
+            lacking = self.previous is None
+            rule = "must be given in the phase lift" if lacking else "must be a station"
+            raise InvalidInput("previous", self.previous, rule, names.stations)
         state = self.state_of(names, fail)
         return PlanQuery(
             q=self.robot.joints(self.robot.q),
@@ -104,21 +108,11 @@ class PlanRequest(SortingFields):
             state=state,
             held=None if self.held is None else self._held(self.held, names, state),
             previous=self.previous,
-            progress=PickProgress(
-                phase=("approach", "descend", "lift").index(self.phase),
-                closing_s=self.closing_s,
-            ),
+            progress=progress_of(self.phase, self.closing_s),
             time_left_s=self.time_left_s,
             objective=self.objective,
             margin=self.margin,
         )
-
-    def _check_previous(self, names: SortingNames) -> None:
-        if self.previous in names.stations or (self.previous is None and self.phase != "lift"):
-            return
-        lacking = self.previous is None
-        rule = "must be given in the phase lift" if lacking else "must be a station"
-        raise InvalidInput("previous", self.previous, rule, names.stations)
 
     def _held(self, held: str, names: SortingNames, state: SortingState) -> int:
         """Return the position at which the held object counts."""
@@ -223,8 +217,6 @@ class PlanAnswer(Answer):
 
         Args:
             plan: The plan; its decision counts people as the request does.
-            names: Names of the task.
-            people: Use of each person.
         """
         chosen, decision, segment = plan.chosen, plan.decision, plan.segment
 

@@ -130,7 +130,6 @@ class RiskMapAnswer(Answer):
 
         Args:
             reached: Whether the hand reaches each position, shape (m,).
-            people: Use of each person.
             decision: Decision at the given positions.
         """
         grid = request.grid.to_domain()

@@ -8,12 +8,12 @@ import numpy as np
 from pydantic import BeforeValidator, Field
 
 from app.api.schemas.examples import SORTING, shows
-from app.api.schemas.numbers import Answer, Body, Finite
+from app.api.schemas.numbers import Answer, Body, Finite, Word
 from app.api.schemas.task_selection import Stamp
 from app.errors import InvalidInput
 from app.sim.core.arrays import Vec
 from app.sim.sorting.batch import SortingSettings
-from app.sim.sorting.decision_types import REASONS, By, RankedMove, SortingDecision, Why
+from app.sim.sorting.decision_types import REASONS, By, SortingDecision, Why
 from app.sim.sorting.names import NamedObject, SortingNames, fail_with, state_from_names
 from app.sim.sorting.progress_monitor import MAX_SEEN, FallbackReason, ProgressMonitor
 from app.sim.sorting.sorting_values import SortingValues
@@ -28,7 +28,6 @@ from app.sim.sorting.state import (
     SortingState,
 )
 
-Word = Annotated[str, Field(min_length=1, max_length=64)]
 Name = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_-]{0,31}$")]
 Key = Annotated[str, Field(pattern=r"^[0-9a-f]{16}$")]
 
@@ -61,10 +60,6 @@ class SortingObject(Body):
     )
     id: Word | None = Field(None, description="your name for it; returned with the move")
 
-    def to_domain(self) -> NamedObject:
-        """Return the simulator's data."""
-        return NamedObject(**dict(self))
-
 
 class GoalObject(Body):
     """An object of a goal tower."""
@@ -73,12 +68,12 @@ class GoalObject(Body):
     colour: Word | None = Field(None, description="colour; the tower's own if null")
 
 
-def _from_size(value: object) -> object:
-    return {"size": value} if isinstance(value, str) else value
-
-
 GoalEntry = Annotated[
-    GoalObject, BeforeValidator(_from_size, json_schema_input_type=Word | GoalObject)
+    GoalObject,
+    BeforeValidator(
+        lambda value: {"size": value} if isinstance(value, str) else value,
+        json_schema_input_type=Word | GoalObject,
+    ),
 ]
 
 
@@ -132,7 +127,6 @@ class SortingFields(Body):
         """Return the state.
 
         Args:
-            names: Names of the task.
             fail: The cell's failure probabilities, shape (K,).
 
         Raises:
@@ -142,7 +136,7 @@ class SortingFields(Body):
             tower: [(one.colour, one.size) for one in wanted]
             for tower, wanted in self.goal.items()
         }
-        objects = [one.to_domain() for one in self.objects]
+        objects = [NamedObject(**dict(one)) for one in self.objects]
         return state_from_names(names, objects, goal, fail_with(names, fail, self.failure_map))
 
     @property
@@ -169,24 +163,18 @@ class SortingRequest(SortingFields):
         None, description="`monitor` of the last answer in the same task; null at its start"
     )
     decider: By = Field("policy", description="a policy, or the exact planner")
-    checkpoint: str | None = Field(
+    checkpoint: Word | None = Field(
         None,
-        min_length=1,
-        max_length=64,
         description="SHA-256 or alias of a sorting policy; if null the cell's shipped one, or "
         "the exact planner",
     )
     stamp: Stamp = Field(None, description="your time of the state; returned unchanged")
 
     def to_domain(self, names: SortingNames, fail: Vec) -> SortingState:
-        """Return the state.
-
-        Args:
-            names: Names of the task.
-            fail: The cell's failure probabilities, shape (K,).
+        """Return the state as :meth:`state_of`, for a decider that may have the checkpoint.
 
         Raises:
-            InvalidInput: An impossible state, with the field.
+            InvalidInput: A checkpoint is named for the planner, or the state is impossible.
         """
         if self.decider == "planner" and self.checkpoint is not None:
             rule = "must be null where the planner decides"
@@ -262,14 +250,19 @@ class SortingAnswer(Answer):
         outside: Sequence[OutsideTraining],
     ) -> Self:
         """Return the answer of a decision in a state."""
-        ids = request.ids
-        moves = [_valued(one, state, names, ids) for one in decision.ranked]
-        monitor = decision.monitor
+        ids, monitor = request.ids, decision.monitor
+
+        def shown(move: Move) -> SortingMove:
+            return move_of(move, state, names, ids)
+
         return cls.from_object(
             decision,
-            move=move_of(decision.move, state, names, ids) if decision.move else None,
+            move=shown(decision.move) if decision.move else None,
             because=REASONS[decision.why],
-            moves=moves,
+            moves=[
+                SortingValue(**dict(shown(one.move)), value=one.value, fewest=one.fewest)
+                for one in decision.ranked
+            ],
             outside=outside,
             monitor=None if monitor is None else SortingRecord.from_domain(monitor),
             stamp=request.stamp,
@@ -290,7 +283,6 @@ def outside_of(
     """Return the inputs outside the training range; none without a policy.
 
     Args:
-        names: Names of the task.
         own: The cell's failure probabilities, shape (K,).
     """
     if policy is None:
@@ -342,10 +334,3 @@ def _place(
         return SortingPlace(station=names.cells[position], level=None)
     height = int((state.towers[tower] != NULL).sum())
     return SortingPlace(station=names.towers[tower], level=height - 1 if top else height)
-
-
-def _valued(
-    one: RankedMove, state: SortingState, names: SortingNames, ids: Ids
-) -> SortingValue:
-    move = move_of(one.move, state, names, ids)
-    return SortingValue(**dict(move), value=one.value, fewest=one.fewest)

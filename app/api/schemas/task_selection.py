@@ -1,13 +1,13 @@
 """``POST /v1/task-selection``: state in, decision out."""
 
 from collections.abc import Sequence
-from typing import Annotated, Literal
+from typing import Annotated, Literal, get_args
 
 import numpy as np
-from pydantic import ConfigDict, Field
+from pydantic import Field
 
 from app.api.schemas.examples import TASK_SELECTION, shows
-from app.api.schemas.numbers import Answer, Body, Data, Finite, Vector3, Vector6
+from app.api.schemas.numbers import Answer, Body, Data, Finite, Vector3, Vector6, Word
 from app.api.schemas.people import PersonInput, PersonUse
 from app.api.schemas.people import PersonState as PersonState
 from app.api.schemas.robot_state import RobotState
@@ -15,12 +15,7 @@ from app.errors import InvalidInput
 from app.sim.core.arrays import Vec
 from app.sim.core.pick_depth import PICK_DEPTH_M
 from app.sim.perception.multi_person_tracker import MAX_SKELETONS
-from app.sim.pick.task_policy import (
-    Candidate,
-    Decision,
-    Objective,
-    PickProgress,
-)
+from app.sim.pick.task_policy import Candidate, Decision, Objective, PickProgress
 
 MAX_CANDIDATES = 1000
 FrameName = Literal["robot-base", "base_link"]
@@ -30,6 +25,9 @@ FRAME_TEXT = (
     "at z = 0; the pendant's `base` is turned by half a turn about z (x and y change sign)"
 )
 
+Phase = Literal["approach", "descend", "lift"]
+ClosingTime = Annotated[float, Field(ge=0.0, le=60.0)]
+TimeLeft = Annotated[float, Field(ge=-1e9, le=1e9)]
 Stamp = int | Finite | Annotated[str, Field(max_length=64)] | None
 """Returned unchanged: a float would round nanoseconds since 1970."""
 
@@ -69,15 +67,15 @@ class TaskSelectionRequest(Body):
         description="last chosen id, for hysteresis; one that is no candidate counts as none, "
         "and is refused in the phase `lift`; null: none",
     )
-    phase: Literal["approach", "descend", "lift"] = Field(
+    phase: Phase = Field(
         "approach",
         description="phase of the pick of `previous`: `approach` of the point over the object, "
         "`descend` to it and close the gripper, `lift` it; while it is lifted it stays chosen",
     )
-    closing_s: Annotated[float, Field(ge=0.0, le=60.0)] = Field(
+    closing_s: ClosingTime = Field(
         0.0, description="time for which the tool has been held at the object [s]"
     )
-    time_left_s: Annotated[float, Field(ge=-1e9, le=1e9)] = Field(
+    time_left_s: TimeLeft = Field(
         10.0, description="time left to reach the target [s]; clamped to 0 to 60 for the policy"
     )
     objective: Objective = Field(
@@ -85,11 +83,8 @@ class TaskSelectionRequest(Body):
         description="the choice maximises the critic's `value` with hysteresis, as in the "
         "thesis, or the probability of `success`, or minimises the expected `time` per success",
     )
-    checkpoint: str | None = Field(
-        None,
-        min_length=1,
-        max_length=64,
-        description="SHA-256 or alias; the shipped policy if null",
+    checkpoint: Word | None = Field(
+        None, description="SHA-256 or alias; the shipped policy if null"
     )
 
     def to_domain(self) -> tuple[Vec, Vec, tuple[Candidate, ...]]:
@@ -98,8 +93,14 @@ class TaskSelectionRequest(Body):
         Raises:
             InvalidInput: An id occurs twice, or the lifted candidate is missing.
         """
-        self._check_ids_are_unique()
-        self._check_lifted_is_offered()
+        ids = [one.id for one in self.candidates]
+        if len(set(ids)) < len(ids):
+            index = next(i for i, name in enumerate(ids) if ids.index(name) < i)
+            rule = "must be unique among the candidates"
+            raise InvalidInput(f"candidates[{index}].id", ids[index], rule)
+        if self.phase == "lift" and self.previous not in ids:
+            rule = "must be the id of a candidate in the phase lift"
+            raise InvalidInput("previous", self.previous, rule, ids)
         return (
             self.robot.joints(self.robot.q),
             self.robot.joints(self.robot.qd),
@@ -109,31 +110,16 @@ class TaskSelectionRequest(Body):
     @property
     def progress(self) -> PickProgress:
         """Progress of the pick of ``previous``."""
-        return PickProgress(
-            phase=("approach", "descend", "lift").index(self.phase), closing_s=self.closing_s
-        )
+        return progress_of(self.phase, self.closing_s)
 
-    def _check_lifted_is_offered(self) -> None:
-        ids = [one.id for one in self.candidates]
-        if self.phase == "lift" and self.previous not in ids:
-            rule = "must be the id of a candidate in the phase lift"
-            raise InvalidInput("previous", self.previous, rule, ids)
 
-    def _check_ids_are_unique(self) -> None:
-        if len({one.id for one in self.candidates}) == len(self.candidates):
-            return
-        seen: set[str] = set()
-        for index, candidate in enumerate(self.candidates):
-            if candidate.id in seen:
-                rule = "must be unique among the candidates"
-                raise InvalidInput(f"candidates[{index}].id", candidate.id, rule)
-            seen.add(candidate.id)
+def progress_of(phase: Phase, closing_s: float) -> PickProgress:
+    """Return the progress of a pick from its members in a request."""
+    return PickProgress(phase=get_args(Phase).index(phase), closing_s=closing_s)
 
 
 class OutOfRangeInput(Answer):
     """An input outside the training range, or a joint outside its limits."""
-
-    model_config = ConfigDict(frozen=True, from_attributes=True)
 
     field: str
     value: float
