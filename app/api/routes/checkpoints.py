@@ -10,7 +10,7 @@ from app.api.description import FILE_BODY, set_stored, stored_responses
 from app.api.registry import PolicyRegistry
 from app.api.schemas.checkpoints import CheckpointList, CheckpointPublic, Recalibration
 from app.api.services import Services, ServicesDep
-from app.errors import InvalidInput, NotFound
+from app.errors import InvalidInput
 from app.policies.checkpoints.checkpoint import (
     CHOOSING,
     REACHING,
@@ -47,7 +47,8 @@ def list_checkpoints(
     page = checkpoints.list_checkpoints(
         services.store, job_id=job_id, cursor=cursor, limit=limit
     )
-    return CheckpointList.from_domain(page)
+    items = [CheckpointPublic.from_domain(one) for one in page.items]
+    return CheckpointList(items=items, next_cursor=page.next_cursor)
 
 
 @router.post(
@@ -95,11 +96,7 @@ def _store(
 
 def _keep(found: Checkpoint, services: Services, response: Response) -> CheckpointPublic:
     """Store a checkpoint; set status and ``Location`` of the answer."""
-    try:
-        checkpoints.get_checkpoint(services.store, found.sha256)
-        new = False
-    except NotFound:
-        new = True
+    new = not checkpoints.stored_among(services.store, [found.sha256])
     record = services.checkpoints.put(to_store(found))
     set_stored(response, f"{router.prefix}/{record.sha256}", new=new)
     return CheckpointPublic.from_domain(record)

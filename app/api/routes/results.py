@@ -71,7 +71,8 @@ def list_all_evaluations(
     page = list_evaluations(
         services.store, protocol=protocol, checkpoint=sha256, cursor=cursor, limit=limit
     )
-    return EvaluationList.from_domain(page)
+    items = [EvaluationPublic.from_domain(job) for job in page.items]
+    return EvaluationList(items=items, next_cursor=page.next_cursor)
 
 
 @router.get("/jobs/{job_id}/trials", summary="The trials of a sweep")

@@ -14,7 +14,7 @@ from app.policies.checkpoints import pretrained
 from app.policies.checkpoints.checkpoint import purpose_of
 from app.policies.inference.recalibration import MIN_OUTCOMES, with_timeout
 from app.policies.networks.outcome import OUTCOMES
-from app.store.records import CheckpointRecord, Page
+from app.store.records import CheckpointRecord
 
 ROUNDING = 0.01
 """Excess over 1 of a sum of probabilities that is accepted."""
@@ -56,12 +56,6 @@ class CheckpointList(Answer):
 
     items: list[CheckpointPublic]
     next_cursor: str | None = Field(description="`cursor` of the next page")
-
-    @classmethod
-    def from_domain(cls, page: Page[CheckpointRecord]) -> Self:
-        """Return the schema of a page."""
-        items = [CheckpointPublic.from_domain(one) for one in page.items]
-        return cls(items=items, next_cursor=page.next_cursor)
 
 
 class ObservedOutcome(Body):

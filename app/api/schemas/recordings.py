@@ -102,8 +102,14 @@ class RecordingItem(Answer):
 
     @classmethod
     def from_domain(cls, record: StoredRecording) -> Self:
-        """Return the schema of a record."""
-        return cls.from_object(record, **_members(record))
+        """Return the schema of a record; its detail is needed for :class:`RecordingPublic`."""
+        return cls.from_object(
+            record,
+            frames=record.n_frames,
+            duration_s=record.duration,
+            **record.summary,
+            **(record.detail or {}),
+        )
 
 
 class RecordingPublic(RecordingItem):
@@ -112,23 +118,8 @@ class RecordingPublic(RecordingItem):
     clean_runs: list[RunPublic]
     artifacts: list[ArtifactPublic] = Field(description="the first 1000")
 
-    @classmethod
-    def from_domain(cls, record: StoredRecording) -> Self:
-        """Return the schema of a record with its detail."""
-        assert record.detail is not None
-        parts = {name: record.detail[name] for name in ("clean_runs", "artifacts")}
-        return cls.from_object(record, **_members(record), **parts)
-
 
 class RecordingList(Answer):
     """All recordings, by name."""
 
     items: list[RecordingItem]
-
-
-def _members(record: StoredRecording) -> dict[str, Any]:
-    return {
-        **record.summary,
-        "frames": record.n_frames,
-        "duration_s": record.duration,
-    }

@@ -6,7 +6,7 @@ from typing import Any, Self
 from pydantic import Field
 
 from app.api.schemas.numbers import Answer, Counts, Sparse
-from app.store.records import JobRecord, Page
+from app.store.records import JobRecord
 from jobs.comparison import JobComparison
 
 _OWN = ("protocol", "checkpoint", "seed", "episodes", "results", "cpu_seconds")
@@ -43,12 +43,6 @@ class EvaluationList(Answer):
 
     items: list[EvaluationPublic]
     next_cursor: str | None = Field(description="`cursor` of the next page")
-
-    @classmethod
-    def from_domain(cls, page: Page[JobRecord]) -> Self:
-        """Return the schema of a page."""
-        items = [EvaluationPublic.from_domain(job) for job in page.items]
-        return cls(items=items, next_cursor=page.next_cursor)
 
 
 class ComparedJob(Answer):
