@@ -5,6 +5,7 @@ observation and its age, with worst-case motion since. Key-points take some mill
 not processed on the event loop.
 """
 
+import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -18,7 +19,6 @@ from app.api.schemas.people import (
     KeypointsPerson,
     PersonInput,
     PersonState,
-    PersonUse,
     Source,
     Speeds,
     TrackedPerson,
@@ -35,6 +35,7 @@ from app.sim.perception.keypoints import keypoints_of
 from app.sim.perception.observed_people import (
     as_monitored,
     checked_person,
+    degradations,
     nearest_index,
     person_anywhere,
     person_from_cylinder,
@@ -68,18 +69,31 @@ class KnownPerson(NamedTuple):
     """Estimate from key-points; None without key-points."""
 
     def use(self, used: bool, dropped: bool = False) -> Data:
-        """Return the data of the answer's member about this person.
+        """Return the data of a :class:`PersonUse`.
 
         Args:
-            used: Whether the policy uses this person.
+            used: Whether this person is the nearest of those that the policy observes.
             dropped: Whether this person is left out because the request has too many.
         """
-        use = PersonUse.data_of(
-            self.source, used, self.speeds, self.person, self.observed, self.estimate
-        )
-        if dropped:
-            use["flags"].append("dropped")
-        return use
+        person, observed, estimate = self.person, self.observed, self.estimate
+        return {
+            "by": self.source,
+            "used": used,
+            "as_cylinder": person is not None and person.cylinder is not None,
+            "monitored_as_cylinder": observed is not None and observed.cylinder is not None,
+            "speeds": self.speeds,
+            "flags": [
+                *(() if estimate is None else estimate.flags),
+                *(() if person is None else degradations(person)),
+                *(("dropped",) if dropped else ()),
+            ],
+            **{
+                name: [] if estimate is None else list(getattr(estimate, name))
+                for name in ("held", "missing", "outliers", "unusable")
+            },
+            "implausible": None if estimate is None else estimate.implausible,
+            "age_s": estimate.age_s if estimate and math.isfinite(estimate.age_s) else None,
+        }
 
 
 def known_people(
@@ -134,7 +148,6 @@ def people_for_policy(
     """Return the people of a request that a policy may observe.
 
     Args:
-        trackers: Open trackers.
         q: The robot's joint positions [rad], shape (6,).
 
     Raises:

@@ -6,7 +6,6 @@ cylinder) or ``tracker`` (a track of ``/v1/trackers``).
 Source: docs/method.md 2.8.
 """
 
-import math
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
@@ -14,7 +13,7 @@ import numpy as np
 from pydantic import BeforeValidator, Discriminator, Field, Tag
 from pydantic_core import PydanticCustomError
 
-from app.api.schemas.numbers import Answer, Body, Data, Finite, Time, Vector18
+from app.api.schemas.numbers import Answer, Body, Finite, Time, Vector18
 from app.errors import InvalidInput
 from app.sim.cells.cell import Cell
 from app.sim.core.arrays import Vec
@@ -23,8 +22,7 @@ from app.sim.human.anthropometry import NAMES, PERCENTILES, percentile_body
 from app.sim.human.kernels.kinematics import N_SIZE
 from app.sim.human.person import Person
 from app.sim.perception.keypoints import BODY_25, FARTHEST_M, N_KEYPOINTS
-from app.sim.perception.observed_people import FASTEST, MOST_REMEMBERED, degradations
-from app.sim.perception.person_estimator import PersonEstimate
+from app.sim.perception.observed_people import FASTEST, MOST_REMEMBERED
 
 Source = Literal["joint-angles", "keypoints", "cylinder", "tracker"]
 Speeds = Literal["given", "zero", "estimated"]
@@ -281,40 +279,3 @@ class PersonUse(Answer):
     age_s: float | None = Field(
         description="time since the newest credible key-point [s]; null where there was none"
     )
-
-    @staticmethod
-    def data_of(
-        source: Source,
-        used: bool,
-        speeds: Speeds,
-        person: Person | None,
-        observed: Person | None,
-        estimate: PersonEstimate | None,
-    ) -> Data:
-        """Return the data of the use of a person.
-
-        Args:
-            source: Kind of description in the request.
-            used: Whether this person is the nearest of those that the policy observes.
-            speeds: Origin of the speeds.
-            person: State for the policy; None: not used.
-            observed: State for monitoring; None: not used.
-            estimate: Estimate from key-points; None without key-points.
-        """
-        return {
-            "by": source,
-            "used": used,
-            "as_cylinder": person is not None and person.cylinder is not None,
-            "monitored_as_cylinder": observed is not None and observed.cylinder is not None,
-            "speeds": speeds,
-            "flags": [
-                *(() if estimate is None else estimate.flags),
-                *(() if person is None else degradations(person)),
-            ],
-            "held": [] if estimate is None else list(estimate.held),
-            "missing": [] if estimate is None else list(estimate.missing),
-            "outliers": [] if estimate is None else list(estimate.outliers),
-            "unusable": [] if estimate is None else list(estimate.unusable),
-            "implausible": None if estimate is None else estimate.implausible,
-            "age_s": estimate.age_s if estimate and math.isfinite(estimate.age_s) else None,
-        }
