@@ -1,6 +1,6 @@
 from pathlib import Path
 
-from app.api.state_metrics import STORED_METRICS
+from app.api.state_metrics import stored_metrics
 from app.store import attempts, jobs
 from app.store.engine import Store
 from app.store.records import NewJob
@@ -17,5 +17,5 @@ def test_steps_of_every_running_job_are_read(store: Store, tmp_path: Path) -> No
         jobs.create_job(store, NewJob(kind="count", spec={}, total_steps=5))
         attempts.claim_next(store)
     with serving(store, tmp_path) as (_, services):
-        read = {one.name: list(one.read(services)) for one in STORED_METRICS}
+        read = {one.name: one.samples for one in stored_metrics(services)}
     assert len(read["tandem_job_steps"]) == len(read["tandem_job_total_steps"]) == n_jobs
