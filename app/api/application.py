@@ -24,7 +24,6 @@ from app.api.routes import (
     health,
     job_actions,
     jobs,
-    metrics,
     presets,
     protocols,
     recordings,
@@ -62,7 +61,6 @@ def build_app(
     """Return the application; its lifespan sets ``app.state.services``.
 
     Args:
-        lifespan: Starts and stops the parts of the service.
         static: Folder of the page.
         token: The token required of every request; None on loopback.
         traces: Receives a span of each request; None: none is made.
@@ -82,7 +80,7 @@ def build_app(
         docs_url=None,
         redoc_url=None,
         responses={422: {}},
-        generate_unique_id_function=description.operation_id,
+        generate_unique_id_function=lambda route: route.name,  # of its function, unique
     )
     app.state.token = token
     app.state.metrics = counts
@@ -107,7 +105,7 @@ def build_app(
         recordings,
     ):
         app.include_router(part.router, dependencies=[Depends(check_query)])
-    for part in (health, metrics, session, viewer, reference):
+    for part in (health, session, viewer, reference):
         app.include_router(part.router)
     description.install(app)
     add_page(app, static)

@@ -8,7 +8,6 @@ import http
 from typing import Any
 
 from fastapi import FastAPI, Response
-from fastapi.routing import APIRoute
 from pydantic import BaseModel
 
 from app.api.bodies import FILE_TYPES
@@ -67,7 +66,6 @@ def stored_responses(model: type[BaseModel], same: str) -> dict[int | str, dict[
     """Return the answers to a request that stores a resource.
 
     Args:
-        model: The resource.
         same: What is stored already with status 200, as text.
     """
     return {
@@ -81,11 +79,6 @@ def set_stored(response: Response, location: str, *, new: bool) -> None:
     """Set status and ``Location`` of an answer of :func:`stored_responses`."""
     response.status_code = 201 if new else 200
     response.headers["Location"] = location
-
-
-def operation_id(route: APIRoute) -> str:
-    """Return the name of an operation: that of its function, which is unique."""
-    return route.name
 
 
 def install(app: FastAPI) -> None:
@@ -103,11 +96,7 @@ def install(app: FastAPI) -> None:
 
 
 def _complete(document: dict[str, Any], cookie: str) -> None:
-    """Add the problems of every operation, their schema and the kinds of access.
-
-    Args:
-        cookie: Name of the session cookie.
-    """
+    """Add the problems of every operation, their schema and the kinds of access."""
     parts = document["components"]
     schema = Problem.model_json_schema(ref_template="#/components/schemas/{model}")
     parts["schemas"] |= schema.pop("$defs") | {Problem.__name__: schema}

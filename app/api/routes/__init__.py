@@ -5,10 +5,9 @@ attempts        Jobs of workers on other machines: read, report, end
 cells           Work cells as data, shipped ones and the user's own
 checkpoints     Trained policies: list, read, download, upload
 decisions/      Decisions: task selection, sorting moves, motion, both at once, risk map
-health          Liveness and readiness, for monitors
+health          Liveness, readiness and metrics, for monitors
 job_actions     Actions on jobs: cancel, resume, retry, clone, label, delete
 jobs            Training and evaluation as jobs: post, list, follow
-metrics         Metrics for Prometheus
 presets         Presets of training jobs, with the limits of every field
 protocols       Protocols of evaluations, with the inputs of each
 recordings      Recordings of human motion: import a file, list, show, remove

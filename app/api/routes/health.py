@@ -1,16 +1,19 @@
-"""Liveness and readiness, for monitors.
+"""Liveness, readiness and metrics, for monitors.
 
-Neither route needs the token; without it they answer the status only.
+Liveness and readiness need no token; without it they answer the status only.
 """
 
 from datetime import UTC, datetime, timedelta
 from typing import Literal
 
 from fastapi import APIRouter, Request
+from prometheus_client.exposition import choose_encoder
 from pydantic import Field
+from starlette.responses import Response
 
+from app.api.metrics import Metrics
 from app.api.schemas.numbers import Answer
-from app.api.services import Services, ServicesDep
+from app.api.services import ServicesDep
 from app.errors import NotReady
 
 router = APIRouter(tags=["health"])
@@ -74,7 +77,12 @@ async def ready(request: Request, services: ServicesDep) -> ReadinessPublic:
         return ReadinessPublic(status="ready")
     services.readiness.require()
     damaged, waiting = services.checkpoints.damaged, services.supervisor.waiting
-    stalled = _stalled(services)
+    now = datetime.now(UTC)
+    stalled = {
+        name: now - timedelta(seconds=age)
+        for name, world in services.worlds.items()
+        if (age := world.handle.since_snapshot_s()) > STALLED_S
+    }
     return ReadinessPublic(
         status="degraded" if damaged or waiting or stalled else "ready",
         damaged=list(damaged) or None,
@@ -83,8 +91,19 @@ async def ready(request: Request, services: ServicesDep) -> ReadinessPublic:
     )
 
 
-def _stalled(services: Services) -> dict[str, datetime]:
-    """Return the live worlds that no longer tick, with the time of their last tick."""
-    now = datetime.now(UTC)
-    ages = {name: one.handle.since_snapshot_s() for name, one in services.worlds.items()}
-    return {name: now - timedelta(seconds=age) for name, age in ages.items() if age > STALLED_S}
+@router.get(
+    "/metrics",
+    summary="Metrics for Prometheus",
+    response_class=Response,
+    responses={
+        200: {
+            "content": {"text/plain": {}, "application/openmetrics-text": {}},
+            "description": "text format of Prometheus, or OpenMetrics by `Accept`",
+        }
+    },
+)
+def scrape(request: Request) -> Response:
+    """Return every metric; `docs/operations.md` lists them."""
+    metrics: Metrics = request.app.state.metrics
+    encode, media_type = choose_encoder(request.headers.get("accept", ""))
+    return Response(encode(metrics.registry), headers={"Content-Type": media_type})
