@@ -32,23 +32,12 @@ class BodyMiddleware:
     text and integers.
 
     Args:
-        app: The inner layers.
-        max_bytes: Largest JSON body.
         files: Routes that take files by POST or PUT, each with its largest file [bytes].
     """
 
-    def __init__(
-        self,
-        app: ASGIApp,
-        *,
-        max_bytes: int = MAX_BODY_BYTES,
-        files: Mapping[str, int] | None = None,
-    ) -> None:
+    def __init__(self, app: ASGIApp, *, files: Mapping[str, int]) -> None:
         self.app = app
-        self.max_bytes = max_bytes
-        self.files = [
-            (compile_path(path)[0], largest) for path, largest in (files or {}).items()
-        ]
+        self.files = [(compile_path(path)[0], largest) for path, largest in files.items()]
         self._largest_file = lru_cache(_MANY_PATHS)(self._find_largest_file)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -59,12 +48,13 @@ class BodyMiddleware:
         path, headers = path_of(scope), headers_of(scope)
         largest = self._largest_file(scope["method"], path)
         takes_file = largest is not None
-        max_bytes = self.max_bytes if largest is None else largest
+        max_bytes = MAX_BODY_BYTES if largest is None else largest
+        is_form = _media_type(headers.get("content-type", "")) == FORM
         refused = _refused_head(scope, headers, takes_file, max_bytes)
-        if refused is None and _has_body(headers) and not takes_file and not _is_form(headers):
-            body, messages = await read_whole(receive, max_bytes)
+        if refused is None and _has_body(headers) and not takes_file and not is_form:
+            body, messages = await read_whole(receive)
             receive = repeating(messages, receive)
-            refused = _refused_json(body, scope["path"], max_bytes)
+            refused = _refused_json(body, scope["path"])
         else:
             receive = _counted(receive, max_bytes)
         if refused is not None:
@@ -88,7 +78,7 @@ def _refused_head(
     if fault is not None:
         return member_problem(422, "invalid-input", fault, instance)
     length = headers.get("content-length", "")
-    if length.isdecimal() and _exceeds(length, max_bytes):
+    if length.isdecimal() and exceeds(length, max_bytes):
         return _too_large(f"{length} bytes", max_bytes, instance)
     if not _has_body(headers):
         return None
@@ -110,14 +100,14 @@ def _has_body(headers: Mapping[str, str]) -> bool:
     return headers.get("content-length", "") not in ("", "0") or "transfer-encoding" in headers
 
 
-def _exceeds(length: str, most: int) -> bool:
+def exceeds(length: str, most: int) -> bool:
     """Return whether a decimal of any length is greater than a number."""
     digits = length.lstrip("0")
     return len(digits) > len(str(most)) or int(digits or "0") > most
 
 
-async def read_whole(receive: Receive, max_bytes: int) -> tuple[bytes, list[Message]]:
-    """Read a body until it ends or exceeds the limit; return it and its messages.
+async def read_whole(receive: Receive) -> tuple[bytes, list[Message]]:
+    """Read a JSON body until it ends or exceeds the limit; return it and its messages.
 
     The last message is no ``http.request`` where the client has left.
     """
@@ -126,7 +116,7 @@ async def read_whole(receive: Receive, max_bytes: int) -> tuple[bytes, list[Mess
         message = await receive()
         messages.append(message)
         body += message.get("body", b"")
-        more = message.get("more_body", False) and len(body) <= max_bytes
+        more = message.get("more_body", False) and len(body) <= MAX_BODY_BYTES
     return body, messages
 
 
@@ -140,10 +130,10 @@ def repeating(messages: list[Message], receive: Receive) -> Receive:
     return receive_again
 
 
-def _refused_json(body: bytes, instance: str, max_bytes: int) -> ProblemResponse | None:
+def _refused_json(body: bytes, instance: str) -> ProblemResponse | None:
     """Return the problem of a body; None where there is none."""
-    if len(body) > max_bytes:
-        return _too_large(f"more than {max_bytes} bytes", max_bytes, instance)
+    if len(body) > MAX_BODY_BYTES:
+        return _too_large(f"more than {MAX_BODY_BYTES} bytes", MAX_BODY_BYTES, instance)
     fault = fault_in_json(body)
     return None if fault is None else member_problem(422, "invalid-input", fault, instance)
 
@@ -167,10 +157,6 @@ def _media_type(content_type: str) -> str:
     return content_type.partition(";")[0].strip().lower()
 
 
-def _is_form(headers: Mapping[str, str]) -> bool:
-    return _media_type(headers.get("content-type", "")) == FORM
-
-
 def is_json(content_type: str) -> bool:
     """Return whether a content type is that of a JSON body."""
     kind = _media_type(content_type)
@@ -180,8 +166,7 @@ def is_json(content_type: str) -> bool:
 
 
 def _too_large(value: str, max_bytes: int, instance: str) -> ProblemResponse:
-    rule = f"must be at most {max_bytes} bytes"
-    fault = member("body", value, rule)
+    fault = member("body", value, f"must be at most {max_bytes} bytes")
     return member_problem(413, "body-too-large", fault, instance, {"Connection": "close"})
 
 

@@ -6,47 +6,34 @@ which receive the body again, so that every problem is written in one place. Wit
 middleware is not used: the framework makes the spans of requests.
 """
 
-from collections.abc import Awaitable, Callable, Iterable
-from typing import NamedTuple, get_type_hints
+from collections.abc import Iterable
+from typing import get_type_hints
 
 from fastapi.routing import APIRoute
 from pydantic import BaseModel, ValidationError
 from pydantic_core import to_json
 from starlette.types import ASGIApp, Receive, Scope, Send
 
-from app.api.bodies import MAX_BODY_BYTES, is_json, read_whole, repeating
-from app.api.schemas.numbers import Data
+from app.api.bodies import MAX_BODY_BYTES, exceeds, is_json, read_whole, repeating
 from app.api.security import headers_of, path_of
 from app.api.texts import fault_in_json
 from app.errors import ServiceError
 
 JSON_HEAD = (b"content-type", b"application/json")
 _CODINGS = frozenset(("content-encoding", "transfer-encoding"))
-_DIGITS = len(str(MAX_BODY_BYTES))
-
-
-class _Direct(NamedTuple):
-    """A route of an asynchronous function of a body, ``request``, and the services."""
-
-    route: APIRoute
-    decide: Callable[..., Awaitable[BaseModel | Data]]
-    model: type[BaseModel]
-    """Model of the body."""
 
 
 class DirectRouteMiddleware:
     """ASGI middleware around the body middleware and the framework.
 
-    Args:
-        app: The body middleware and the framework.
-        routes: The decision routes, with the method ``POST``.
+    Each route is a ``POST`` to an asynchronous function of a body, ``request``, and the
+    services.
     """
 
     def __init__(self, app: ASGIApp, *, routes: Iterable[APIRoute]) -> None:
         self.app = app
         self.routes = {
-            one.path: _Direct(one, one.endpoint, get_type_hints(one.endpoint)["request"])
-            for one in routes
+            one.path: (one, get_type_hints(one.endpoint)["request"]) for one in routes
         }
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
@@ -56,13 +43,14 @@ class DirectRouteMiddleware:
         if found is None or not _is_ordinary(scope):
             await self.app(scope, receive, send)
             return
-        body, messages = await read_whole(receive, MAX_BODY_BYTES)
+        body, messages = await read_whole(receive)
         left = messages[-1]["type"] != "http.request"
-        content = None if left else await _answer(found, scope, body)
+        route, model = found
+        content = None if left else await _answer(route, model, scope, body)
         if content is None:
             await self.app(scope, repeating(messages, receive), send)
             return
-        scope["route"] = found.route
+        scope["route"] = route
         length = b"content-length", str(len(content)).encode()
         await send(
             {"type": "http.response.start", "status": 200, "headers": [length, JSON_HEAD]}
@@ -78,19 +66,20 @@ def _is_ordinary(scope: Scope) -> bool:
         is_json(headers.get("content-type", ""))
         and _CODINGS.isdisjoint(headers)
         and length.isdecimal()
-        and len(length) <= _DIGITS
-        and int(length) <= MAX_BODY_BYTES
+        and not exceeds(length, MAX_BODY_BYTES)
         and not scope["query_string"]
     )
 
 
-async def _answer(found: _Direct, scope: Scope, body: bytes) -> bytes | None:
+async def _answer(
+    route: APIRoute, model: type[BaseModel], scope: Scope, body: bytes
+) -> bytes | None:
     """Return the answer to a request; None where the framework is to answer."""
     if len(body) > MAX_BODY_BYTES or fault_in_json(body) is not None:
         return None
     try:
-        request = found.model.model_validate_json(body)
-        answer = await found.decide(request, scope["app"].state.services)
+        request = model.model_validate_json(body)
+        answer = await route.endpoint(request, scope["app"].state.services)
     except (ValidationError, ServiceError):
         return None
     return to_json(answer, inf_nan_mode="null")

@@ -66,7 +66,7 @@ def plain(client: TestClient) -> Iterator[TestClient]:
     assert [one.path for one in routes] == list(BODIES)
     for route in routes:
         app.add_api_route(route.path, route.endpoint, methods=["POST"])
-    app.add_middleware(BodyMiddleware)
+    app.add_middleware(BodyMiddleware, files={})
     yield TestClient(app, base_url=ADDRESS)
 
 

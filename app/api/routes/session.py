@@ -7,6 +7,7 @@ from urllib.parse import parse_qs
 from fastapi import APIRouter, Request
 from starlette.responses import HTMLResponse, RedirectResponse, Response
 
+from app.api.bodies import FORM
 from app.api.security import SESSION_PATH, cookie_name, session_value, sign_in_page
 from app.errors import InvalidInput
 
@@ -21,10 +22,11 @@ async def sign_in(request: Request) -> Response:
     """Check the token of a form or of JSON and answer with the cookie."""
     token: str | None = request.app.state.token
     body = await request.body()
-    is_form = request.headers.get("content-type", "").startswith(
-        "application/x-www-form-urlencoded"
-    )
-    given = _from_form(body) if is_form else _from_json(body)
+    is_form = request.headers.get("content-type", "").startswith(FORM)
+    if is_form:
+        given = parse_qs(body.decode("utf-8", "replace")).get("token", [""])[0]
+    else:
+        given = _from_json(body)
     proof = given.encode("utf-8", "replace")
     if token is not None and not hmac.compare_digest(proof, token.encode()):
         if is_form:  # A browser shows the answer as it is.
@@ -43,11 +45,6 @@ async def sign_in(request: Request) -> Response:
             secure=request.url.scheme == "https",
         )
     return answer
-
-
-def _from_form(body: bytes) -> str:
-    fields = parse_qs(body.decode("utf-8", "replace"))
-    return fields.get("token", [""])[0]
 
 
 def _from_json(body: bytes) -> str:
