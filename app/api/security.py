@@ -19,6 +19,7 @@ from starlette.responses import HTMLResponse, Response
 from starlette.types import ASGIApp, Receive, Scope, Send
 
 from app.api.problems import problem
+from app.api.validation import member
 
 COOKIE = "tandem_session"
 """Start of the name of the session cookie."""
@@ -74,15 +75,9 @@ def cookie_name(token: str) -> str:
 @lru_cache(maxsize=64)
 def is_loopback(host: str) -> bool:
     """Whether the header ``Host`` always means this machine."""
-    return is_loopback_name(_hostname(host))
-
-
-def is_loopback_name(host: str | None) -> bool:
-    """Whether a host name, without its port, always means this machine."""
-    if host == "localhost":
-        return True
     try:
-        return host is not None and ipaddress.ip_address(host).is_loopback
+        name = urlsplit(f"//{host}").hostname or ""
+        return name == "localhost" or ipaddress.ip_address(name).is_loopback
     except ValueError:
         return False
 
@@ -91,7 +86,6 @@ class AccessMiddleware:
     """ASGI middleware that checks Host, Origin and token.
 
     Args:
-        app: The inner layers.
         token: The token, or None on loopback.
         open_paths: Paths answered without the token (health checks, sign-in); they read
             ``request.state.trusted``.
@@ -158,15 +152,8 @@ class AccessMiddleware:
 def _refusal(
     status: int, kind: str, field: str, value: str, rule: str
 ) -> tuple[int, str, str, dict[str, object]]:
-    data: dict[str, object] = {"field": field, "value": repr(value[:200]), "rule": rule}
-    return status, kind, f"{field} {value[:200]!r} {rule}", {**data, "choices": []}
-
-
-def _hostname(host: str) -> str | None:
-    try:
-        return urlsplit(f"//{host}").hostname
-    except ValueError:
-        return None
+    given = repr(value[:200])
+    return status, kind, f"{field} {given} {rule}", member(field, given, rule)
 
 
 def _same_site(origin: str, host: str) -> bool:
