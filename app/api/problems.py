@@ -114,15 +114,13 @@ def problem(
     data: Mapping[str, object] | None = None,
     headers: Mapping[str, str] | None = None,
 ) -> ProblemResponse:
-    """Return a problem document.
+    """Return a problem document; with status 503, it asks for a repetition after 2 s.
 
     Args:
-        status: HTTP status.
         detail: One sentence about this occurrence.
         kind: Last part of the type URI; from the status if None.
         instance: Path of the request.
         data: Extension members.
-        headers: Headers of the answer.
     """
     title = http.HTTPStatus(status).phrase
     kind = kind or title.lower().replace(" ", "-")
@@ -135,9 +133,8 @@ def problem(
     }
     if (request_id := REQUEST_ID.get()) is not None:
         members["request_id"] = request_id
-    return ProblemResponse(
-        {**members, **(data or {})}, status, headers=dict(headers) if headers else None
-    )
+    wait = {"Retry-After": "2"} if status == 503 else {}
+    return ProblemResponse({**members, **(data or {})}, status, {**wait, **(headers or {})})
 
 
 def member_problem(
@@ -147,35 +144,16 @@ def member_problem(
     instance: str,
     headers: Mapping[str, str] | None = None,
 ) -> ProblemResponse:
-    """Return the problem of one faulty member.
-
-    Args:
-        status: HTTP status.
-        kind: Last part of the type URI.
-        fault: Field, value, rule and choices.
-        instance: Path of the request.
-        headers: Headers of the answer.
-    """
+    """Return the problem of one faulty member; arguments as of :func:`problem`."""
     detail = fault_text(fault)
     return problem(status, detail, kind=kind, instance=instance, data=fault, headers=headers)
 
 
 def service_problem(error: ServiceError, instance: str) -> ProblemResponse:
     """Return the problem of an error."""
-    status, kind = 500, "service-error"
-    for error_type, its_status, its_kind in STATUS:
-        if isinstance(error, error_type):
-            status, kind = its_status, its_kind
-            break
-    headers = {"Retry-After": "2"} if status == 503 else None
-    return problem(
-        status,
-        error.message,
-        kind=kind,
-        instance=instance,
-        data=error.problem(),
-        headers=headers,
-    )
+    known = ((status, kind) for one, status, kind in STATUS if isinstance(error, one))
+    status, kind = next(known, (500, "service-error"))
+    return problem(status, error.message, kind=kind, instance=instance, data=error.problem())
 
 
 async def on_service_error(request: Request, error: Exception) -> ProblemResponse:
@@ -202,19 +180,13 @@ def validation_problem(
     Args:
         errors: Pydantic's errors, with locations that begin with ``body``; at least one.
         models: The possible models of the body.
-        instance: Path of the request.
     """
     cut = [without_tag(one, models) for one in errors[:MAX_LISTED_ERRORS]]
     found = merged([validation_member(one, model) for one, model in cut])
     malformed = errors[0]["type"] == "json_invalid"
-    first = found[0]
-    return problem(
-        400 if malformed else 422,
-        fault_text(first),
-        kind="malformed-json" if malformed else "invalid-input",
-        instance=instance,
-        data={**first, "errors": found},
-    )
+    status, kind = (400, "malformed-json") if malformed else (422, "invalid-input")
+    data = {**found[0], "errors": found}
+    return problem(status, fault_text(found[0]), kind=kind, instance=instance, data=data)
 
 
 async def on_http_error(request: Request, error: Exception) -> ProblemResponse:

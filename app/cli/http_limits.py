@@ -268,10 +268,7 @@ _HEAD_TOO_LARGE = (
 
 def _refusal(status: int, kind: str, detail: str) -> bytes:
     """Return an HTTP/1.1 response that ends the connection."""
-    headers = {**HEADERS, "Connection": "close"}
-    if status == 503:
-        headers["Retry-After"] = "2"
-    answer = problem(status, detail, kind=kind, headers=headers)
+    answer = problem(status, detail, kind=kind, headers={**HEADERS, "Connection": "close"})
     lines = [STATUS_LINE[status]]
     for name, value in answer.raw_headers:
         lines += [name, b": ", value, b"\r\n"]

@@ -96,17 +96,11 @@ def test_problem_may_show_half_of_a_surrogate_pair() -> None:
     assert json.loads(bytes(answer.body))["detail"] == "\ud800 \u00e4 \U0001f600"
 
 
-def test_unknown_path_is_a_problem(client: TestClient) -> None:
-    answer = client.get("/v1/nothing")
-    assert answer.status_code == 404
-    assert answer.json()["instance"] == "/v1/nothing"
+@pytest.mark.parametrize("path", ["/v1/nothing", "/static/nothing.js"])
+def test_unknown_path_is_a_problem(client: TestClient, path: str) -> None:
+    answer = client.get(path)
     assert answer.headers["content-type"] == "application/problem+json"
-
-
-def test_missing_file_of_the_page_is_a_problem(client: TestClient) -> None:
-    answer = client.get("/static/nothing.js")
-    assert answer.status_code == 404
-    assert answer.headers["content-type"] == "application/problem+json"
+    assert problem_of(answer, 404)["instance"] == path
 
 
 def test_wrong_method_lists_those_that_are_answered(client: TestClient) -> None:
