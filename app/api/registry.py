@@ -8,7 +8,7 @@ import logging
 import threading
 from collections import OrderedDict
 from collections.abc import Callable, Collection, Iterable, Mapping
-from typing import Any, Generic, Protocol, TypeVar
+from typing import Any, Generic, TypeVar
 
 from starlette.concurrency import run_in_threadpool
 
@@ -36,18 +36,8 @@ REACH_ALIAS = "reach"
 """Default policy for reaching."""
 
 
-class Loaded(Protocol):
-    """A loaded policy."""
-
-    @property
-    def checkpoint(self) -> str:
-        """SHA-256 of its checkpoint."""
-
-
-P = TypeVar("P", bound=Loaded)
+P = TypeVar("P")
 Q = TypeVar("Q")
-Build = Callable[[Mapping[str, Any], bytes], P]
-"""Makes a policy from a manifest and safetensors bytes."""
 
 
 class CheckpointNames:
@@ -172,12 +162,16 @@ class PolicyRegistry(Generic[P]):
     """Loaded policies of one kind; safe to use from any thread.
 
     Args:
-        names: The stored checkpoints.
         build: Makes a policy from a manifest and safetensors bytes; refuses other kinds.
         default: Alias of the default policy.
     """
 
-    def __init__(self, names: CheckpointNames, build: Build[P], default: str) -> None:
+    def __init__(
+        self,
+        names: CheckpointNames,
+        build: Callable[[Mapping[str, Any], bytes], P],
+        default: str,
+    ) -> None:
         self._names = names
         self._build = build
         self._default = default
@@ -198,12 +192,13 @@ class PolicyRegistry(Generic[P]):
         Raises:
             CheckpointMismatch: It is known not to fit.
         """
-        sha256 = self._names.aliases.get(self._or_default(reference), reference)
+        name = self._or_default(reference)
+        sha256 = self._names.aliases.get(name, name)
         with self._lock:
-            policy = self._policies.get(sha256 or "")
+            policy = self._policies.get(sha256)
             if policy is not None:
-                self._policies.move_to_end(policy.checkpoint)
-            known = self._mismatches.get(sha256 or "")
+                self._policies.move_to_end(sha256)
+            known = self._mismatches.get(sha256)
         if known is not None:
             raise CheckpointMismatch(known.field, known.expected, known.actual)
         return policy
@@ -260,13 +255,6 @@ class PolicyRegistry(Generic[P]):
         self._names.forget_unstored()
 
     async def get(self, reference: str | None) -> P:
-        """Return a policy as :meth:`load` does; one that is not in memory is read on a thread.
-
-        Args:
-            reference: SHA-256 or alias; the default policy if None.
-
-        Raises:
-            ServiceError: As for :meth:`load`.
-        """
+        """Return a policy as :meth:`load`; one that is not in memory is read on a thread."""
         policy = self._loaded(reference)
         return await run_in_threadpool(self.load, reference) if policy is None else policy

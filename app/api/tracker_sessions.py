@@ -42,14 +42,13 @@ class TrackedPeople:
 
     t: float | None
     """The time, on the tracker's clock [s]; None before the first frame."""
-    since_frame_s: float
-    """Time since the newest frame, or since the tracker was opened without a frame [s]."""
     estimates: tuple[PersonEstimate, ...]
     """Estimate of each track, predicted for the time."""
     observed: tuple[PersonEstimate | None, ...]
     """Estimate of each track at the last frame with its person; None without such a frame."""
     observed_age_s: tuple[float, ...]
-    """Age of each observation [s]; without one, ``since_frame_s``."""
+    """Age of each observation; without one, the time since the newest frame, or since the
+    tracker was opened [s]."""
     unassigned: tuple[UnassignedDetection, ...]
     """People of the newest frame without a track, nearest first."""
 
@@ -130,7 +129,6 @@ class TrackerSession:
         ]
         return TrackedPeople(
             t=None if newest is None else newest + since_frame_s,
-            since_frame_s=since_frame_s,
             estimates=self._flagged(estimates, since_frame_s),
             observed=observed,
             observed_age_s=tuple(ages),
