@@ -1,5 +1,6 @@
 """The commands ``backup`` and ``restore``."""
 
+from contextlib import closing
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -21,11 +22,8 @@ def backup(file: File, as_json: Json = False) -> None:
     from app.store.database.backup import write_backup
     from app.store.engine import Store
 
-    store = Store(settings.database)
-    try:
+    with closing(Store(settings.database)) as store:
         found = write_backup(store, settings.data, file)
-    finally:
-        store.close()
     print_result(f"{_text(found)}\nwritten to {file}", _data(found), as_json=as_json)
 
 
@@ -36,11 +34,8 @@ def restore(file: File, as_json: Json = False) -> None:
     from app.store.engine import Store
 
     settings.data.mkdir(parents=True, exist_ok=True)
-    store = Store(settings.database)
-    try:
+    with closing(Store(settings.database)) as store:
         found, kept = restore_backup(store, settings.data, file)
-    finally:
-        store.close()
     text = f"{_text(found)}\nrestored to {store.shown_url}"
     if kept is not None:
         text += f"\nprevious database kept as {kept}"
@@ -49,12 +44,10 @@ def restore(file: File, as_json: Json = False) -> None:
 
 
 def _text(found: "BackupSummary") -> str:
-    rows = found.rows
+    tables = ("jobs", "checkpoints", "cells", "recordings")
+    rows = "".join(f"{found.rows.get(name, 0)} {name}, " for name in tables)
     return (
-        f"backup of {found.created_at}: {rows.get('jobs', 0)} jobs, "
-        f"{rows.get('checkpoints', 0)} checkpoints, {rows.get('cells', 0)} cells, "
-        f"{rows.get('recordings', 0)} recordings, {found.n_files} files, "
-        f"{found.size / 1e6:.1f} MB"
+        f"backup of {found.created_at}: {rows}{found.n_files} files, {found.size / 1e6:.1f} MB"
     )
 
 

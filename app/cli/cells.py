@@ -8,7 +8,7 @@ import typer
 
 from app.cli.options import Json, prepared_settings
 from app.cli.output import every_fault_printed, print_result
-from app.errors import InvalidInput, NotFound
+from app.errors import InvalidInput
 
 if TYPE_CHECKING:
     from app.settings import Settings
@@ -94,10 +94,8 @@ def named_cell(name: str, settings: "Settings") -> "Cell":
     from app.sim.cells.cell import cell_names, load_cell
     from jobs.cell_catalog import CellCatalog
 
-    if name in cell_names():
+    if name in cell_names() or not has_database(settings):
         return load_cell(name)
-    if not has_database(settings):
-        raise NotFound("cell", name, cell_names())
     with opened(settings, NOUN) as store:
         return CellCatalog(store).get(name)
 

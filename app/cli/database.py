@@ -1,7 +1,7 @@
 """The database as commands open it, beside a running server or without one."""
 
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 
 from app.errors import Conflict, NotFound
 from app.settings import Settings
@@ -25,7 +25,6 @@ def opened(settings: Settings, noun: str, *, create: bool = False) -> Iterator[S
     """Open the database, and close it again.
 
     Args:
-        settings: Where it is.
         noun: The object of the command, such as ``"recording"``, for the message.
         create: Whether to create a missing database and to upgrade an older one.
 
@@ -37,8 +36,7 @@ def opened(settings: Settings, noun: str, *, create: bool = False) -> Iterator[S
         settings.data.mkdir(parents=True, exist_ok=True)
     elif not has_database(settings):
         raise NotFound(f"{noun}: there is no database at", settings.database)
-    store = Store(settings.database)
-    try:
+    with closing(Store(settings.database)) as store:
         try:
             check_schema(store)
         except Conflict:
@@ -46,8 +44,6 @@ def opened(settings: Settings, noun: str, *, create: bool = False) -> Iterator[S
                 raise
             upgrade(store, settings)
         yield store
-    finally:
-        store.close()
 
 
 def upgrade(store: Store, settings: Settings) -> None:

@@ -3,6 +3,7 @@
 import errno
 import ipaddress
 import socket
+from contextlib import closing
 
 from app.errors import Conflict, InvalidInput
 from app.settings import Settings
@@ -14,11 +15,7 @@ BACKLOG = 128
 
 
 def listen(host: str, port: int) -> socket.socket:
-    """Bind and listen.
-
-    Args:
-        host: Address or name to listen on.
-        port: Port; 0 takes any free one.
+    """Bind an address or name and a port, 0 for any free one, and listen.
 
     Raises:
         Conflict: Another program listens there.
@@ -56,14 +53,13 @@ def check_database_unused(settings: Settings) -> None:
         Conflict: Another server does.
     """
     settings.data.mkdir(parents=True, exist_ok=True)
-    store = Store(settings.database)
-    lock = ServerLock(store, settings.data)
-    try:
-        lock.acquire()
-        Lease(store, lock).check()
-    finally:
-        lock.release()
-        store.close()
+    with closing(Store(settings.database)) as store:
+        lock = ServerLock(store, settings.data)
+        try:
+            lock.acquire()
+            Lease(store, lock).check()
+        finally:
+            lock.release()
 
 
 def _explained(error: OSError, host: str, port: int) -> Conflict | InvalidInput:

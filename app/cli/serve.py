@@ -1,6 +1,7 @@
 """The commands ``serve`` and ``setup``."""
 
 import time
+from contextlib import closing
 from typing import Annotated
 
 import typer
@@ -38,10 +39,9 @@ def setup() -> None:
     from app.store.engine import Store
 
     settings.data.mkdir(parents=True, exist_ok=True)
-    store = Store(settings.database)
-    upgrade(store, settings)
-    print(f"database: {store.shown_url}", flush=True)
-    store.close()
+    with closing(Store(settings.database)) as store:
+        upgrade(store, settings)
+        print(f"database: {store.shown_url}", flush=True)
     print("compiling the simulator's kernels (several minutes, once) ...", flush=True)
     started = time.monotonic()
     for n, (name, cpu_s) in enumerate(compile_all(cores()), 1):
