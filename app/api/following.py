@@ -140,11 +140,8 @@ def _updated(
     if not items or items[0].sha256 == follow.checkpoint:
         return follow, choices
     newest = items[0]
-    sorts = purpose_of(newest.manifest) == SORTING
-    command: PolicyCommand = SetPolicy(checkpoint=newest.sha256)
-    if sorts:
-        command = SetSortingPolicy(checkpoint=newest.sha256)
-    submit_loaded(command, world, services, choices)
+    command = SetSortingPolicy if purpose_of(newest.manifest) == SORTING else SetPolicy
+    submit_loaded(command(checkpoint=newest.sha256), world, services, choices)
     update = {"step": newest.step, "checkpoint": newest.sha256}
     return follow.model_copy(update=update), choices + 1
 

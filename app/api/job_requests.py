@@ -16,7 +16,7 @@ from app.policies.evaluation.registry import (
     check_task,
     lacks_for_choice,
 )
-from app.sim.cells.cell import Cell, cell_names
+from app.sim.cells.cell import cell_names
 from app.store import job_actions, jobs, metrics
 from app.store.records import JobKind, JobRecord, JobState, MetricRow, NewJob, References
 from app.store.references import references_of
@@ -38,7 +38,6 @@ def page_of_jobs(services: Services, query: PageQuery, waiting: str | None) -> b
     """Return a page of the jobs as JSON, newest first.
 
     Args:
-        services: Parts of the service.
         waiting: Reason for which no job runs.
 
     Raises:
@@ -84,16 +83,11 @@ def checked(body: AnySpec, services: Services) -> NewJob:
     if new.preset is not None:
         preset = presets.resolve(new.preset, new.overrides or {})
         cell = services.cells.to_train_in(preset)
-        if isinstance(body, SweepSpec):
-            _check_objective(body.objective.protocol, cell)
+        if isinstance(body, SweepSpec) and body.objective.protocol in OF_CHOICE:
+            if (lack := lacks_for_choice(cell)) is not None:
+                rule = f"cannot be run in the cell {cell.name!r}: it {lack}"
+                raise InvalidInput("objective.protocol", body.objective.protocol, rule)
     return new
-
-
-def _check_objective(protocol: str, cell: Cell) -> None:
-    """Check that the policies of a sweep can be evaluated in their cell."""
-    if protocol in OF_CHOICE and (lack := lacks_for_choice(cell)) is not None:
-        rule = f"cannot be run in the cell {cell.name!r}: it {lack}"
-        raise InvalidInput("objective.protocol", protocol, rule)
 
 
 def queued(

@@ -213,11 +213,7 @@ def _stopped_by_signals() -> Iterator[Event]:
 
 
 def _log_progress(progress: "Progress") -> None:
-    rates = {
-        "success": progress.success,
-        "collision": progress.collision,
-        "timeout": progress.timeout,
-    }
+    rates = {name: getattr(progress, name) for name in ("success", "collision", "timeout")}
     known = [f"{name} {rate:.3f}" for name, rate in rates.items() if rate is not None]
     left = progress.time_left_s
     logger.info(

@@ -72,7 +72,6 @@ class MotionSocket:
 
     Args:
         client: The socket, not accepted yet.
-        services: Parts of the service.
         which: Whether each request is answered or the newest.
         deadline_s: Time from the arrival of a request to its answer [s].
     """
@@ -207,9 +206,6 @@ class MotionSocket:
 def _malformed(text: str | None, instance: str) -> tuple[ProblemResponse | None, object]:
     """Return the problem of a message that is no JSON, or None, and its request or data.
 
-    Args:
-        instance: Path of the socket.
-
     Raises:
         json.JSONDecodeError: It is no JSON.
     """
@@ -220,18 +216,14 @@ def _malformed(text: str | None, instance: str) -> tuple[ProblemResponse | None,
             return member_problem(400, "malformed-json", binary, instance), None
         long = member("body", f"{len(text)} characters", rule)
         return member_problem(413, "body-too-large", long, instance), None
-    fault = fault_in_json(text.encode())
+    fault, body = fault_in_json(text.encode()), None
     if fault is None:
-        with suppress(ValidationError):
+        try:
             return None, MotionRequest.model_validate_json(text)
-    try:
+        except ValidationError:
+            return None, json.loads(text)
+    with suppress(ValueError, RecursionError):
         body = json.loads(text)
-    except (ValueError, RecursionError):
-        if fault is None:
-            raise
-        body = None
-    if fault is None:
-        return None, body
     return member_problem(422, "invalid-input", fault, instance), body
 
 

@@ -26,12 +26,7 @@ from app.policies.configs import presets
 from app.store.cursors import MAX_INTEGER, MAX_NUMBER
 from app.store.records import Claim
 from jobs.access import EndOfAttempt, StoreAccess
-from jobs.remote.uploads import (
-    MAX_MEMORY_FILE,
-    MAX_UPLOAD,
-    pack_state,
-    require_sha256,
-)
+from jobs.remote.uploads import MAX_MEMORY_FILE, MAX_UPLOAD, pack_state, require_sha256
 
 STALE_ATTEMPT: dict[int | str, dict[str, Any]] = {
     409: {"description": "The attempt no longer holds the job"},

@@ -7,7 +7,7 @@ from starlette.concurrency import run_in_threadpool
 
 from app.api.description import set_stored, stored_responses
 from app.api.schemas.cells import CellList, CellPublic, cell_schema
-from app.api.services import Services, ServicesDep
+from app.api.services import ServicesDep
 from app.errors import Conflict
 from app.sim.cell_validation.reader import read_cell
 from app.sim.cells.cell import load_cell
@@ -74,14 +74,10 @@ async def create_cell(
 def delete_cell(name: str, services: ServicesDep) -> None:
     """Remove a cell; policies trained in it have their own copy."""
     with services.replacing:
-        _require_unused(services, name)
+        for world_id, world in services.worlds.items():
+            if world.cell.name == name:
+                raise Conflict(
+                    f"cell {name!r} is shown by the live world {world_id!r}: show another cell "
+                    "there first"
+                )
         services.cells.remove(name)
-
-
-def _require_unused(services: Services, name: str) -> None:
-    for world_id, world in services.worlds.items():
-        if world.cell.name == name:
-            raise Conflict(
-                f"cell {name!r} is shown by the live world {world_id!r}: show another cell "
-                "there first"
-            )

@@ -26,7 +26,7 @@ from app.errors import InvalidInput
 from app.policies.configs import presets
 from app.store import events, jobs, metrics
 from app.store.cursors import MAX_INTEGER
-from app.store.records import JobEvent, JobKind, JobState
+from app.store.records import JobKind, JobState
 from jobs.executor import end_of_log
 from jobs.spec import JobSpec
 
@@ -139,7 +139,8 @@ async def stream_job(
         news = await run_in_threadpool(events.list_events, services.store, job.id, after=after)
         for event in news:
             after = event.id
-            yield sent(event)
+            data = {**event.data, "at": event.at}
+            yield ServerSentEvent(event=event.kind, id=str(event.id), data=data)
         if not news:
             now = await run_in_threadpool(jobs.find_job, services.store, job.id)
             if now is None:
@@ -149,9 +150,3 @@ async def stream_job(
                 yield ServerSentEvent(event="end", data={"state": now.state})
                 return
             await asyncio.sleep(POLL_S)
-
-
-def sent(event: JobEvent) -> ServerSentEvent:
-    """Write a job's event as one of the stream."""
-    data = {**event.data, "at": event.at}
-    return ServerSentEvent(event=event.kind, id=str(event.id), data=data)

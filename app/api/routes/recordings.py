@@ -7,10 +7,9 @@ from starlette.concurrency import run_in_threadpool
 
 from app.api.description import FILE_BODY, set_stored, stored_responses
 from app.api.schemas.recordings import RecordingItem, RecordingList, RecordingPublic
-from app.api.services import Services, ServicesDep
+from app.api.services import ServicesDep
 from app.sim.mocap.importer import FORMATS, MAX_BYTES
 from app.sim.mocap.read_options import UNITS, UP_AXES, ReadOptions, name_map
-from app.store.records import StoredRecording
 from jobs.recording_catalog import checked_names
 
 router = APIRouter(prefix="/v1/recordings", tags=["recordings"])
@@ -84,7 +83,10 @@ async def create_recording(
     ] = None,
 ) -> RecordingPublic:
     """Import the file in the body and store it; the same file again answers 200."""
-    record, new = await _import(request, services, file_name, name, options)
+    checked_names(file_name, name)  # before the file is read
+    with services.upload():
+        content, add = await request.body(), services.recordings.add
+        record, new = await run_in_threadpool(add, content, file_name, name, options)
     set_stored(response, f"{router.prefix}/{record.name}", new=new)
     return RecordingPublic.from_domain(record)
 
@@ -98,14 +100,3 @@ async def create_recording(
 def delete_recording(name: str, services: ServicesDep) -> None:
     """Remove a recording."""
     services.recordings.remove(name)
-
-
-async def _import(
-    request: Request, services: Services, file_name: str, name: str | None, options: ReadOptions
-) -> tuple[StoredRecording, bool]:
-    """Import the body on a thread, a few at a time; names are checked before it is read."""
-    checked_names(file_name, name)
-    with services.upload():
-        content = await request.body()
-        add = services.recordings.add
-        return await run_in_threadpool(add, content, file_name, name, options)

@@ -4,6 +4,8 @@ from typing import Any
 
 from pydantic import ConfigDict
 
+from app.api.schemas.robot_state import ROS_NAMES
+
 KEYPOINTS: list[list[float] | None] = [
     [0.0, 1.33, 0.81], [0.0, 1.45, 0.64], [-0.18, 1.45, 0.64], None, None,
     [0.18, 1.45, 0.64], [0.23, 1.41, 0.36], [0.26, 1.22, 0.19],
@@ -25,14 +27,7 @@ RISK_MAP: dict[str, Any] = TASK_SELECTION | {
 MOTION: dict[str, Any] = {
     "cell": "shared-workspace",
     "robot": {
-        "names": [
-            "elbow_joint",
-            "shoulder_lift_joint",
-            "shoulder_pan_joint",
-            "wrist_1_joint",
-            "wrist_2_joint",
-            "wrist_3_joint",
-        ],
+        "names": sorted(ROS_NAMES),
         "q": [2.0, -2.5, 0.0, 0.0, 0.0, 0.0],
         "qd": [0.0, 0.0, 0.4, 0.0, 0.0, 0.0],
     },

@@ -1,5 +1,6 @@
 """Joints of the robot in a request: base to wrist 3, or in any order by name."""
 
+import re
 from dataclasses import dataclass
 from typing import Annotated
 
@@ -14,7 +15,7 @@ from app.sim.robot.ur10 import JOINT_NAMES
 
 ROS_NAMES = tuple(f"{name}_joint" for name in JOINT_NAMES)
 """Names of the joints in ROS, base to wrist 3."""
-_FIELDS = ("q", "qd", "qdd")
+_JOINT = re.compile(r"(robot\.(?:q|qd|qdd))\[([0-5])\]")
 
 
 class RobotState(Body):
@@ -49,13 +50,8 @@ class RobotState(Body):
         )
 
     def joints(self, values: list[float]) -> Vec:
-        """Return numbers of the joints from base to wrist 3, shape (6,).
-
-        Args:
-            values: Numbers in the order of the request.
-        """
-        given = np.array(values)
-        return given if self.names is None else given[self._order()]
+        """Return numbers in the order of the request from base to wrist 3, shape (6,)."""
+        return np.array(values)[self._order()]
 
     def _order(self) -> list[int]:
         """Return the indices of the joints, base to wrist 3, in the request."""
@@ -88,11 +84,8 @@ class _FaultsInPlace:
 
     def __exit__(self, _: object, error: BaseException | None, __: object) -> None:
         """Replace an error."""
-        if not isinstance(error, InvalidInput):
-            return
-        for name in _FIELDS:
-            for joint, place in enumerate(self.state._order()):
-                if error.field == f"robot.{name}[{joint}]":
-                    field = f"robot.{name}[{place}]"
-                    rule = f"{error.rule}: {ROS_NAMES[joint]}"
-                    raise InvalidInput(field, error.value, rule, error.choices) from None
+        if isinstance(error, InvalidInput) and (found := _JOINT.fullmatch(error.field)):
+            joint = int(found[2])
+            field = f"{found[1]}[{self.state._order()[joint]}]"
+            rule = f"{error.rule}: {ROS_NAMES[joint]}"
+            raise InvalidInput(field, error.value, rule, error.choices) from None
