@@ -19,8 +19,7 @@ responses         Outermost ASGI middleware: completes every response
 security          Access control: one ASGI middleware around every route, mount and socket
 state_metrics     Metrics that are read from the service at a scrape
 services          Parts of the service that routes use; ``app.main`` creates them
-sockets           Size of WebSocket messages, and refusal of a socket with a reason; idle time
-                  and number of motion sockets: ``motion/load.py``
+sockets           Size of WebSocket messages, and refusal of a socket with a reason
 texts             Detection of JSON that no route accepts
 tracker_sessions  Sessions of trackers: the estimators of people, kept between frames
 validation        Conversion of pydantic's validation errors to field, value, rule and

@@ -113,7 +113,6 @@ class Metrics:
         """Count an answer on a socket.
 
         Args:
-            endpoint: Path of the socket.
             status: Status of the answer, as of the route.
             wait_s: Time from the arrival of the message to the start of the decision [s].
             total_s: Time from the arrival to the answer [s].

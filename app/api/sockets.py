@@ -16,10 +16,7 @@ MAX_REASON = 123
 async def refuse(client: WebSocket, reason: str, code: int = TRY_AGAIN) -> None:
     """Open and close a socket; a browser sees the reason of no other refusal.
 
-    Args:
-        client: Socket that is not open yet.
-        reason: One sentence, of which 123 bytes are sent.
-        code: Close code.
+    The reason is one sentence, of which 123 bytes are sent.
     """
     offered: list[str] = client.scope.get("subprotocols", [])
     await client.accept(offered[0] if offered else None)

@@ -87,12 +87,7 @@ def _field(place: Sequence[str | int]) -> str:
 
 
 def fault_in_address(path: str, query: bytes) -> Member | None:
-    """Return field, value, rule and choices of a fault in an address, or None.
-
-    Args:
-        path: Its path, decoded.
-        query: Its query, encoded.
-    """
+    """Return field, value, rule and choices of a fault in a decoded path or encoded query."""
     if _WRONG.search(path):
         return member("path", shown(path), _TEXT_RULE)
     if b"%00" in query or b"\0" in query:

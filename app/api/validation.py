@@ -176,7 +176,6 @@ def without_inner_tags(
 
     Args:
         location: Location of the error; those outside the body have no tags.
-        model: The body's model.
 
     Returns:
         The location; the model of the last tag, or the body's; the path inside that model.
@@ -229,11 +228,7 @@ def without_tag(
 
 
 class BodyFault(RequestValidationError):
-    """A body does not match a model that its route has chosen.
-
-    Args:
-        errors: Pydantic's errors.
-    """
+    """A body does not match a model that its route has chosen."""
 
     def __init__(self, errors: Sequence[Mapping[str, Any]], model: type[BaseModel]) -> None:
         super().__init__([{**one, "loc": ("body", *one["loc"])} for one in errors])

@@ -62,14 +62,7 @@ app.add_typer(recordings.app, name="recordings")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one command.
-
-    Args:
-        arguments: Command line; that of the process by default.
-
-    Returns:
-        The exit status.
-    """
+    """Run one command, by default that of the process; return the exit status."""
     logs.set_up("text")
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="backslashreplace")  # names of files may be any bytes

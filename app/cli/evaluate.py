@@ -68,7 +68,6 @@ def find_checkpoint(reference: str, settings: "Settings") -> "Checkpoint":
 
     Args:
         reference: A file, a shipped alias, or a SHA-256 or alias of the database.
-        settings: Where the database is.
 
     Raises:
         NotFound: No checkpoint has that name.

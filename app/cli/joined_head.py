@@ -18,7 +18,6 @@ class JoinedHead(asyncio.Transport):
     Heads of answers without a stated length, such as streams of events, leave at once.
 
     Args:
-        transport: Transport of the connection.
         has_body: Whether answers to the request's method have a body.
     """
 

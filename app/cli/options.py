@@ -47,12 +47,8 @@ def prepared_settings(
 ) -> "Settings":
     """Read the settings and keep compiled kernels in the data folder.
 
-    Must run before a kernel is imported. A read-only source tree works this way.
-
-    Args:
-        host: Address to listen on, in place of ``TANDEM_HOST``.
-        port: Port, in place of ``TANDEM_PORT``.
-        data: Data folder, in place of ``TANDEM_DATA``.
+    Must run before a kernel is imported. A read-only source tree works this way. The arguments
+    replace ``TANDEM_HOST``, ``TANDEM_PORT`` and ``TANDEM_DATA``.
 
     Raises:
         InvalidInput: A setting is unknown or breaks a rule.

@@ -133,8 +133,6 @@ def run(settings: Settings, sock: socket.socket, report: Callable[[str], None]) 
     """Run the service until it is stopped by a signal.
 
     Args:
-        settings: Where and how it runs.
-        sock: Listening socket.
         report: Called with the address at the start and once the service is ready, or with the
             reason why it cannot decide.
 
