@@ -122,25 +122,24 @@ class Writer:
                 parts.append(f"{word}={{{', '.join(pairs)}}}")
         for name in of_path:
             path = path.replace(f"{{{name}}}", "{}")
-        address = ", ".join([f'"{path}"', *of_path])
-        kind, ending = self._answer(operation, f'"{method.upper()}"', address, parts)
+        given = [*of_path, *parts]
+        kind, ending = self._answer(operation, method.upper(), path, given)
         return (
             f"    def {operation['operationId']}({', '.join(arguments)}) -> {kind}:\n"
             f'        """{operation["summary"]}."""\n        {ending}\n'
         )
 
     def _answer(
-        self, operation: Node, method: str, address: str, parts: list[str]
+        self, operation: Node, method: str, path: str, given: list[str]
     ) -> tuple[str, str]:
         """Return the type of an answer, and the statement that returns it."""
-        send = f"self._send({', '.join([method, address, *parts])})"
+        call = ", ".join([f'"{method} {path}"', *given])
+        send = f"self._send({call})"
         status = next(one for one in operation["responses"] if one.startswith("2"))
         content = operation["responses"][status].get("content", {})
         if "text/event-stream" in content:
-            return (
-                "Iterator[StreamEvent]",
-                f"return self._events({', '.join([address, *parts])})",
-            )
+            address = ", ".join([f'"{path}"', *given])
+            return "Iterator[StreamEvent]", f"return self._events({address})"
         if not content:
             return "None", send
         if "application/json" not in content:
@@ -153,7 +152,7 @@ class Writer:
         model = self._model(content["application/json"]["schema"])
         if model is None:
             return "dict[str, Any]", f"return dict({send}.json())"
-        return model, f"return self._parsed({', '.join([model, method, address, *parts])})"
+        return model, f"return self._parsed({model}, {call})"
 
     def _body(self, media: Node) -> str:
         """Return the type of a JSON body."""

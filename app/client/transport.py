@@ -91,20 +91,17 @@ class Transport:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def _send(
-        self, method: str, path: str, *names: str, **parts: Unpack[RequestParts]
-    ) -> httpx.Response:
+    def _send(self, route: str, *names: str, **parts: Unpack[RequestParts]) -> httpx.Response:
         """Return an answer.
 
         Args:
-            method: HTTP method.
-            path: Path, with ``{}`` for each name.
+            route: Method and path, with ``{}`` for each name.
             names: Ids and names in the path, not encoded.
-            parts: The rest of the request.
 
         Raises:
             Refused: The server answered a problem.
         """
+        method, _, path = route.partition(" ")
         headers, content = _texts(parts.get("headers")), parts.get("content")
         body = parts.get("body")
         if body is not None:
@@ -124,20 +121,15 @@ class Transport:
         return answer
 
     def _parsed(
-        self,
-        model: type[M],
-        method: str,
-        path: str,
-        *names: str,
-        **parts: Unpack[RequestParts],
+        self, model: type[M], route: str, *names: str, **parts: Unpack[RequestParts]
     ) -> M:
         """Return an answer as its schema; arguments as of :meth:`_send`."""
-        return model.model_validate_json(self._send(method, path, *names, **parts).content)
+        return model.model_validate_json(self._send(route, *names, **parts).content)
 
     def _events(
         self, path: str, *names: str, headers: Json | None = None
     ) -> Iterator[StreamEvent]:
-        """Yield the events of a stream until it ends; path and names as of :meth:`_send`.
+        """Yield the events of a stream until it ends; names as of :meth:`_send`.
 
         Raises:
             Refused: The server answered a problem.

@@ -124,7 +124,7 @@ def test_dots_of_a_name_lead_to_no_other_route(client: Client, name: str) -> Non
 
 def test_redirection_is_no_success(client: Client) -> None:
     with pytest.raises(httpx.HTTPStatusError, match="307"):
-        client._send("GET", "/viewer/{}", "main")  # redirected to the one with a slash
+        client._send("GET /viewer/{}", "main")  # redirected to the one with a slash
 
 
 def test_a_file_has_more_time_than_other_requests(address: str, silent: str) -> None:

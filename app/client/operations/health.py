@@ -9,12 +9,12 @@ class HealthOperations(Transport):
 
     def health(self) -> HealthPublic:
         """200 while the process answers."""
-        return self._parsed(HealthPublic, "GET", "/healthz")
+        return self._parsed(HealthPublic, "GET /healthz")
 
     def ready(self) -> ReadinessPublic:
         """200 when the service can decide."""
-        return self._parsed(ReadinessPublic, "GET", "/readyz")
+        return self._parsed(ReadinessPublic, "GET /readyz")
 
     def scrape(self) -> str:
         """Metrics for Prometheus."""
-        return self._send("GET", "/metrics").text
+        return self._send("GET /metrics").text

@@ -22,11 +22,7 @@ class JobsOperations(Transport):
     ) -> JobPublic:
         """Post a job."""
         return self._parsed(
-            JobPublic,
-            "POST",
-            "/v1/jobs",
-            body=body,
-            headers={"idempotency-key": idempotency_key},
+            JobPublic, "POST /v1/jobs", body=body, headers={"idempotency-key": idempotency_key}
         )
 
     def list_jobs(
@@ -43,8 +39,7 @@ class JobsOperations(Transport):
         """List the jobs."""
         return self._parsed(
             JobList,
-            "GET",
-            "/v1/jobs",
+            "GET /v1/jobs",
             query={
                 "cursor": cursor,
                 "limit": limit,
@@ -57,15 +52,15 @@ class JobsOperations(Transport):
 
     def get_job(self, job_id: str) -> JobPublic:
         """One job."""
-        return self._parsed(JobPublic, "GET", "/v1/jobs/{}", job_id)
+        return self._parsed(JobPublic, "GET /v1/jobs/{}", job_id)
 
     def update_job(self, job_id: str, body: JobChanges | Mapping[str, Any]) -> JobPublic:
         """Change name, notes, priority or budgets of a job."""
-        return self._parsed(JobPublic, "PATCH", "/v1/jobs/{}", job_id, body=body)
+        return self._parsed(JobPublic, "PATCH /v1/jobs/{}", job_id, body=body)
 
     def delete_job(self, job_id: str) -> None:
         """Delete an ended job."""
-        self._send("DELETE", "/v1/jobs/{}", job_id)
+        self._send("DELETE /v1/jobs/{}", job_id)
 
     def get_job_metrics(
         self, job_id: str, *, after_step: int | None = None, limit: int | None = None
@@ -73,15 +68,14 @@ class JobsOperations(Transport):
         """A job's learning curve."""
         return self._parsed(
             MetricsPublic,
-            "GET",
-            "/v1/jobs/{}/metrics",
+            "GET /v1/jobs/{}/metrics",
             job_id,
             query={"after_step": after_step, "limit": limit},
         )
 
     def get_job_log(self, job_id: str, *, tail: int | None = None) -> str:
         """A job's output."""
-        return self._send("GET", "/v1/jobs/{}/log", job_id, query={"tail": tail}).text
+        return self._send("GET /v1/jobs/{}/log", job_id, query={"tail": tail}).text
 
     def stream_job(
         self, job_id: str, *, last_event_id: int | None = None
@@ -93,20 +87,19 @@ class JobsOperations(Transport):
 
     def cancel_job(self, job_id: str) -> JobPublic:
         """Cancel a job."""
-        return self._parsed(JobPublic, "POST", "/v1/jobs/{}/cancel", job_id)
+        return self._parsed(JobPublic, "POST /v1/jobs/{}/cancel", job_id)
 
     def resume_job(
         self, job_id: str, body: Budget | Mapping[str, Any] | None = None
     ) -> JobPublic:
         """Resume an ended job."""
-        return self._parsed(JobPublic, "POST", "/v1/jobs/{}/resume", job_id, body=body)
+        return self._parsed(JobPublic, "POST /v1/jobs/{}/resume", job_id, body=body)
 
     def retry_job(self, job_id: str, *, idempotency_key: str | None = None) -> JobPublic:
         """Run a cancelled or failed job again."""
         return self._parsed(
             JobPublic,
-            "POST",
-            "/v1/jobs/{}/retry",
+            "POST /v1/jobs/{}/retry",
             job_id,
             headers={"idempotency-key": idempotency_key},
         )
@@ -117,8 +110,7 @@ class JobsOperations(Transport):
         """Start a job like another, with changes."""
         return self._parsed(
             JobPublic,
-            "POST",
-            "/v1/jobs/{}/clone",
+            "POST /v1/jobs/{}/clone",
             job_id,
             body=body,
             headers={"idempotency-key": idempotency_key},
@@ -126,8 +118,8 @@ class JobsOperations(Transport):
 
     def list_presets(self) -> PresetList:
         """List the presets."""
-        return self._parsed(PresetList, "GET", "/v1/presets")
+        return self._parsed(PresetList, "GET /v1/presets")
 
     def list_protocols(self) -> ProtocolList:
         """List the protocols."""
-        return self._parsed(ProtocolList, "GET", "/v1/protocols")
+        return self._parsed(ProtocolList, "GET /v1/protocols")

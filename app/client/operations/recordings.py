@@ -11,7 +11,7 @@ class RecordingsOperations(Transport):
 
     def list_recordings(self) -> RecordingList:
         """List the recordings."""
-        return self._parsed(RecordingList, "GET", "/v1/recordings")
+        return self._parsed(RecordingList, "GET /v1/recordings")
 
     def create_recording(
         self,
@@ -27,8 +27,7 @@ class RecordingsOperations(Transport):
         """Import a recording."""
         return self._parsed(
             RecordingPublic,
-            "POST",
-            "/v1/recordings",
+            "POST /v1/recordings",
             content=content,
             query={
                 "file_name": file_name,
@@ -42,8 +41,8 @@ class RecordingsOperations(Transport):
 
     def get_recording(self, name: str) -> RecordingPublic:
         """One recording."""
-        return self._parsed(RecordingPublic, "GET", "/v1/recordings/{}", name)
+        return self._parsed(RecordingPublic, "GET /v1/recordings/{}", name)
 
     def delete_recording(self, name: str) -> None:
         """Remove a recording."""
-        self._send("DELETE", "/v1/recordings/{}", name)
+        self._send("DELETE /v1/recordings/{}", name)

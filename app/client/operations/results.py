@@ -15,12 +15,12 @@ class ResultsOperations(Transport):
     ) -> ComparisonPublic:
         """Compare jobs."""
         return self._parsed(
-            ComparisonPublic, "GET", "/v1/comparison", query={"job": job, "quantity": quantity}
+            ComparisonPublic, "GET /v1/comparison", query={"job": job, "quantity": quantity}
         )
 
     def get_comparison_csv(self, *, job: Sequence[str]) -> str:
         """Download the curves of jobs."""
-        return self._send("GET", "/v1/comparison/csv", query={"job": job}).text
+        return self._send("GET /v1/comparison/csv", query={"job": job}).text
 
     def list_all_evaluations(
         self,
@@ -33,8 +33,7 @@ class ResultsOperations(Transport):
         """List the evaluations."""
         return self._parsed(
             EvaluationList,
-            "GET",
-            "/v1/evaluations",
+            "GET /v1/evaluations",
             query={
                 "protocol": protocol,
                 "checkpoint": checkpoint,
@@ -45,12 +44,12 @@ class ResultsOperations(Transport):
 
     def list_trials(self, job_id: str) -> TrialList:
         """The trials of a sweep."""
-        return self._parsed(TrialList, "GET", "/v1/jobs/{}/trials", job_id)
+        return self._parsed(TrialList, "GET /v1/jobs/{}/trials", job_id)
 
     def get_report(self, job_id: str) -> str:
         """The page of a report."""
-        return self._send("GET", "/v1/jobs/{}/report", job_id).text
+        return self._send("GET /v1/jobs/{}/report", job_id).text
 
     def get_evaluation(self, job_id: str) -> EvaluationPublic:
         """One evaluation."""
-        return self._parsed(EvaluationPublic, "GET", "/v1/evaluations/{}", job_id)
+        return self._parsed(EvaluationPublic, "GET /v1/evaluations/{}", job_id)
