@@ -39,9 +39,8 @@ def test_shipped_cells_say_what_they_are_for(client: TestClient) -> None:
 
 
 def test_unknown_cell_is_not_found_with_the_known_ones(client: TestClient) -> None:
-    answer = client.get("/v1/cells/kitchen")
-    assert answer.status_code == 404
-    assert answer.json()["known"] == list(cell_names())
+    problem = problem_of(client.get("/v1/cells/kitchen"), 404)
+    assert problem["known"] == list(cell_names())
 
 
 def test_own_cell_is_kept_listed_and_removed(client: TestClient, added: dict[str, Any]) -> None:
@@ -125,10 +124,8 @@ def test_job_in_a_cell_that_cannot_be_trained_in_is_refused(client: TestClient) 
         (3, ""),
     ):
         body = {"kind": "train", "preset": "pick-td3", "overrides": {"cell": name}}
-        answer = client.post("/v1/jobs", json=body)
-        assert answer.status_code == 422
-        assert answer.json()["field"] == "overrides.cell"
-        assert rule in answer.json()["rule"]
+        problem = problem_of(client.post("/v1/jobs", json=body))
+        assert problem["field"] == "overrides.cell" and rule in problem["rule"]
 
 
 def test_cell_with_a_waiting_job_cannot_be_removed(

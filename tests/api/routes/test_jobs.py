@@ -97,10 +97,8 @@ def test_bad_evaluation_is_refused_by_field(
     client: TestClient, change: dict[str, Any], field: str
 ) -> None:
     body = {"kind": "evaluate", "protocol": "pick-single", "episodes": 10, **change}
-    answer = client.post("/v1/jobs", json=body)
-    assert answer.status_code == 422
-    assert answer.json()["field"] == field
-    assert "pick" in answer.text
+    problem = problem_of(client.post("/v1/jobs", json=body))
+    assert problem["field"] == field and "pick" in str(problem)
 
 
 @pytest.fixture(scope="module")
@@ -138,10 +136,8 @@ def test_bad_recordings_are_refused_by_field(
     client: TestClient, wave: str, change: dict[str, Any], field: str, text: str
 ) -> None:
     body = {"kind": "evaluate", "protocol": "pick-mocap", "episodes": 2, **change}
-    answer = client.post("/v1/jobs", json=body)
-    assert answer.status_code == 422 and wave
-    assert answer.json()["field"] == field
-    assert text in answer.text
+    problem = problem_of(client.post("/v1/jobs", json=body))
+    assert problem["field"] == field and text in str(problem) and wave
 
 
 def test_evaluation_beside_a_stored_recording_is_accepted(
@@ -222,9 +218,7 @@ def test_bad_query_is_refused_by_field(client: TestClient, query: str, field: st
 
 def test_unknown_job_is_not_found_on_every_route(client: TestClient) -> None:
     for path in ("", "/metrics", "/events", "/log"):
-        answer = client.get(f"/v1/jobs/nothing{path}")
-        assert answer.status_code == 404
-        assert answer.headers["content-type"] == "application/problem+json"
+        problem_of(client.get(f"/v1/jobs/nothing{path}"), 404)
     assert client.post("/v1/jobs/nothing/cancel").status_code == 404
 
 
