@@ -96,19 +96,6 @@ class KnownPerson(NamedTuple):
         }
 
 
-def known_people(
-    entries: Sequence[PersonInput], cell: Cell, trackers: TrackerSessions
-) -> tuple[KnownPerson, ...]:
-    """Return the people of a request.
-
-    Raises:
-        InvalidInput: An impossible state, with its place in the request.
-    """
-    return tuple(
-        _known(entry, f"people[{i}].", cell, trackers) for i, entry in enumerate(entries)
-    )
-
-
 class PeopleForPolicy(NamedTuple):
     """The people of a request that a policy may observe: at most four, the nearest."""
 
@@ -153,13 +140,15 @@ def people_for_policy(
     Raises:
         InvalidInput: An impossible person, with its place.
     """
-    known = known_people(entries, cell, trackers)
+    known = tuple(
+        _known(entry, f"people[{i}].", cell, trackers) for i, entry in enumerate(entries)
+    )
     present = {i: one.person for i, one in enumerate(known) if one.person is not None}
-    places = tuple(nearest_places(present, cell, q))
+    places = tuple(_nearest_places(present, cell, q))
     return PeopleForPolicy(known=known, places=places, people=tuple(present[i] for i in places))
 
 
-def nearest_places(people: Mapping[int, Person], cell: Cell, q: Vec) -> list[int]:
+def _nearest_places(people: Mapping[int, Person], cell: Cell, q: Vec) -> list[int]:
     """Return the indices of at most four people, those nearest to the robot, ascending.
 
     Args:

@@ -10,8 +10,7 @@ from starlette.concurrency import run_in_threadpool
 
 from app.api.known_people import (
     is_slow_conversion,
-    known_people,
-    nearest_places,
+    people_for_policy,
     renumbered,
     require_all_tracked,
 )
@@ -63,32 +62,22 @@ def decide(
     trackers: TrackerSessions,
     left_out: Sequence[LeftOut] = (),
 ) -> Data:
-    """Return the data of the answer to one request, a :class:`MotionAnswer`.
-
-    Args:
-        request: State, people and goal.
-        decider: The policy, trained in that cell.
-        trackers: The open trackers.
-        left_out: Parts that a late request is answered without.
-
-    Raises:
-        ServiceError: The request cannot be answered.
-    """
+    """Return what :func:`answer` does, by a policy that was trained in the cell."""
     require_all_tracked(request.people, trackers)
-    people = known_people(request.people, cell, trackers)
-    as_seen = all(one.observed is one.person for one in people)
-    present = {i: one.person for i, one in enumerate(people) if one.person is not None}
-    last = {i: one.observed for i, one in enumerate(people) if one.observed is not None}
     q = request.robot.joints(request.robot.q)
     # The policy observes the nearest, the safety layer all: a person farther away may be
     # the one who comes too near.
-    seen, monitored = nearest_places(present, cell, q), list(last)
+    people = people_for_policy(request.people, cell, trackers, q)
+    known, seen = people.known, list(people.places)
+    last = {i: one.observed for i, one in enumerate(known) if one.observed is not None}
+    monitored = list(last)
+    as_seen = seen == monitored and all(one.observed is one.person for one in known)
     query = request.to_domain(
-        [present[i] for i in seen],
-        None if as_seen and seen == monitored else [last[i] for i in monitored],
+        people.people,
+        None if as_seen else list(last.values()),
         safety_settings(cell),
-        max((one.age_s for one in people), default=0.0),
-        max((one.displaced_m for one in people), default=0.0),
+        max((one.age_s for one in known), default=0.0),
+        max((one.displaced_m for one in known), default=0.0),
     )
     if "search" in left_out:
         query = replace(query, search=False)
@@ -96,7 +85,7 @@ def decide(
         query = replace(query, rollout=False)
     with request.robot.faults_in_place():
         decision = decider.decide(query)
-    if not seen == monitored == list(range(len(people))):
+    if not seen == monitored == list(range(len(known))):
         nearest = decision.nearest_person
         decision = decision._replace(
             nearest_person=None if nearest is None else seen[nearest],
@@ -105,8 +94,7 @@ def decide(
         )
     weights = dict(zip(seen, decision.person_weights, strict=True))
     uses = [
-        one.use(i == decision.nearest_person, i in present and i not in seen)
-        | (weights[i]._asdict() if i in weights else NO_WEIGHT)
-        for i, one in enumerate(people)
+        use | (weights[i]._asdict() if i in weights else NO_WEIGHT)
+        for i, use in enumerate(people.uses(decision.nearest_person))
     ]
     return MotionAnswer.data_of(decision, query, uses, cell.robot.dt, request.stamp)
