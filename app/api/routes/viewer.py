@@ -182,10 +182,8 @@ async def to_viewer(client: WebSocket, viewer: ClientConnection) -> None:
         if len(frame or message.get("text") or "") > MAX_MESSAGE:
             await client.close(TOO_LARGE, f"a frame has at most {MAX_MESSAGE} bytes")
             return
-        if len(frame) <= SMALL_BYTES:
-            allowed = is_allowed(frame)
-        else:
-            allowed = await asyncio.to_thread(is_allowed, frame)
+        small = len(frame) <= SMALL_BYTES
+        allowed = is_allowed(frame) if small else await asyncio.to_thread(is_allowed, frame)
         if allowed:
             await viewer.send(frame)
         else:
