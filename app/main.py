@@ -41,7 +41,7 @@ from app.policies.inference.reach_policy import ReachPolicy
 from app.policies.inference.sorting_policy import SortingPolicy
 from app.policies.inference.task_selection import TaskChooser
 from app.provenance import VERSION
-from app.settings import Settings, check_access
+from app.settings import Settings, check_access, make_data_folder
 from app.sim.cells.cell import Cell, load_cell
 from app.sim.core.kernel_cache import kernel_cache
 from app.sim.pick.task_policy import TaskPolicy
@@ -124,7 +124,7 @@ class Service:
     """
 
     def __init__(self, settings: Settings, counts: Metrics, tracer: Tracer) -> None:
-        settings.data.mkdir(parents=True, exist_ok=True)
+        make_data_folder(settings)
         store = Store(settings.database)
         worlds: dict[str, LiveWorld] = {}
         names = CheckpointNames(store)

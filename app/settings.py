@@ -152,6 +152,19 @@ def _with_token(settings: Settings) -> Settings:
     return settings.model_copy(update={"token": SecretStr(token)})
 
 
+def make_data_folder(settings: Settings) -> None:
+    """Make the data folder if it is missing.
+
+    Raises:
+        InvalidInput: It cannot be made, or a file has its name.
+    """
+    try:
+        settings.data.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        rule = f"must be a folder that exists or can be made: {error.strerror}"
+        raise InvalidInput(f"{PREFIX}DATA", str(settings.data), rule) from None
+
+
 def check_access(settings: Settings) -> None:
     """Check that the settings protect the service.
 

@@ -30,10 +30,11 @@ def backup(file: File, as_json: Json = False) -> None:
 def restore(file: File, as_json: Json = False) -> None:
     """Replace the database by that of a backup; the server must be stopped."""
     settings = prepared_settings()
+    from app.settings import make_data_folder
     from app.store.database.backup import restore_backup
     from app.store.engine import Store
 
-    settings.data.mkdir(parents=True, exist_ok=True)
+    make_data_folder(settings)
     with closing(Store(settings.database)) as store:
         found, kept = restore_backup(store, settings.data, file)
     text = f"{_text(found)}\nrestored to {store.shown_url}"

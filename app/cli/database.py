@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from contextlib import closing, contextmanager
 
 from app.errors import Conflict, NotFound
-from app.settings import Settings
+from app.settings import Settings, make_data_folder
 from app.store.database.lease import Lease
 from app.store.database.lock import ServerLock
 from app.store.database.migrate import migrate
@@ -33,7 +33,7 @@ def opened(settings: Settings, noun: str, *, create: bool = False) -> Iterator[S
         Conflict: It has the tables of another version.
     """
     if create:
-        settings.data.mkdir(parents=True, exist_ok=True)
+        make_data_folder(settings)
     elif not has_database(settings):
         raise NotFound(f"{noun}: there is no database at", settings.database)
     with closing(Store(settings.database)) as store:

@@ -6,7 +6,7 @@ import socket
 from contextlib import closing
 
 from app.errors import Conflict, InvalidInput
-from app.settings import Settings
+from app.settings import Settings, make_data_folder
 from app.store.database.lease import Lease
 from app.store.database.lock import ServerLock
 from app.store.engine import Store
@@ -52,7 +52,7 @@ def check_database_unused(settings: Settings) -> None:
     Raises:
         Conflict: Another server does.
     """
-    settings.data.mkdir(parents=True, exist_ok=True)
+    make_data_folder(settings)
     with closing(Store(settings.database)) as store:
         lock = ServerLock(store, settings.data)
         try:

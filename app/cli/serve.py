@@ -36,9 +36,10 @@ def setup() -> None:
     from app.cli.database import upgrade
     from app.precompile import PARTS, compile_all
     from app.provenance import cores
+    from app.settings import make_data_folder
     from app.store.engine import Store
 
-    settings.data.mkdir(parents=True, exist_ok=True)
+    make_data_folder(settings)
     with closing(Store(settings.database)) as store:
         upgrade(store, settings)
         print(f"database: {store.shown_url}", flush=True)

@@ -199,10 +199,13 @@ def test_folder_that_cannot_be_made_is_named_without_a_traceback(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (tmp_path / "file").write_text("")
-    monkeypatch.setenv("TANDEM_DATA", str(tmp_path / "file" / "data"))
+    folder = tmp_path / "file" / "data"
+    monkeypatch.setenv("TANDEM_DATA", str(folder))
     (tmp_path / "clip.csv").write_text(csv_text(working(100)))
-    assert main(["recordings", "import", str(tmp_path / "clip.csv"), "--keep"]) == 1
-    assert capsys.readouterr().err == f"tandem: {tmp_path}/file/data: Not a directory\n"
+    for command in (["recordings", "import", str(tmp_path / "clip.csv"), "--keep"], ["setup"]):
+        assert main(command) == 2
+        rule = "must be a folder that exists or can be made: Not a directory"
+        assert capsys.readouterr().err == f"tandem: TANDEM_DATA = '{folder}' {rule}\n"
 
 
 def test_missing_library_of_the_system_is_one_line(tmp_path: Path) -> None:
