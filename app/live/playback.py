@@ -109,7 +109,12 @@ class PlayedMotion:
 
 
 def is_outside(q: Vec, worker: Worker) -> bool:
-    """Return whether the pelvis of a posture is outside a walking area by more than 0.02 m."""
+    """Return whether a pelvis is outside a walking area by more than 0.02 m.
+
+    Args:
+        q: Joint positions [m, rad], shape (18,).
+        worker: Person with the walking area.
+    """
     x, y, slack = float(q[0]), float(q[1]), 0.02
     inside_x = worker.x_min - slack <= x <= worker.x_max + slack
     return not (inside_x and worker.y_min - slack <= y <= worker.y_max + slack)

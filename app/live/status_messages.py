@@ -52,9 +52,12 @@ def value_text(value: float, digits: int = 2) -> str:
 
 
 def length_text(metres: float) -> str:
-    """Return a length of at least 0 in metres, in millimetres below 1 cm.
+    """Return a length in metres, in millimetres below 1 cm.
 
     The page has the same rule: ``length`` in web/page/format.js.
+
+    Args:
+        metres: The length [m], not negative.
     """
     mm = math.floor(1000.0 * metres + 0.5)
     if mm >= 10:

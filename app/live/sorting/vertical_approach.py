@@ -47,7 +47,12 @@ class VerticalApproach:
         return above(self.point, min(APPROACH_M, FUNNEL * max(error - AT_M, 0.0)))
 
     def is_over(self, tcp: Vec, now: float) -> bool:
-        """Return whether the step is complete or has timed out at ``now`` [s]."""
+        """Return whether the step is complete or has timed out.
+
+        Args:
+            tcp: Position of the tcp [m], shape (3,).
+            now: Time in the present status [s].
+        """
         age = now - self.since
         if self.step == "down":
             return self.is_down(tcp) or age > DOWN_S

@@ -28,7 +28,11 @@ def top_of(box: Obstacle) -> float:
 def support_height(cell: Cell, point: Sequence[float]) -> float:
     """Return the height of the table or obstacle that carries what is at a point [m].
 
-    The highest top below the point; 0, the table's, where nothing is below it.
+    Args:
+        point: Point [m], shape (3,).
+
+    Returns:
+        The highest top below it; 0, the table's, where nothing is below it.
     """
     tops = [top_of(box) for box in cell.obstacles if is_over(box, point)]
     tops += [0.0] if is_over_table(cell.table, point) else []

@@ -52,7 +52,12 @@ def no_people() -> Shapes:
 
 
 def capsule_shapes(ends: Vec, radius: Vec) -> Shapes:
-    """Return people given by the ends, shape (m, 2, 3), and radii of capsules [m], (m,)."""
+    """Return people given by capsules.
+
+    Args:
+        ends: Ends of the capsules [m], shape (m, 2, 3).
+        radius: Their radii [m], shape (m,).
+    """
     return replace(no_people(), columns=capsules_soa(ends, radius, padded_size(len(radius))))
 
 
@@ -133,9 +138,12 @@ class Checker:
         return all(self.edge_free(a, b) for a, b in zip(path[:-1], path[1:], strict=True))
 
     def first_blocked(self, q: Vec, qd: Vec, first: int = 0) -> int:
-        """Return the first period, from ``first`` on, of a timed path that is not free; else n.
+        """Return the first period of a timed path that is not free; see the kernel.
 
-        Its n + 1 knots have positions ``q`` [rad] and speeds ``qd`` [rad/s], shape (n + 1, 6).
+        Args:
+            q: Joint positions between periods [rad], shape (n + 1, 6).
+            qd: Joint speeds between periods [rad/s], shape (n + 1, 6).
+            first: Period to begin with.
         """
         shared = self._obstacles, self._pose
         return int(free.first_blocked(self.arm, q, qd, self.arm.dt, first, *shared))

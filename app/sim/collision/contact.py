@@ -2,10 +2,6 @@
 
 The same kernels as those of the batches (``kernels/contact.py``), so that reports agree with
 training.
-
-People are given by ``human_q``, the workers' joints [m, rad], shape (W, 18); ``cylinders``, the
-walkers' x, y and radius [m], shape (C, 3); and ``sizes``, the workers' sizes [m], shape
-(W, body.N_SIZE), or None for the cell's person.
 """
 
 from dataclasses import dataclass
@@ -65,7 +61,14 @@ class Clearance:
 def clearance(
     arm: Arm, people: People, q: Vec, human_q: Vec, cylinders: Vec, sizes: Vec | None = None
 ) -> Clearance:
-    """Return the distances of the robot at joint positions ``q`` [rad], shape (6,)."""
+    """Return the distances of the robot at ``q``.
+
+    Args:
+        q: Joint positions [rad], shape (6,).
+        human_q: The workers' joints [m, rad], shape (W, 18).
+        cylinders: The walkers' x, y and radius [m], shape (C, 3).
+        sizes: The workers' sizes [m], shape (W, body.N_SIZE); None for the cell's person.
+    """
     robot = _robot_at(arm, q)
     geometry = people_geometry_of(people, human_q, cylinders, sizes)
     to_people, to_cell, to_self = kernel.clearances(arm, people, robot, geometry)
@@ -84,9 +87,10 @@ def contact(
 
     Args:
         path: The robot's path in the period.
-        human_q: The workers at start and end.
-        cylinders: The walkers at start and end.
-        sizes: The workers' sizes, or those at start and end where pelvis or lengths change.
+        human_q: The workers' joints at start and end [m, rad], shape (W, 18) each.
+        cylinders: The walkers' x, y, radius at start and end [m], shape (C, 3) each.
+        sizes: The workers' sizes [m], shape (W, body.N_SIZE), or those at start and end where
+            pelvis or lengths change; None for the cell's person.
 
     Raises:
         SimulationError: A number is NaN or infinite.
@@ -124,7 +128,14 @@ def contact(
 
 
 def worker_distances(arm: Arm, people: People, q: Vec, human_q: Vec, sizes: Vec) -> Vec:
-    """Return the distance of the robot at ``q`` [rad] to each worker [m], shape (W,)."""
+    """Return the distance of the robot at ``q`` to each worker [m], shape (W,).
+
+    Args:
+        people: Shared data of W workers.
+        q: Joint positions [rad], shape (6,).
+        human_q: The workers' joints [m, rad], shape (W, 18).
+        sizes: Their sizes [m], shape (W, body.N_SIZE).
+    """
     n_workers = len(human_q)
     if n_workers == 0:
         return np.zeros(0)
@@ -136,7 +147,13 @@ def worker_distances(arm: Arm, people: People, q: Vec, human_q: Vec, sizes: Vec)
 
 
 def pedestrian_distances(arm: Arm, people: People, q: Vec, cylinders: Vec) -> Vec:
-    """Return the distance of the robot at ``q`` [rad] to each walker [m], shape (C,)."""
+    """Return the distance of the robot at ``q`` to each walking cylinder [m], shape (C,).
+
+    Args:
+        people: Shared data with the height of cylinders.
+        q: Joint positions [rad], shape (6,).
+        cylinders: x, y and radius of each [m], shape (C, 3).
+    """
     columns, top = _robot_at(arm, q).columns, people.top_z
     found = [cylinder_clearance(columns, 0, x, y, r, top)[0] for x, y, r in cylinders]
     return np.array(found)

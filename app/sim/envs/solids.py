@@ -39,7 +39,7 @@ class Capsule:
     opacity: float = 1.0
 
     def corners(self) -> Floats:
-        """Return the corners of a box around it."""
+        """Return the corners of a box around it [m], shape (8, 3)."""
         ends = np.stack([single(self.start), single(self.end)])
         low, high = ends.min(axis=0) - self.radius, ends.max(axis=0) + self.radius
         return single(0.5 * (low + high) + 0.5 * (high - low) * _UNIT)
@@ -81,7 +81,7 @@ class Cylinder:
     opacity: float = 1.0
 
     def corners(self) -> Floats:
-        """Return the corners of a box around it."""
+        """Return the corners of a box around it [m], shape (8, 3)."""
         middle = single(self.base) + single([0.0, 0.0, 0.5 * self.height])
         return middle + single([self.radius, self.radius, 0.5 * self.height]) * _UNIT
 
@@ -122,7 +122,7 @@ class Box:
         return single([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
     def corners(self) -> Floats:
-        """Return its corners."""
+        """Return its corners [m], shape (8, 3)."""
         return single(single(self.center) + single(self.half_size) * _UNIT @ self._turn().T)
 
     def hit(self, origin: Floats, ray: Floats) -> tuple[Floats, Floats]:

@@ -82,7 +82,12 @@ def rest_posture(x: float, y: float, yaw: float) -> Vec:
 
 
 def arm_lengths(size: Vec, hand: str) -> tuple[float, float]:
-    """Return the lengths of an arm [m]: shoulder to elbow, elbow to palm."""
+    """Return the lengths of an arm [m]: shoulder to elbow, elbow to palm.
+
+    Args:
+        size: Body lengths [m], shape (N_SIZE,).
+        hand: ``"r"`` or ``"l"``.
+    """
     side = 0 if hand == "r" else 1
     fore = size[body.FOREARM_R + side] + size[body.HAND]
     return float(size[body.UPPER_ARM_R + side]), float(fore)
@@ -279,7 +284,13 @@ def reach(
 ) -> Posture:
     """Return the posture with one palm at ``position``, the other arm as in ``q_start``.
 
-    The other arguments are those of :func:`solve_hands`.
+    Args:
+        hand: ``"r"`` or ``"l"``.
+        position: Target of the palm [m], shape (3,).
+        q_start: Joint positions to start from [m, rad], shape (18,).
+        size: The person's size [m], shape (12,) (``BodySize.vector``).
+        pelvis: Pelvis x [m], y [m], yaw [rad]; as it is where None.
+        swivel: Turn of the elbow outward [rad].
     """
     right, left = (position, None) if hand == "r" else (None, position)
     return solve_hands(q_start, size, right=right, left=left, pelvis=pelvis, swivel=swivel)

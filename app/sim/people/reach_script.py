@@ -123,11 +123,14 @@ def reach_script(
 
 
 def standing_reach(cell: Cell, palm: Vec, hand: Hand) -> Vec:
-    """Return a posture (18,) with one palm at a point and the other at the table's edge.
+    """Return a posture with one palm at a point and the other at the table's edge.
 
     Args:
         palm: Position of the palm [m], shape (3,).
         hand: The hand.
+
+    Returns:
+        Joint positions [m, rad], shape (18,).
     """
     side = -1 if hand == "r" else 1
     x = float(np.clip(0.8 * palm[0] - side * 0.12, cell.human.x_min, cell.human.x_max))

@@ -76,7 +76,13 @@ class StampTimeline:
         return max(later, self.time + (now - self.arrived))
 
     def accept(self, stamp: float, time: float, now: float) -> None:
-        """Make a frame the newest one, with the ``time`` [s] that :meth:`offer` returned."""
+        """Make a frame the newest one.
+
+        Args:
+            stamp: As offered [s].
+            time: Time returned by :meth:`offer` [s].
+            now: As offered [s].
+        """
         self.jumped = len(self._pending) >= N_RESYNC
         self._pending.clear()
         self.stamp, self.time, self.arrived = stamp, time, now

@@ -35,10 +35,13 @@ class PersonGrid:
     def postures(
         self, person: Person, size: Vec | None = None
     ) -> tuple[Vec, NDArray[np.bool_]]:
-        """Return the joint positions at each position [m, rad], and whether it is reached.
+        """Return the posture at each position, and whether it is reached.
 
-        They have the shapes (ny nx, 18) and (ny nx,). Where a hand is moved, the person's body
-        dimensions ``size`` [m], shape (12,), are needed.
+        Args:
+            size: The person's body dimensions [m], shape (12,); needed where a hand is moved.
+
+        Returns:
+            Joint positions [m, rad], shape (ny nx, 18), and flags, shape (ny nx,).
         """
         y, x = (values.ravel() for values in np.meshgrid(self.y, self.x, indexing="ij"))
         q, reached = np.tile(person.q, (len(x), 1)), np.ones(len(x), dtype=bool)

@@ -84,7 +84,13 @@ class RestingPeoplePlanner:
         return True
 
     def free(self, people: Shapes, grasp: GraspRules, q_over: Vec, q_grasp: Vec) -> Flags:
-        """Return which targets are as far from people as a grasp demands, shape (n,)."""
+        """Return which targets are as far from people as a grasp demands, shape (n,).
+
+        Args:
+            people: People at this moment.
+            q_over: Joint positions over the objects [rad], shape (n, 6).
+            q_grasp: Joint positions at the objects [rad], shape (n, 6).
+        """
         least = grasp.start_clearance
         beside = people.columns.tobytes(), people.cylinders.tobytes(), least
         if beside != self._beside:
@@ -106,6 +112,9 @@ class RestingPeoplePlanner:
         Those that are free, and the one whose pick has begun; all where none is left.
 
         Args:
+            people: People at this moment.
+            q_over: Joint positions over the objects [rad], shape (n, 6).
+            q_grasp: Joint positions at the objects [rad], shape (n, 6).
             begun: Index of the target whose pick has begun; None: of no target.
         """
         left = self.free(people, grasp, q_over, q_grasp)

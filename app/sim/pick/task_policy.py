@@ -198,9 +198,16 @@ class TaskPolicy(PolicyIdentity, Protocol):
         *,
         terms: ChoiceTerms = FRESH,
     ) -> RiskMap:
-        """Choose beside one person in several postures; each choice is that of :meth:`decide`.
+        """Choose beside one person in several postures; each choice is that of ``decide``.
 
         Args:
+            q: Robot joint positions [rad], shape (6,).
+            qd: Robot joint speeds [rad/s], shape (6,).
+            people: The people in the cell, at most four.
+            candidates: The candidates, at least one.
             moved: The person and the postures.
             terms: Terms of the choice beside the state.
+
+        Raises:
+            InvalidInput: A value that no answer can be given for.
         """

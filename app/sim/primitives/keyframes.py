@@ -174,7 +174,14 @@ def _keyframe(size: Vec, pelvis: Vec, palms: Vec, swivel: float) -> tuple[Keyfra
 
 
 def posture(size: Vec, pelvis: Vec, palms: Vec, swivel: float) -> human.Posture:
-    """Return the posture of a person of a size [m] with given stance, palms and swivel."""
+    """Return the posture of a stance with given palms.
+
+    Args:
+        size: The person's size [m], shape (12,).
+        pelvis: Pelvis x [m], y [m], yaw [rad], shape (3,).
+        palms: Right and left palm [m], shape (2, 3).
+        swivel: Swivel of the elbows [rad].
+    """
     x, y, yaw = (float(value) for value in pelvis)
     start = human.rest_posture(x, y, yaw)
     return human.solve_hands(start, size, right=palms[0], left=palms[1], swivel=swivel)
@@ -275,14 +282,24 @@ def is_inside(q: Vec) -> bool:
 
 
 def is_over_table(cell: Cell, q: Vec, size: Vec) -> bool:
-    """Return whether palms, wrists and elbows of a posture are clear of the table."""
+    """Return whether palms, wrists and elbows are clear of the table.
+
+    Args:
+        cell: Work cell.
+        q: Joint positions [m, rad], shape (..., 18).
+        size: Body lengths [m], shape (N_SIZE,).
+    """
     named = human.joint_points(q, size)
     points = np.stack([named[human.POINT_NAMES[i]] for i in _LOW_POINTS])
     return bool((height_over_table(cell, points) >= OVER_TABLE).all())
 
 
 def height_over_table(cell: Cell, points: Vec) -> Vec:
-    """Return the height of points, (..., 3), over the table [m]; infinite beside it, (...)."""
+    """Return the height of points over the table [m], infinite beside the table, shape (...).
+
+    Args:
+        points: Points [m], shape (..., 3).
+    """
     table = cell.table
     x, y, z = points[..., 0], points[..., 1], points[..., 2]
     over = (x >= table.x_min) & (x <= table.x_max) & (y >= table.y_min) & (y <= table.y_max)

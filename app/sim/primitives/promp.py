@@ -156,7 +156,8 @@ def of_weights(
     Args:
         weights: Weights of each demonstration, shape (n, n_joints, n_basis).
         durations: Durations [s], shape (n,).
-        width: As for :func:`fit`, and so is ``floor``.
+        width: Width of the Gaussians [phase]; None: :func:`usual_width`.
+        floor: Standard deviation added to every weight, smoothly along the phase [m, rad].
         residual: Residual of the regression [m, rad], shape (n_joints,); None: nothing.
     """
     n, n_joints, n_basis = weights.shape

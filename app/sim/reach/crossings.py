@@ -96,7 +96,8 @@ def covered(track: Vec, start: Vec, goal: Vec) -> NDArray[np.bool_]:
 
     Args:
         track: x, y, radius at the ends of control periods [m], shape (n + 1, 3).
-        start: Start of the segment [m], shape (3,); ``goal`` is its end.
+        start: Start of the segment [m], shape (>= 2,).
+        goal: Its end [m], shape (>= 2,).
     """
     segment = goal[:2] - start[:2]
     offset = track[:, :2] - start[:2]
@@ -133,9 +134,14 @@ def recorded_crossings(cell: Cell, motions: Sequence[Motion], n: int) -> Crossin
 
 
 def cylinder_track(motion: Motion, floor_z: float, dt: float) -> Vec:
-    """Return a recorded person as cylinders every ``dt`` [s]: x, y, radius [m], shape (n, 3).
+    """Return a recorded person as cylinders: x, y, radius [m], shape (n, 3).
 
     Source: docs/method.md 2.8.
+
+    Args:
+        motion: One run.
+        floor_z: Height of the floor [m].
+        dt: Time between cylinders [s].
     """
     size = motion.size.vector(floor_z)
     times = np.arange(0.0, float(motion.times[-1]) + 1e-9, dt)

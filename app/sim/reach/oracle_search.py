@@ -97,7 +97,13 @@ def sample_detours(
 
 
 def toward(arm: Arm, q: Vec, aim: Vec) -> NDArray[np.float32]:
-    """Return actions of straight motions from ``q`` to ``aim`` [rad], in [-1, 1], (n, 6)."""
+    """Return actions of straight joint motions, in [-1, 1], shape (n, 6).
+
+    Args:
+        arm: From ``scene.arm_of``.
+        q: Joint positions [rad], shape (n, 6).
+        aim: Target configurations [rad], shape (n, 6).
+    """
     return np.clip(GAIN * (aim - q) / arm.limits.qd_max, -1.0, 1.0).astype(np.float32)
 
 
@@ -133,7 +139,13 @@ class OracleSearch:
         return np.flatnonzero(self.resimulations.reached == 0)
 
     def scripted(self, episodes: Index, n_each: int, *, at_once: bool = False) -> None:
-        """Run scripted resimulations; ``at_once``: all move to the goal immediately."""
+        """Run scripted resimulations of some episodes.
+
+        Args:
+            episodes: Their indices, shape (k,).
+            n_each: Resimulations of each.
+            at_once: Whether all move to the goal immediately.
+        """
         for rows in self._parts(episodes, n_each):
             first, until = sample_detours(self._arm, self._rng, len(rows))
             if at_once:
@@ -142,7 +154,13 @@ class OracleSearch:
             self._simulate(rows, lambda batch, k: np.zeros(0), first, until, last)
 
     def disturbed(self, episodes: Index, n_each: int, acts: Acts) -> None:
-        """Run resimulations with a policy and noise on its actions."""
+        """Run resimulations of some episodes with a policy and noise on its actions.
+
+        Args:
+            episodes: Their indices, shape (k,).
+            n_each: Resimulations of each.
+            acts: The policy: actions of all environments of a batch.
+        """
         for rows in self._parts(episodes, n_each):
             first, until = sample_detours(self._arm, self._rng, len(rows))
             until[self._rng.uniform(size=len(rows)) < 0.5] = 0.0

@@ -114,8 +114,12 @@ LEVERS = (1.4432, 1.4319, 0.8199, 0.2476, 0.2123, 0.0469)
 def levers(tool_length: float = 0.12, tool_radius: float = 0.04) -> Vec:
     """Return the largest distance of the robot from each joint's axis [m], shape (6,).
 
-    A point moves at most at the sum of joint speeds times levers. A longer or thicker tool [m]
-    adds its excess; the last joint turns the tool about itself.
+    A point moves at most at the sum of joint speeds times levers. A longer or thicker tool adds
+    its excess; the last joint turns the tool about itself.
+
+    Args:
+        tool_length: Distance from flange to tcp [m].
+        tool_radius: Radius of the tool [m].
     """
     longer, thicker = max(tool_length - 0.12, 0.0), max(tool_radius - 0.04, 0.0)
     return np.array(LEVERS) + longer * np.array([1.0, 1.0, 1.0, 1.0, 1.0, 0.0]) + thicker

@@ -175,12 +175,14 @@ def returning(arm: Arm, q: Vec, act: Vec) -> tuple[Vec, JointLimits]:
     """Return action and limits that lead joints outside their position limits back inside.
 
     Such a joint is given the whole action inward and no limit on the exceeded side: its speed
-    turns inward as fast as its acceleration (and jerk) limits allow. Where no joint is outside,
-    the limits are those of ``arm`` itself.
+    turns inward as fast as its acceleration (and jerk) limits allow.
 
     Args:
         q: Joint positions [rad], shape (6,).
         act: Action in [-1, 1], shape (6,).
+
+    Returns:
+        Action, shape (6,), and limits; those of ``arm`` itself where no joint is outside.
     """
     limits = arm.limits
     if are_inside(q, limits.q_min, limits.q_max):
@@ -195,9 +197,12 @@ def admitting(arm: Arm, q: Vec, qd: Vec) -> Arm:
     """Return the robot with position and speed limits that its own straight stop keeps.
 
     Speed and separation monitoring admits only trajectories inside the limits and stops
-    otherwise. A measured state, ``q`` [rad] and ``qd`` [rad/s], whose straight stop leaves the
-    limits would always be stopped, at any distance of people. Acceleration limits are kept:
-    they determine the stop.
+    otherwise. A state whose straight stop leaves the limits would always be stopped, at any
+    distance of people. Acceleration limits are kept: they determine the stop.
+
+    Args:
+        q: Joint positions as measured [rad], shape (6,).
+        qd: Joint speeds as measured [rad/s], shape (6,).
     """
     rest = q + 0.5 * stop_time(qd, arm.limits.qdd_max) * qd
     low, high, fast = np.minimum(q, rest), np.maximum(q, rest), np.abs(qd)

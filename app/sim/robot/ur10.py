@@ -109,12 +109,15 @@ class Robot:
         )
 
     def ik_vertical(self, position: Vec, q_min: Vec, q_max: Vec) -> Vec | None:
-        """Return joint positions [rad], (6,), with the tool pointing down; None without any.
+        """Return the configuration with the tool pointing down at ``position``.
 
         Args:
             position: Position of the tcp [m], shape (3,).
             q_min: Lower joint limits [rad], shape (6,).
             q_max: Upper joint limits [rad], shape (6,).
+
+        Returns:
+            Joint positions [rad], shape (6,); None where no such configuration exists.
         """
         q, unlimited = np.empty(6), np.full(6, np.inf)
         # Copies: kernels are compiled again for read-only arrays.

@@ -49,9 +49,12 @@ class SafetyDecision:
     """Bound on the displacement of any point of the robot during it, B [m]."""
 
     def at(self, q: Vec, qd: Vec, t: float) -> tuple[Vec, Vec]:
-        """Return joint positions [rad] and speeds [rad/s], shape (6,), at time ``t`` [s].
+        """Return joint positions [rad] and speeds [rad/s], shape (6,), in the period.
 
-        The period starts at ``t = 0`` with positions ``q`` and speeds ``qd``.
+        Args:
+            q: Joint positions at its start [rad], shape (6,).
+            qd: Joint speeds at its start [rad/s], shape (6,).
+            t: Time since its start [s].
         """
         there, speeds = np.empty(6), np.empty(6)
         path = JointPath(as_kernel_array(q), as_kernel_array(qd), self.c, self.d)
@@ -102,8 +105,12 @@ def powers_of_time(decision: SafetyDecision, q: Vec, qd: Vec) -> Vec:
     """Return the executed motion as polynomials in time, ascending, shape (6, 7).
 
     ``q + qd s + c s^2 + d s^3`` at ``s = t - k t^2/2``, expanded in powers of ``t``: seven
-    coefficients per joint, from ``t^0`` to ``t^6``. They hold until rest at ``t = 1/k``. The
-    period starts at positions ``q`` [rad] and speeds ``qd`` [rad/s], shape (6,).
+    coefficients per joint, from ``t^0`` to ``t^6``. They hold until rest at ``t = 1/k``.
+
+    Args:
+        decision: Decision for the period.
+        q: Joint positions at its start [rad], shape (6,).
+        qd: Joint speeds at its start [rad/s], shape (6,).
     """
     k, c, d = decision.path_deceleration, decision.c, decision.d
     return np.stack(

@@ -20,7 +20,11 @@ N_DIRECTIONS = 72
 
 
 def required_distances(arm: Arm, settings: SafetySettings, qd: Vec) -> Vec:
-    """Return S_p of each capsule of the robot [m], (n,), at joint speeds ``qd`` [rad/s]."""
+    """Return S_p of each of the robot's capsules [m], shape (n,).
+
+    Args:
+        qd: Joint speeds [rad/s], shape (6,).
+    """
     t_stop = float(override.stop_time(as_kernel_array(qd), arm.limits.qdd_max))
     t_r = arm.dt + settings.latency
     fastest = np.concatenate([[0.0], np.cumsum(np.abs(qd) * arm.lever)])

@@ -107,7 +107,12 @@ def block_height(cell: Cell) -> float:
 
 
 def half_size(cell: Cell, size: int, n_sizes: int) -> Vec:
-    """Return half of a block's length, width and height [m], (3,); size 0 is the smallest."""
+    """Return half of a block's length, width and height [m], shape (3,).
+
+    Args:
+        cell: Sorting cell.
+        size: 0 the smallest.
+    """
     share = size / (n_sizes - 1) if n_sizes > 1 else 0.5
     width = HALF_WIDTHS[0] + share * (HALF_WIDTHS[-1] - HALF_WIDTHS[0])
     return np.array([width, width, 0.5 * block_height(cell)])

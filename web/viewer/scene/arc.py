@@ -39,7 +39,10 @@ class Arc:
 def dashes(start: Vec, end: Vec, lift: float) -> Vec:
     """Return the dashes of an arc from ``start`` to ``end`` [m], shape (N_STROKES, 2, 3).
 
-    Its height over the straight line is ``lift`` [m], less where the ends are near.
+    Args:
+        start: Its beginning [m], shape (3,).
+        end: Its end [m], shape (3,).
+        lift: Greatest height over the straight line [m]; less where the ends are near.
     """
     ends = (np.arange(N_STROKES)[:, None] + np.array([0.15, 0.75])) / N_STROKES
     line = start + ends[..., None] * (end - start)

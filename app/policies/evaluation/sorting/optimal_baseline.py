@@ -20,7 +20,11 @@ def _work(shape: SortingShape) -> PlannerWork:
 
 
 def measure(batch: SortingBatch, which: Index) -> tuple[Index, Vec]:
-    """Return the fewest moves to the goal and the expected attempts of environments, (m,) each.
+    """Return the fewest moves to the goal and the expected attempts, shape (m,) each.
+
+    Args:
+        batch: Tasks.
+        which: Environments, shape (m,).
 
     Raises:
         SimulationError: The objects of an environment cannot form its goal.
@@ -34,7 +38,12 @@ def measure(batch: SortingBatch, which: Index) -> tuple[Index, Vec]:
 
 
 def choose_by_planner(batch: SortingBatch, which: Index) -> Index:
-    """Return the exact planner's moves in environments that are not at their goals, (m,)."""
+    """Return the exact planner's moves in environments that are not at their goals, (m,).
+
+    Args:
+        batch: Tasks.
+        which: Environments, shape (m,).
+    """
     rows, best = batch.rows, np.zeros(len(which), dtype=np.int64)
     tasks = TaskBatch(
         clutter=rows.clutter[which],
