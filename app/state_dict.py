@@ -1,9 +1,9 @@
 """State of objects as named arrays and JSON values, to resume trainings exactly.
 
-A class lists the attributes that change while it works in ``STATE``. Arrays are restored in
-place, because others hold them, too; random generators, numbers, nested objects and (named)
-tuples of arrays are understood. Anything else in ``STATE`` is an error, so that no part of a
-state is left out silently.
+A class lists in ``STATE`` the attributes that change while it works. Arrays are restored in
+place, because other objects refer to them; random generators, numbers, nested objects and
+(named) tuples of arrays are supported. Anything else in ``STATE`` is an error, so that no part
+of a state is left out silently.
 """
 
 import json
@@ -72,7 +72,7 @@ def _add(found: State, path: str, value: Any) -> None:
     elif isinstance(value, Stateful):
         found.update({f"{path}.{name}": one for name, one in value.state_dict().items()})
     else:
-        raise TypeError(f"{path}: no state of a {type(value).__name__} is known")
+        raise TypeError(f"{path}: cannot store a {type(value).__name__}")
 
 
 def _load(state: Mapping[str, Any], path: str, value: Any) -> None:

@@ -72,7 +72,7 @@ class CellCatalog:
         try:
             cell = self.get(name)
         except NotFound:
-            rule = "is no known work cell"
+            rule = "is not a known work cell"
             raise InvalidInput("overrides.cell", name, rule, self.names()) from None
         if (lack := lacks_for_training(preset, cell)) is not None:
             raise InvalidInput("overrides.cell", name, f"cannot be trained in: it {lack}")

@@ -87,7 +87,7 @@ class RecordingCatalog:
         known = self.names()
         for place, name in enumerate(names):
             if name not in known:
-                rule = "is no stored recording" + ("" if known else ": there is none")
+                rule = "is not a stored recording" + ("" if known else ": there is none")
                 raise InvalidInput(f"recordings[{place}]", name, rule, known)
 
     def runs_of(self, names: Sequence[str]) -> tuple[Motion, ...]:

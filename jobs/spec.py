@@ -81,7 +81,7 @@ class TrainSpec(_Spec, Budget):
             InvalidInput: An unknown preset or override, or a value outside its bounds.
         """
         if self.preset not in presets.PRESETS:
-            raise InvalidInput("preset", self.preset, "is no preset", tuple(presets.PRESETS))
+            raise InvalidInput("preset", self.preset, "is not a preset", tuple(presets.PRESETS))
         return NewJob(
             kind=self.kind,
             spec=self._body(),
@@ -122,7 +122,7 @@ class EvaluateSpec(_Spec):
                 protocol does not take; a checkpoint where it has no policy.
         """
         if self.protocol not in PROTOCOLS:
-            raise InvalidInput("protocol", self.protocol, "is no protocol", tuple(PROTOCOLS))
+            raise InvalidInput("protocol", self.protocol, "is not a protocol", tuple(PROTOCOLS))
         most = most_episodes(self.protocol)
         if self.episodes is not None and self.episodes > most:
             raise InvalidInput("episodes", self.episodes, f"must lie in [1, {most}]")
@@ -216,7 +216,7 @@ class SweepSpec(_Spec):
             InvalidInput: An unknown preset, field or protocol, or a value outside its bounds.
         """
         if self.preset not in presets.PRESETS:
-            raise InvalidInput("preset", self.preset, "is no preset", tuple(presets.PRESETS))
+            raise InvalidInput("preset", self.preset, "is not a preset", tuple(presets.PRESETS))
         presets.resolve(self.preset, self.overrides)
         self._check_ranges()
         self._check_objective()
@@ -239,7 +239,7 @@ class SweepSpec(_Spec):
         for path, drawn in self.ranges.items():
             field = f"ranges.{path}"
             if path not in known:
-                raise InvalidInput(field, path, "is no field of the preset", known)
+                raise InvalidInput(field, path, "is not a field of the preset", known)
             for name, value in drawn.ends(field).items():
                 try:
                     presets.resolve(self.preset, self.with_fields({path: value}))

@@ -95,7 +95,7 @@ def test_python_example_runs(
     lines = capsys.readouterr().out.splitlines()
     assert lines[0].startswith("cube")
     assert lines[-2] == "end {'state': 'cancelled'}"
-    assert lines[-1].startswith("preset is no preset ['pick-td3'")
+    assert lines[-1].startswith("preset is not a preset ['pick-td3'")
 
 
 def test_what_is_flagged_is_found_wherever_it_is() -> None:

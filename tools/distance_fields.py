@@ -36,7 +36,7 @@ class Cone:
     flat: tuple[float, float, float] = (1.0, 1.0, 1.0)
     """Scale along x, y, z about the middle of the cone."""
     blend: float = 0.04
-    """Width of the smooth union with what came before [m]."""
+    """Width of the smooth union with the preceding cones [m]."""
 
     def distance(self, points: Vec) -> Vec:
         """Return the distance of points (..., 3) from the surface [m]."""
@@ -110,8 +110,9 @@ class Grid:
 
         Args:
             values: Distances on the grid [m].
-            smooth: Width of the Gaussian that takes out the grid's steps, in grid cells.
-            hidden: Distances to what covers the surface; what lies 4 mm inside is left out.
+            smooth: Standard deviation of the Gaussian that smooths the grid's steps [spacings].
+            hidden: Distances to a covering body on the grid [m]; parts of the surface more than
+                4 mm inside it are left out.
         """
         soft = gaussian_filter(values, smooth) if smooth > 0.0 else values
         soft = np.pad(soft, 1, constant_values=float(np.abs(values).max()))

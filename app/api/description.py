@@ -15,7 +15,7 @@ from app.api.problems import MEDIA_TYPE, Problem
 from app.api.security import COOKIE, cookie_name
 
 PROBLEMS = {
-    400: ("BadRequest", "The body is no JSON or incomplete, or the request no HTTP/1.1"),
+    400: ("BadRequest", "The body is incomplete or not JSON, or the request is not HTTP/1.1"),
     401: ("Unauthorized", "The server requires its token"),
     403: ("Forbidden", "`Origin` is another site than this server"),
     404: ("NotFound", "Nothing has that name or id; `known` lists the names, where few"),

@@ -1,4 +1,4 @@
-"""Jobs of requests: the one a path names, pages of them, checks before one is queued."""
+"""Jobs in HTTP requests: lookup by path, pages of the list, checks before one is queued."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -24,7 +24,7 @@ from jobs.spec import AnySpec, EvaluateSpec, SweepSpec
 
 
 class PageQuery(NamedTuple):
-    """Which page of the list of jobs is asked for, as for ``app.store.jobs.list_jobs``."""
+    """Requested page of the list of jobs; fields as in ``app.store.jobs.list_jobs``."""
 
     cursor: str | None
     limit: int

@@ -261,7 +261,7 @@ def _from_tracker(
     try:
         session = trackers.get(entry.tracker)
     except NotFound:
-        rule = f"is no open tracker; an unused one is deleted after {IDLE_S:g} s"
+        rule = f"is not an open tracker; an unused one is deleted after {IDLE_S:g} s"
         raise refused("tracker", entry.tracker, rule) from None
     if session.cell != cell.name:
         rule = f"must be a tracker of the cell {cell.name}, not {session.cell}"

@@ -120,7 +120,7 @@ class CheckpointNames:
             self.mark_damaged(error)
             raise
         except NotFound:
-            rule = "is no stored checkpoint: neither its SHA-256 nor an alias"
+            rule = "is not a stored checkpoint: neither its SHA-256 nor an alias"
             raise InvalidInput("checkpoint", name, rule, tuple(self.aliases)) from None
         self._damaged.pop(record.sha256, None)
         return record, tensors

@@ -243,7 +243,7 @@ class Services:
         try:
             return self.cells.get(name)
         except NotFound as error:
-            raise InvalidInput("cell", name, "is no known work cell", error.known) from None
+            raise InvalidInput("cell", name, "is not a known work cell", error.known) from None
 
 
 def services_of(connection: HTTPConnection) -> Services:

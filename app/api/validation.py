@@ -271,7 +271,7 @@ async def check_query(connection: HTTPConnection) -> None:
         parts = list(_parts(known[name].field_info.annotation)) if name in known else []
         odd, plain = next((_PLAIN[one] for one in (int, float) if one in parts), (None, ""))
         if name not in known:
-            rule = "is no parameter" if known else "is no parameter: the route has none"
+            rule = "is not a parameter" if known else "is not a parameter: the route has none"
             context = {"choices": list(known)}
         elif len(values) > 1 and list not in [get_origin(one) for one in parts]:
             rule = "must be given once"

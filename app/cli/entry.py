@@ -2,8 +2,8 @@
 
 Results go to standard output (``--json``: one object), logs and errors to standard error.
 Exit status: 0 whatever the result, 1 where this machine is in the way (port taken, database
-in use, disk full, folder that cannot be made, library missing, start failed), 2 for a wrong
-call, such as a file that cannot be read or a data folder that cannot be made or written.
+in use, disk full, report folder that cannot be made, library missing, start failed), 2 for a
+wrong call, such as a file that cannot be read or a data folder that cannot be made or written.
 """
 
 import io

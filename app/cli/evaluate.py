@@ -126,7 +126,7 @@ def bench(
         for path in sorted(folder.glob("bench_*.py"))
     }
     if name not in scripts:
-        raise InvalidInput("NAME", name, "is no benchmark of this checkout", list(scripts))
+        raise InvalidInput("NAME", name, "is not a benchmark of this checkout", list(scripts))
     prepared_settings()
     command = [sys.executable, str(scripts[name]), *context.args]
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}

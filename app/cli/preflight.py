@@ -26,7 +26,7 @@ def listen(host: str, port: int) -> socket.socket:
             host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE
         )[0]
     except (socket.gaierror, UnicodeError):  # no name has such a label
-        raise InvalidInput("TANDEM_HOST", host, "is no address of this machine") from None
+        raise InvalidInput("TANDEM_HOST", host, "is not an address of this machine") from None
     sock = socket.socket(family, kind, protocol)
     sock.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:

@@ -24,7 +24,7 @@ Json = Mapping[str, Any]
 
 
 class Refused(Exception):
-    """The server answered a problem.
+    """The server answered with a problem document.
 
     Args:
         problem: The problem, with status, detail and, for bad input, field and rule.
@@ -43,7 +43,7 @@ class StreamEvent:
     event: str
     """its kind"""
     id: str
-    """id to go on after; empty where the stream cannot be resumed"""
+    """id after which the stream can be resumed; empty where it cannot"""
     data: dict[str, Any]
     """its content"""
 
@@ -58,7 +58,7 @@ class RequestParts(TypedDict, total=False):
     body: BaseModel | Json | None
     """JSON body"""
     content: bytes
-    """body as it is"""
+    """raw body, sent unchanged"""
 
 
 class Transport:
@@ -99,7 +99,7 @@ class Transport:
             names: Ids and names in the path, not encoded.
 
         Raises:
-            Refused: The server answered a problem.
+            Refused: The server answered with a problem document.
         """
         method, _, path = route.partition(" ")
         headers, content = _texts(parts.get("headers")), parts.get("content")
@@ -132,7 +132,7 @@ class Transport:
         """Yield the events of a stream until it ends; names as of :meth:`_send`.
 
         Raises:
-            Refused: The server answered a problem.
+            Refused: The server answered with a problem document.
         """
         pauses = httpx.Timeout(self._timeout_s, read=max(self._timeout_s, SILENCE_S))
         with self._http.stream(

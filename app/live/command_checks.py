@@ -76,18 +76,20 @@ def check(command: Command, cell: Cell, people: Sequence[int]) -> None:
     scenario = scenario_of(cell)
     if not isinstance(command, COMMANDS[scenario]):
         tags = [one.model_fields["tag"].default for one in get_args(COMMANDS[scenario])]
-        rule = f"is no command of a {scenario} cell like {cell.name}"
+        rule = f"is not a command of a {scenario} cell like {cell.name}"
         raise InvalidInput("tag", command.tag, rule, tags)
     _check_people(command, cell, people)
     match command:
         case SetCandidates():
             for index, name in enumerate(command.ids):
-                _require(f"ids[{index}]", name, cell.station_ids, "is no station of this cell")
+                _require(
+                    f"ids[{index}]", name, cell.station_ids, "is not a station of this cell"
+                )
         case ToggleCandidate():
-            _require("id", command.id, cell.station_ids, "is no station of this cell")
+            _require("id", command.id, cell.station_ids, "is not a station of this cell")
         case StartCase():
             cases = [case.id for case in cases_of(cell)]
-            _require("id", command.id, cases, "is no case study of this cell")
+            _require("id", command.id, cases, "is not a case study of this cell")
         case SetSafety() if command.use_measured_velocity is not None and scenario != "reach":
             rule = f"needs people who are cylinders: those of {cell.name} are workers"
             raise InvalidInput("use_measured_velocity", command.use_measured_velocity, rule)
@@ -95,7 +97,7 @@ def check(command: Command, cell: Cell, people: Sequence[int]) -> None:
             _check_goal(command.position, cell)
         case StartTest():
             tests = [one.name for one in tests_of(cell)]
-            _require("id", command.id, tests, "is no sorting test that fits this cell")
+            _require("id", command.id, tests, "is not a sorting test that fits this cell")
         case AddBlock() | MoveBlock() | SetGoal():
             _check_table_words(command, cell)
 
@@ -119,7 +121,9 @@ def check_inference_mode(name: str, known: Sequence[str]) -> None:
     Raises:
         InvalidInput: It does not, or there is no policy.
     """
-    rule = "is no inference mode of this policy" if known else "needs a policy: there is none"
+    rule = (
+        "is not an inference mode of this policy" if known else "needs a policy: there is none"
+    )
     _require("inference_mode", name, known, rule)
 
 
@@ -158,21 +162,21 @@ def _check_table_words(command: AddBlock | MoveBlock | SetGoal, cell: Cell) -> N
     clusters = cell.stations_of("cluster")
     towers = [one.id for one in clusters]
     places = [*(one.id for one in cell.stations_of("clutter")), *towers]
-    sizes, no_place = SIZE_NAMES[3], "is no clutter slot or tower of this cell"
+    sizes, no_place = SIZE_NAMES[3], "is not a clutter slot or tower of this cell"
     match command:
         case AddBlock():
             colours = [one.colour or one.id for one in clusters]
-            _require("colour", command.colour, colours, "is no colour of this cell")
-            _require("size", command.size, sizes, "is no size")
+            _require("colour", command.colour, colours, "is not a colour of this cell")
+            _require("size", command.size, sizes, "is not a size")
             if command.at is not None:
                 _require("at", command.at, places, no_place)
         case MoveBlock():
             _require("to", command.to, places, no_place)
         case SetGoal():
             for tower, wanted in command.towers.items():
-                _require("towers", tower, towers, "is no tower of this cell")
+                _require("towers", tower, towers, "is not a tower of this cell")
                 for level, size in enumerate(wanted):
-                    _require(f"towers.{tower}[{level}]", size, sizes, "is no size")
+                    _require(f"towers.{tower}[{level}]", size, sizes, "is not a size")
 
 
 def _require(field: str, word: str, known: Sequence[str], rule: str) -> None:

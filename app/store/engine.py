@@ -264,7 +264,7 @@ def _checked_url(database_url: str) -> sa.URL:
             raise InvalidInput("database_url", database_url, rule)
         unknown = sorted(set(url.query) - {"timeout"})
         if unknown:
-            rule = "is no parameter of a SQLite file"
+            rule = "is not a parameter of a SQLite file"
             raise InvalidInput("database_url", unknown[0], rule, ("timeout",))
         url = url.set(database=str(path))
     return url

@@ -54,7 +54,7 @@ class ServiceInputs:
         path = f"{self._service.attempt}/recordings/{quote(name, safe='')}"
         content = self._service.find(path)
         if content is None:
-            raise InvalidInput(f"recordings[{place}]", name, "is no stored recording")
+            raise InvalidInput(f"recordings[{place}]", name, "is not a stored recording")
         record, tensors = split(content, MAX_RECORD)
         return unpacked(_RECORDING.validate_python(record), tensors)
 

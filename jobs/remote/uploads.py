@@ -107,7 +107,7 @@ class WorkerUploads:
         with self._lock:
             for place, name in enumerate([] if state is None else _listed(state.manifest)):
                 if not folder.path(name).is_file():
-                    rule = "is no file of this job: send it first"
+                    rule = "is not a file of this job: send it first"
                     raise InvalidInput(f"state.manifest.memory[{place}]", name, rule)
             if attempts.record_checkpoint(self._store, claim, step, to_store(policy), state):
                 manifests = attempts.resume_manifests(self._store, claim.job_id)

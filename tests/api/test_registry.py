@@ -39,7 +39,7 @@ def test_checkpoint_deleted_while_it_is_loaded_answers_no_later_request(store: S
     names = CheckpointNames(store)
     registry = PolicyRegistry(names, build, "pick")
     assert registry.load(new.sha256).checkpoint == new.sha256
-    with pytest.raises(InvalidInput, match="is no stored checkpoint"):
+    with pytest.raises(InvalidInput, match="is not a stored checkpoint"):
         registry.load(new.sha256)
 
 
@@ -61,7 +61,7 @@ def test_checkpoint_that_does_not_fit_is_read_once_until_it_is_deleted(store: St
     assert len(built) == 1
     retention.delete_checkpoint(store, new.sha256, {})
     names.forget_unstored()
-    with pytest.raises(InvalidInput, match="is no stored checkpoint"):
+    with pytest.raises(InvalidInput, match="is not a stored checkpoint"):
         registry.load(new.sha256)
 
 
@@ -110,7 +110,7 @@ def test_checkpoint_that_a_repeated_attempt_drops_answers_no_longer(store: Store
     claimed(store)
     names.forget_unstored()
     assert registry.held == {kept.sha256}
-    with pytest.raises(InvalidInput, match="is no stored checkpoint"):
+    with pytest.raises(InvalidInput, match="is not a stored checkpoint"):
         registry.load(dropped.sha256)
 
 

@@ -143,7 +143,7 @@ def test_answers_name_the_joints_of_their_vectors(client: TestClient) -> None:
     ("names", "text"),
     [
         ([*ROS_NAMES[:5], "gripper_joint"], "'gripper_joint', lacks 'wrist_3_joint'"),
-        ([*ROS_NAMES, "finger_joint"], "does not know 'finger_joint'"),
+        ([*ROS_NAMES, "finger_joint"], "has the unknown name 'finger_joint'"),
         ([*ROS_NAMES[:5], "elbow_joint"], "holds 'elbow_joint' 2 times, lacks 'wrist_3_joint'"),
         (list(ROS_NAMES[:5]), "lacks 'wrist_3_joint'"),
         ([], "lacks 'shoulder_pan_joint'"),

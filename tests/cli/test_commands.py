@@ -316,7 +316,7 @@ def test_shipped_cell_file_is_good_and_a_broken_one_is_named(
     assert "23 stations" in capsys.readouterr().out
     cell_file.write_text(json.dumps(workshop.definition(wheels=4)), encoding="utf-8")
     assert main(["cells", "check", str(cell_file)]) == 2
-    assert "wheels = 4 is no known field" in capsys.readouterr().err
+    assert "wheels = 4 is not a known field" in capsys.readouterr().err
 
 
 def test_every_fault_of_a_cell_file_is_a_line_and_an_object(

@@ -8,7 +8,7 @@ import pytest
 
 from app.__main__ import main
 from app.cli.report import PAGE, RESULTS
-from app.policies.report.numbers import curve_end, preset_value, reach_setting, stored_value
+from app.policies.report.numbers import curve_end, preset_value, setting, stored_value
 from app.policies.report.page import TEXT, files_of, page
 
 PRINTED = (
@@ -74,7 +74,7 @@ def test_a_file_that_holds_no_result_is_named(tmp_path: Path, content: str, caps
     path.write_bytes(content.encode(errors="surrogateescape"))
     assert main(["report", "--results", str(tmp_path), "--output", str(tmp_path / "a")]) == 2
     said = capsys.readouterr().err
-    assert f"results = '{path}' is no result file" in said and "Traceback" not in said
+    assert f"results = '{path}' is not a result file" in said and "Traceback" not in said
 
 
 def test_a_page_that_cannot_be_written_is_refused(tmp_path: Path, capsys):
@@ -120,4 +120,6 @@ def test_numbers_are_written_with_interval_deviation_or_unit():
     assert curve_end({"curves": curves}, "q", "success") is None
     assert preset_value("reach-ddpg-thesis", "learning.lr_start", "10") == "0.001"
     assert preset_value("reach-ddpg-thesis", "action.meaning") == "speed"
-    assert (reach_setting("control_rate"), reach_setting("v_min")) == ("50", "0.3")
+    assert setting("reach-ddpg-thesis", "control_rate") == "50"
+    assert setting("reach-ddpg-thesis", "v_min") == "0.3"
+    assert setting("pick-td3-thesis", "success_tilt") == "0.2"

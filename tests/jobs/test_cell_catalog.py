@@ -52,7 +52,7 @@ def test_cell_to_train_in_must_have_what_the_scenario_needs(catalog: CellCatalog
         assert catalog.to_train_in(resolve(preset, {"cell": fits})).name == fits
         with pytest.raises(InvalidInput, match=rf"overrides\.cell = '{other}' cannot be"):
             catalog.to_train_in(resolve(preset, {"cell": other}))
-        with pytest.raises(InvalidInput, match=r"overrides\.cell = 'kitchen' is no known"):
+        with pytest.raises(InvalidInput, match=r"overrides\.cell = 'kitchen' is not a known"):
             catalog.to_train_in(resolve(preset, {"cell": "kitchen"}))
 
 

@@ -163,7 +163,7 @@ def test_recordings_that_are_not_stored_are_named_with_their_place(
     catalog: RecordingCatalog,
 ) -> None:
     with pytest.raises(
-        InvalidInput, match=r"recordings\[0\] = 'a' is no stored recording: there is"
+        InvalidInput, match=r"recordings\[0\] = 'a' is not a stored recording: there is"
     ):
         catalog.check(["a"])
     catalog.add(CLIP, "nod.csv")

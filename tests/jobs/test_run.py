@@ -135,7 +135,7 @@ def test_training_in_a_cell_that_is_gone_fails_by_name(store: Store, tmp_path: P
     train(store, cell="kitchen")
     job = run_here(store, tmp_path)
     assert job.state == "failed"
-    assert "overrides.cell = 'kitchen' is no known work cell" in (job.error or "")
+    assert "overrides.cell = 'kitchen' is not a known work cell" in (job.error or "")
 
 
 @pytest.mark.slow
@@ -252,7 +252,7 @@ def test_evaluation_beside_a_recording_that_is_gone_fails_by_name(
     jobs.create_job(store, spec)
     job = run_here(store, tmp_path)
     assert job.state == "failed"
-    assert "recordings[0] = 'waves' is no stored recording" in (job.error or "")
+    assert "recordings[0] = 'waves' is not a stored recording" in (job.error or "")
 
 
 @SQLITE_ONLY

@@ -80,8 +80,8 @@ def test_unknown_kind_is_refused(kind: object) -> None:
 @pytest.mark.parametrize(
     ("body", "field", "rule"),
     [
-        (TRAIN | {"preset": "pick-td4"}, "preset", "is no preset; choices: pick-td3"),
-        (TRAIN | {"overrides": {"wdith": 64}}, "overrides.wdith", "is no field"),
+        (TRAIN | {"preset": "pick-td4"}, "preset", "is not a preset; choices: pick-td3"),
+        (TRAIN | {"overrides": {"wdith": 64}}, "overrides.wdith", "is not a field"),
         (TRAIN | {"overrides": {"networks": {"width": 7}}}, "overrides.networks.width", "in"),
         (
             TRAIN | {"overrides": {"learning": {"gamma": math.nan}}},
@@ -93,7 +93,7 @@ def test_unknown_kind_is_refused(kind: object) -> None:
             "checkpoint",
             "must not be",
         ),
-        (EVALUATE | {"protocol": "pick-all"}, "protocol", "is no protocol; choices: pick-"),
+        (EVALUATE | {"protocol": "pick-all"}, "protocol", "is not a protocol; choices: pick-"),
         (EVALUATE | {"episodes": 10**9}, "episodes", "must lie in"),
         (RECORDED | {"recordings": []}, "recordings", "at least one .* for pick-mocap"),
         ({"kind": "evaluate", "protocol": "pick-mocap"}, "recordings", "at least one"),

@@ -20,7 +20,7 @@ def handle() -> WorldHandle:
 
 
 def test_command_that_does_not_fit_the_table_is_refused_at_once(handle: WorldHandle) -> None:
-    with pytest.raises(InvalidInput, match="is no block"):
+    with pytest.raises(InvalidInput, match="is not a block"):
         handle.submit(RemoveBlock(id="block99"))
     assert handle.drain() == []
 

@@ -73,7 +73,7 @@ def test_sqlite_is_durable_and_checks_references(store: Store) -> None:
         ("sqlite:///x.db?timeout=soon", r"timeout = 'soon' must lie in \(0, 3600\] s"),
         ("sqlite:///x.db?timeout=-1", r"timeout = '-1' must lie in \(0, 3600\] s"),
         ("sqlite:///x.db?timeout=1&timeout=2", r"must lie in \(0, 3600\] s"),
-        ("sqlite:///x.db?mode=ro", "mode.* is no parameter of a SQLite file.*timeout"),
+        ("sqlite:///x.db?mode=ro", "mode.* is not a parameter of a SQLite file.*timeout"),
     ],
 )
 def test_bad_database_url_says_what_is_wrong(url: str, rule: str) -> None:

@@ -84,7 +84,7 @@ def lines(results: Path) -> list[list[str]] | None:
         ],
         [
             "reach under SSM, crossing people, velocity known exactly",
-            "robot brought to standstill",
+            "robot brought to standstill; time to goal",
             f"{rollout['n']:,}",
             f"{percent(_opposite(rollout['never_at_standstill']))}; "
             f"{rollout['time_s']['mean']:.2f} s",

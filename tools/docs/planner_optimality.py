@@ -2,10 +2,10 @@
 
     python -m tools.docs.planner_optimality [--tasks 400] [--seed 21]
 
-Writes ``docs/results/planner-optimality.json``. Random tasks (at most five cells, one to three
-colours, one or two sizes, arbitrary goals, failure probabilities from 0 to 0.4) are solved by
-exhaustive search: minimum number of moves, all first moves of such plans, and the minimum of
-the expected attempts over these plans and, up to four cells, over all plans. The planner is
+Writes ``docs/results/planner-optimality.json``. Random tasks (up to five clutter slots, one to
+three colours, one or two sizes, arbitrary goals, failure probabilities of 0 to 0.4) are solved
+by exhaustive search: minimum number of moves, all first moves of such plans, and the minimum of
+the expected attempts over these plans and, up to four slots, over all plans. The planner is
 executed one move at a time with replanning after each move.
 """
 

@@ -16,7 +16,7 @@ export const BLOCKS = { red: "rgb(205 58 62)", green: "rgb(112 184 92)", blue: "
 const DARK_INK = "rgb(15 21 26)";
 export const BLOCK_INK = { red: "white", green: DARK_INK, blue: "white" };
 
-/** Chance that a grasp fails -> colour of its cell; as FAILURES in web/viewer/scene/sorting_bodies.py. */
+/** Chance that a grasp fails -> colour of its clutter slot; as FAILURES in web/viewer/scene/sorting_bodies.py. */
 const FAILURES = [
   [0.0, [240, 237, 229]],
   [0.2, [243, 217, 164]],

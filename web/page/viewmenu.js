@@ -10,7 +10,7 @@ const HELP = {
   Values: "What the critic expects at each goal",
   "Target line": "From the tool to the chosen goal",
   "Risk map": "Probability of a contact by the place where the first person stands",
-  "Failure figures": "How often a grasp fails in each cell",
+  "Failure probabilities": "How often a grasp fails at each clutter slot",
   Goal: "The blocks that the towers still lack",
   Move: "From where the block is taken to where it goes",
   "Separation zone": "Where a person is nearer than the rule asks for",

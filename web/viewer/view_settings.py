@@ -39,7 +39,7 @@ CHOICE = (
     RISK_MAP,
 )
 SORTING = (
-    Setting(label="Failure figures", node="/chances"),
+    Setting(label="Failure probabilities", node="/chances"),
     Setting(label="Goal", node="/goal"),
     Setting(label="Move", node="/move"),
 )

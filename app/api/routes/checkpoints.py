@@ -113,7 +113,7 @@ def recalibrate_checkpoint(
 ) -> CheckpointPublic:
     """Store a copy whose probabilities are corrected by outcomes observed in one cell.
 
-    It acts and values as before. Point an alias to it to use it.
+    Its actions and values are unchanged. To use it, point an alias to it.
     """
     record, tensors = read_sound(services.store, reference)
     found = recalibrated(load_checkpoint(record.manifest, tensors), *request.to_domain())

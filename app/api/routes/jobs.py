@@ -79,7 +79,7 @@ async def list_jobs(
 ) -> Response:
     """Return one page, newest first."""
     if preset is not None and preset not in presets.PRESETS:
-        raise InvalidInput("preset", preset, "is no preset", tuple(presets.PRESETS))
+        raise InvalidInput("preset", preset, "is not a preset", tuple(presets.PRESETS))
     query = PageQuery(cursor, limit, state, part_of, kind, preset)
     asked = query, services.supervisor.waiting
     content = await services.response_cache.find(asked, lambda: page_of_jobs(services, *asked))

@@ -66,7 +66,7 @@ def list_all_evaluations(
 ) -> EvaluationList:
     """Return one page of the results of succeeded evaluations, newest first."""
     if protocol is not None and protocol not in PROTOCOLS:
-        raise InvalidInput("protocol", protocol, "is no protocol", tuple(PROTOCOLS))
+        raise InvalidInput("protocol", protocol, "is not a protocol", tuple(PROTOCOLS))
     sha256 = services.checkpoints.aliases.get(checkpoint or "", checkpoint)
     page = list_evaluations(
         services.store, protocol=protocol, checkpoint=sha256, cursor=cursor, limit=limit

@@ -59,7 +59,7 @@ VECTORS = {
 OPTIONAL = {"ray_origin", "ray_direction"}
 """Vectors that may be null: a rectangle that is drawn in the scene has no ray."""
 SMALL_BYTES = 1024
-"""Largest frame decoded on the event loop, in microseconds."""
+"""Largest frame decoded on the event loop [bytes]; larger ones are decoded in a thread."""
 # The viewer's page is one inline script that unpacks itself, and its WebAssembly loader
 # evaluates text; both are restricted to the viewer's frame and to this server.
 POLICY = (

@@ -48,8 +48,9 @@ UNUSABLE = (
     "outside [0, 1]"
 )
 IMPLAUSIBLE = (
-    "reason why the key-points are impossible in this frame (`foreign-frame`): another frame "
-    "or unit, or none usable; null where they are possible"
+    "reason why the key-points cannot be positions in `base_link` in metres "
+    "(`foreign-frame`): another coordinate frame or unit, or no usable key-point; null where "
+    "they can"
 )
 
 
@@ -111,7 +112,10 @@ class BodyPercentiles(Body):
 class PersonState(Body):
     """A person as 18 joint angles of the human model."""
 
-    q: Vector18 = Field(description="joint positions [m, rad]: " + ", ".join(human.JOINT_NAMES))
+    q: Vector18 = Field(
+        description="joint positions [m, rad]; the pelvis in the robot's `base_link`: "
+        + ", ".join(human.JOINT_NAMES)
+    )
     qd: Vector18 = Field(description="joint speeds [m/s, rad/s]")
     body: Annotated[
         BodyPercentiles | None,
@@ -120,7 +124,9 @@ class PersonState(Body):
     size: Annotated[
         Lengths | None,
         Field(
-            description=f"lengths in place of percentiles [m]: {', '.join(NAMES)} (1: median)"
+            description=f"body dimensions in place of percentiles: {', '.join(NAMES)}. "
+            "`pelvis` is the height of the standing pelvis above the table (z in the robot's "
+            "`base_link`) [m], `girth` a ratio to the median person, the others are lengths [m]"
         ),
     ] = None
 
@@ -176,11 +182,12 @@ class KeypointsPerson(KeypointDetection):
 class CylinderPerson(Body):
     """A person as an upright cylinder.
 
-    Converted to a person of the cell's size at rest in it, facing the robot's base.
+    Policies for people of 18 joints observe a standing person of the cell's body dimensions on
+    its axis, who faces the robot's base.
     """
 
-    x: Place = Field(description="axis [m]")
-    y: Place = Field(description="axis [m]")
+    x: Place = Field(description="x of the axis in the robot's `base_link` [m]")
+    y: Place = Field(description="y of the axis in the robot's `base_link` [m]")
     vx: Speed = Field(description="velocity [m/s]")
     vy: Speed = Field(description="velocity [m/s]")
     r: Annotated[float, Field(ge=0.01, le=FARTHEST_M)] = Field(description="radius [m]")
@@ -206,8 +213,8 @@ class TrackedPerson(Body):
     person: Annotated[int, Field(ge=0, le=3)] = Field(description="index of the track")
     t: Time | None = Field(
         None,
-        description="present on the tracker's clock [s]; used where it gives a greater age "
-        "than the arrival of the newest frame",
+        description="current time on the tracker's clock [s]; used if the age that it gives "
+        "exceeds the time since the newest frame arrived",
     )
 
 
@@ -269,7 +276,8 @@ class PersonUse(Answer):
     speeds: Speeds = Field(description="origin of the speeds; zero: unknown")
     flags: list[str] = Field(
         description="degradations of the estimate; `far`: the policy uses this person at 5 m, "
-        "or not at all; `clamped`: angles, radius, growth or past are at their bounds"
+        "or not at all; `clamped`: angles, radius, growth or past are at their bounds; "
+        "`dropped`: the policy does not observe this person, because there are more than four"
     )
     held: list[str] = Field(description="unobserved joints, at rest or at their last angle")
     missing: list[str] = Field(description="unknown key-points")

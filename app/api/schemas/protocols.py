@@ -1,4 +1,4 @@
-"""Protocols of evaluations, as the form of an evaluation needs them."""
+"""Evaluation protocols, with the inputs that each takes."""
 
 import inspect
 from typing import Literal, Self
@@ -20,7 +20,7 @@ Recordings = Literal["none", "optional", "required"]
 
 
 class ProtocolPublic(Answer):
-    """One protocol."""
+    """A protocol and the inputs that it takes."""
 
     name: str
     title: str = Field(description="what it evaluates")
@@ -28,8 +28,12 @@ class ProtocolPublic(Answer):
         description="`purpose` of the checkpoints that it takes; null for one without policy"
     )
     checkpoint: str | None = Field(description="alias of its default checkpoint")
-    max_episodes: int = Field(description="greatest number of episodes; of each pair or target")
-    recordings: Recordings
+    max_episodes: int = Field(
+        description="greatest number of episodes; of each pair or target if there are several"
+    )
+    recordings: Recordings = Field(
+        description="whether recordings of people can or must be named"
+    )
 
     @classmethod
     def from_name(cls, name: str) -> Self:

@@ -36,7 +36,7 @@ class RobotState(Body):
     def _are_the_joints_of_the_robot(cls, names: list[str] | None) -> list[str] | None:
         if names is None or sorted(names) == sorted(ROS_NAMES):
             return names
-        faults = [f"does not know {name!r}" for name in names if name not in ROS_NAMES]
+        faults = [f"has the unknown name {name!r}" for name in names if name not in ROS_NAMES]
         faults += [
             f"holds {one!r} {names.count(one)} times"
             for one in ROS_NAMES
@@ -50,7 +50,7 @@ class RobotState(Body):
         )
 
     def joints(self, values: list[float]) -> Vec:
-        """Return numbers in the order of the request from base to wrist 3, shape (6,)."""
+        """Return values in the order of the request from base to wrist 3, shape (6,)."""
         return np.array(values)[self._order()]
 
     def _order(self) -> list[int]:

@@ -40,9 +40,15 @@ class SafetyInput(Body):
     tracker_delay: Seconds | None = Field(
         default=None, description="age of the tracker's data on arrival, a part of T_r [s]"
     )
-    intrusion_distance: Metres | None = Field(default=None, description="C [m]")
-    person_uncertainty: Metres | None = Field(default=None, description="Z_d [m]")
-    robot_uncertainty: Metres | None = Field(default=None, description="Z_r [m]")
+    intrusion_distance: Metres | None = Field(
+        default=None, description="intrusion distance C [m]"
+    )
+    person_uncertainty: Metres | None = Field(
+        default=None, description="uncertainty of a person's position, Z_d [m]"
+    )
+    robot_uncertainty: Metres | None = Field(
+        default=None, description="uncertainty of the robot's position, Z_r [m]"
+    )
     protective_distance: Metres | None = Field(
         default=None, description="additional distance to people while the robot moves [m]"
     )
@@ -73,11 +79,11 @@ class Terms(Answer):
     )
     robot_speed: float = Field(description="v_r, bound of that link's speed [m/s]")
     reaction_time: float = Field(description="T_r: period, reaction, delay and age [s]")
-    stop_time: float = Field(description="T_s [s]")
-    braking: float = Field(description="B [m]")
-    intrusion: float = Field(description="C [m]")
-    person_uncertainty: float = Field(description="Z_d [m]")
-    robot_uncertainty: float = Field(description="Z_r [m]")
+    stop_time: float = Field(description="T_s, duration of a stop [s]")
+    braking: float = Field(description="B, displacement of the link during the stop [m]")
+    intrusion: float = Field(description="C, intrusion distance [m]")
+    person_uncertainty: float = Field(description="Z_d, of the person's position [m]")
+    robot_uncertainty: float = Field(description="Z_r, of the robot's position [m]")
     protective_distance: float = Field(description="additional distance [m]")
 
 

@@ -80,8 +80,9 @@ class TaskSelectionRequest(Body):
     )
     objective: Objective = Field(
         "value",
-        description="the choice maximises the critic's `value` with hysteresis, as in the "
-        "thesis, or the probability of `success`, or minimises the expected `time` per success",
+        description="the choice maximises the critic's `value` (the rule of the thesis, with "
+        "hysteresis added), or the probability of `success`, or minimises the expected `time` "
+        "per success",
     )
     checkpoint: Word | None = Field(
         None, description="SHA-256 or alias; the shipped policy if null"

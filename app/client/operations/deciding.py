@@ -27,7 +27,7 @@ class DecidingOperations(Transport):
         return self._parsed(PlanAnswer, "POST /v1/plan", body=body)
 
     def map_risk(self, body: RiskMapRequest | Mapping[str, Any]) -> RiskMapAnswer:
-        """Choose beside a person at each position of a grid."""
+        """Map choice and risk over positions of a person."""
         return self._parsed(RiskMapAnswer, "POST /v1/risk-map", body=body)
 
     def decide_motion(self, body: MotionRequest | Mapping[str, Any]) -> MotionAnswer:

@@ -1,4 +1,4 @@
-"""What workers and pedestrians of a live cell share: people by their ids."""
+"""People of a live cell by id: the base of its workers and of its pedestrians."""
 
 from collections.abc import Iterator
 from typing import Generic, TypeVar

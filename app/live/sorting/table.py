@@ -286,7 +286,7 @@ class SortingTable:
         for one in self.blocks:
             if one.id == id:
                 return one
-        raise InvalidInput("id", id, "is no block", [one.id for one in self.blocks])
+        raise InvalidInput("id", id, "is not a block", [one.id for one in self.blocks])
 
     def _kind(self, id: str) -> int:
         colour, _, size = id.partition("-")

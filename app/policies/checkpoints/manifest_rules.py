@@ -103,7 +103,7 @@ def check_ranges(ranges: Mapping[str, Any], sizes: Mapping[str, int], purpose: s
     for name, entry in ranges.items():
         field = f"manifest.trained_range.{name}"
         if name not in sizes:
-            rule = f"is no group of the training range of a policy for {purpose}"
+            rule = f"is not a group of the training range of a policy for {purpose}"
             raise InvalidInput(field, entry, rule, tuple(sizes))
         if not _is_range(entry, sizes[name]):
             rule = f"must hold two lists of {sizes[name]} finite numbers, low and high"

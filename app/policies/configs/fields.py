@@ -221,9 +221,9 @@ def _unknown_field(
     """Return the error of an unknown field, with the known ones as choices."""
     groups = _groups_of(kind)
     if len(path) > 1:
-        return InvalidInput(field, value, "is no field", tuple(groups[path[0]].model_fields))
+        return InvalidInput(field, value, "is not a field", tuple(groups[path[0]].model_fields))
     meant = [f"{name}.{path[0]}" for name, one in groups.items() if path[0] in one.model_fields]
-    return InvalidInput(field, value, "is no field", tuple(meant) or ("cell", *groups))
+    return InvalidInput(field, value, "is not a field", tuple(meant) or ("cell", *groups))
 
 
 def _groups_of(kind: type[TrainingConfig]) -> dict[str, type[FieldGroup]]:

@@ -70,7 +70,7 @@ def resolve(name: str, overrides: Mapping[str, object]) -> Preset:
     for key, value in overrides.items():
         group = data.get(key)
         if key == "name":
-            raise InvalidInput("overrides.name", value, "is no field")
+            raise InvalidInput("overrides.name", value, "is not a field")
         data[key] = (
             group | value if isinstance(group, dict) and isinstance(value, dict) else value
         )

@@ -176,16 +176,17 @@ class SortingPreset(TrainingConfig):
 
 
 def _printed(name: str, cell: str, n_t: int, kind: str) -> SortingPreset:
-    """Return table 3.1 with the defaults of Stable-Baselines 2, the library of the thesis.
+    """Return table 3.1 with defaults of Stable-Baselines 2, the library of the thesis.
 
-    The defaults: an update for every step, the target network copied every 500 of them, the
+    The defaults: an update for every step, the target network copied every 500 updates, the
     first update after 1,000 steps, Glorot-uniform weights, gradients up to a norm of 10,
     timeouts as ends of the task.
     Not printed and chosen here: localisation failures in 5 % of the picks, and a reward in
     which parking and failures cost as much as a move. N_t is the least number of steps; the
     training goes on as long again.
 
-    Deviates: 40 environments are stepped together, then follow 40 updates.
+    Deviates: 40 environments are stepped together, then follow 40 updates; gradient norms,
+    importance weights and priorities differ as docs/method.md 1.4 says.
 
     Args:
         name: Name of the preset.

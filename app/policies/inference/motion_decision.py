@@ -201,7 +201,9 @@ class MotionDecider:
                 raise InvalidInput(name, value, "must be finite and not negative [s]")
         asked = query.person_weighting
         if asked not in PERSON_WEIGHTINGS:
-            raise InvalidInput("person_weighting", asked, "must name a rule", PERSON_WEIGHTINGS)
+            raise InvalidInput(
+                "person_weighting", asked, "must be one of the choices", PERSON_WEIGHTINGS
+            )
         return robot, goal
 
     def _mode(self, asked: MotionMode | None) -> MotionMode:

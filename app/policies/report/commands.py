@@ -26,6 +26,23 @@ def command_of(result: Json) -> str:
     return " ".join([f"python -m app evaluate {protocol}", *parts])
 
 
+def training_of(result: Json, name: str, task: str = "") -> str:
+    """Return the command that trained the curves of a name, with their seeds and commits.
+
+    Args:
+        task: Task of the curves; empty where the file has one task.
+    """
+    curves = [
+        one for one in result["curves"] if one["name"] == name and one.get("task", "") == task
+    ]
+    preset, fields = name.partition(",")[0], curves[0].get("fields") or {}
+    sets = "".join(f" --set {key}={value}" for key, value in fields.items())
+    seeds = ", ".join(str(one["seed"]) for one in curves)
+    commits = sorted({f"`{commit}`" for one in curves for commit in one.get("commits") or ()})
+    command = f"python -m tools.docs.training_curves {preset}{sets} --seed SEED --output RUN"
+    return f"{name}: `{command}`, seeds {seeds}, commits {', '.join(commits) or 'not stored'}"
+
+
 def writing_command(name: str, result: Json) -> str:
     """Return the command that writes a result file.
 

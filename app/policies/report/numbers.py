@@ -6,6 +6,7 @@ from app.policies.configs import presets
 from app.policies.evaluation.rows import Json
 from app.sim.cells.cell import load_cell
 from app.sim.people.pedestrian import PedestrianSettings
+from app.sim.pick.kernels.episode import SUCCESS_TILT
 from app.sim.scenario.kernels.episode import SUCCESS_DISTANCE
 
 
@@ -95,12 +96,13 @@ def preset_value(preset: str, path: str, factor: str = "1") -> str:
     return value if isinstance(value, str) else f"{float(value) * float(factor):,.10g}"
 
 
-def reach_setting(name: str) -> str:
-    """Return a number of the reach scenario: robot [Hz, m, rad/s] and people [m/s, m]."""
-    robot, walk = load_cell(presets.get("reach-ddpg-thesis").cell).robot, PedestrianSettings()
+def setting(preset: str, name: str) -> str:
+    """Return a number of a preset's scenario [Hz, m, rad, rad/s] or pedestrians [m/s, m]."""
+    robot, walk = load_cell(presets.get(preset).cell).robot, PedestrianSettings()
     numbers = {
         "control_rate": 1.0 / robot.dt,
         "success_distance": SUCCESS_DISTANCE,
+        "success_tilt": SUCCESS_TILT,
         "joint_speed": max(robot.qd_max),
     }
     return f"{numbers.get(name) or getattr(walk, name):g}"

@@ -7,7 +7,7 @@ empty part.
 ``{value FILE / ROW / KEY [/ UNIT]}``                number of a result file
 ``{curve FILE / PRESET / KEY [/ UNIT [/ TASK]]}``    last point of learning curves
 ``{preset PRESET / GROUP.FIELD [/ FACTOR]}``         field of a preset
-``{reach NAME}``                                     number of the reach scenario
+``{setting PRESET / NAME}``                          number of the scenario of a preset
 ``{command TEXT}``                                   measures what a section lacks; own line
 ===================================================  =========================================
 """
@@ -21,8 +21,8 @@ from pathlib import Path
 from app.errors import InvalidInput
 from app.policies.evaluation.registry import PROTOCOLS, default_checkpoint
 from app.policies.evaluation.rows import Json
-from app.policies.report.commands import command_of, writing_command
-from app.policies.report.numbers import curve_end, preset_value, reach_setting, stored_value
+from app.policies.report.commands import command_of, training_of, writing_command
+from app.policies.report.numbers import curve_end, preset_value, setting, stored_value
 
 MISSING = "not measured"
 MEASURED = """Numbers from a *job*, as named below a table, were measured for this report; all
@@ -37,10 +37,10 @@ TEXT = Path(__file__).with_name("thesis.md").read_text(encoding="utf-8")
 """The page with placeholders."""
 TASKS = ("-e0", "-e1")
 """Ends of the names of files that state the task of a sorting policy."""
-_PLACE = re.compile(r"\{(value|curve|preset|reach) ([^}]+)\}")
+_PLACE = re.compile(r"\{(value|curve|preset|setting) ([^}]+)\}")
 _COMMAND = re.compile(r"^\{command (.+)\}$", re.MULTILINE)
 _OF_RESULT: dict[str, Callable[..., str | None]] = {"value": stored_value, "curve": curve_end}
-_OF_CODE: dict[str, Callable[..., str]] = {"preset": preset_value, "reach": reach_setting}
+_OF_CODE: dict[str, Callable[..., str]] = {"preset": preset_value, "setting": setting}
 
 
 def files_of(text: str) -> set[str]:
@@ -71,7 +71,7 @@ def page(results: Path, measured: Mapping[str, Json] | None = None) -> tuple[str
         measured: Results in place of files, by the name of the file without ``.json``.
 
     Raises:
-        InvalidInput: There is no such folder, or a file is no result file.
+        InvalidInput: There is no such folder, or a file is not a result file.
     """
     if not results.is_dir():  # as beside an installed package, which has no documents
         raise InvalidInput("results", str(results), "must be a folder of result files")
@@ -88,6 +88,7 @@ def page(results: Path, measured: Mapping[str, Json] | None = None) -> tuple[str
 def section(text: str, find: Find) -> tuple[str, list[str]]:
     """Return a section with its numbers and their sources, and the measures without a file."""
     title, absent, used = text.splitlines()[0].lstrip("# "), list[str](), dict[str, Json]()
+    trained = dict[str, None]()
 
     def number(place: re.Match[str]) -> str:
         kind, parts = place[1], _parts(place[2])
@@ -101,11 +102,13 @@ def section(text: str, find: Find) -> tuple[str, list[str]]:
             absent.append(f"{title}: {line.split('|')[1].strip()}")
             return MISSING
         used[file] = found
+        if kind == "curve":
+            trained[training_of(found, where[0], *where[3:])] = None
         return value
 
     written = _PLACE.sub(number, text)
     command = _COMMAND.search(written)
-    sources = [_origin(file, found) for file, found in used.items()]
+    sources = [*(_origin(file, found) for file, found in used.items()), *trained]
     if absent and command:
         sources.append(f"{MISSING}: `{command[1]}`")
     blocks = [_COMMAND.sub("", written).rstrip()]
@@ -126,9 +129,9 @@ def _find(results: Path, measured: Mapping[str, Json], file: str) -> Json | None
     try:
         found = json.loads(path.read_bytes())
     except ValueError as error:
-        raise InvalidInput("results", str(path), f"is no result file: {error}") from error
+        raise InvalidInput("results", str(path), f"is not a result file: {error}") from error
     if not isinstance(found, dict):
-        raise InvalidInput("results", str(path), "is no result file: must be a JSON object")
+        raise InvalidInput("results", str(path), "is not a result file: must be a JSON object")
     return found
 
 

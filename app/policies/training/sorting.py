@@ -1,7 +1,8 @@
 """Training on the sorting task: model, checkpoints, curriculum and learning curve.
 
-A point of the curve is measured in greedy episodes from clean starts with the triangular sizes
-of the thesis, the same ones at every point. Their CPU time is not counted as training.
+A point of the curve is measured in greedy episodes from undisturbed starts with the triangular
+distributions of the thesis for numbers of objects, the same episodes at every point. Their CPU
+time is not counted as training.
 """
 
 from collections.abc import Mapping

@@ -242,7 +242,7 @@ def _fault(raw: dict[str, Any], error: Any) -> Fault:
     if kind == "missing":
         return fault(place, "", "is missing", _description(raw, loc))
     if kind == "extra_forbidden":
-        rule = "is no known field"
+        rule = "is not a known field"
         return fault(place, value, rule, _known(raw, loc))
     if kind == "union_tag_not_found":
         return fault(f"{place}.kind", "", f"is missing: {', '.join(_PEOPLE)}")

@@ -205,7 +205,7 @@ def read_rows(lines: Sequence[tuple[int, str]], n_columns: int, n_rows: int) -> 
     if faults:
         raise BadRecording(faults[:MAX_FAULTS])
     if len(rows) < 2:
-        raise bad("frames", f"<{len(rows)}>", "must be at least 2", "one frame is no motion")
+        raise bad("frames", f"<{len(rows)}>", "must be at least 2", "one frame is not a motion")
     return np.array(rows)
 
 

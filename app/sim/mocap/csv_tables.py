@@ -57,7 +57,8 @@ class AngleTrack:
     q: Vec
     """Joint positions of the 18-DoF model [m, rad], shape (n, 18)."""
     pelvis_z: Vec
-    """Height of the pelvis [m], shape (n,)."""
+    """Height of the pelvis as in the file [m], shape (n,): above that of standing (CSV), or in
+    the frame of the file (OpenSim)."""
     frames: NDArray[np.int64]
     """Frame number of each row, counted from 0, shape (n,)."""
     n_frames: int
@@ -131,7 +132,7 @@ def _declared_degrees(file: CsvText, columns: Mapping[str, int]) -> bool:
     for unit, spellings in ANGLE_UNITS.items():
         if declared == unit or (not declared and stated <= set(spellings)):
             return unit == "degrees"
-    rule = "must be declared in the first line: # angles = degrees, or # angles = radians"
+    rule = "must be declared in a comment: # angles = degrees, or # angles = radians"
     raise bad("angles", shown(declared) if declared else "", rule)
 
 

@@ -285,7 +285,7 @@ def complete_rows(
     if good.sum() < 2:
         value = f"<{int(good.sum())}>"
         rule = "must be at least 2 that have all values"
-        raise bad("frames", value, rule, "one frame is no motion")
+        raise bad("frames", value, rule, "one frame is not a motion")
     rows = np.flatnonzero(~good)
     missing = []
     for group in np.split(rows, np.flatnonzero(np.diff(rows) > 1) + 1) if rows.size else ():

@@ -1,4 +1,4 @@
-"""The pick scenario of thesis chapter 5: one robot, one person, cubes and docks.
+"""The pick scenario of thesis chapter 5: a robot, up to four people, cubes and docks.
 
 :class:`PickBatch` steps many environments in compiled kernels (``pick/kernels/episode.py``).
 The functions evaluate one state with the same kernels, for the live world and task selection.
@@ -70,8 +70,9 @@ VIEWS = {
     "phase": (FEATURES, N_WITH_PHASE),
     "two-people": (FEATURES, N_PICK),
 }
-"""Contents and lengths of observations: the raw state of (5.8); that and features; those and
-the person's body dimensions; features and the phase of a pick; that and a second person."""
+"""Contents and lengths of observations: the raw state of thesis eq. (5.8); the state and
+features; these and the person's body dimensions; state, features and the phase of the pick;
+these and a second person."""
 DEFAULT_WEIGHTS = RewardWeights(
     c_d=0.5, c_th=0.5, c_c=1.0, c_step=0.02, c_v=1.0, d_v=0.1, c_s=1.0, gamma=1.0
 )
@@ -125,7 +126,7 @@ class PickSettings:
         choices = (("start", get_args(StartRule)), ("observation", tuple(VIEWS)))
         for name, known in choices:
             if (rule := getattr(self, name)) not in known:
-                raise InvalidInput(name, rule, "must name a rule", known)
+                raise InvalidInput(name, rule, "must be one of the choices", known)
         for name in ("time_limit_s", "short_limit_s"):
             if not 0.0 < getattr(self, name) < math.inf:
                 raise InvalidInput(name, getattr(self, name), "must be positive and finite")
@@ -275,7 +276,7 @@ class PickBatch(EnvBatch):
         self._look(checked)
 
     def set_starts(self, q: Vec) -> None:
-        """Put the robots at rest at other starts [rad], shape (n_envs, 6)."""
+        """Place the robots at rest in given configurations [rad], shape (n_envs, 6)."""
         require_shape("q", q, self.state.q.shape)
         require_finite("q", q)
         shared = self.world, self.settings.grasp, self.state
@@ -316,7 +317,7 @@ def queries(
     targets: tuple[Vec, Vec, Vec],
     progress: tuple[Indices, Vec],
 ) -> PickQuery:
-    """Return n states with the target of each one's phase.
+    """Return n states as queries; the target of a state depends on its phase.
 
     Args:
         grasp: Phases of a pick.

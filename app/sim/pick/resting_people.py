@@ -51,7 +51,7 @@ class PickTarget:
 
 @dataclass(slots=True)
 class RestingPeoplePlanner:
-    """Moves one robot while all people are at rest; :meth:`note` is called every cycle.
+    """Moves one robot while all people are at rest; :meth:`note` is called in every period.
 
     ``people`` are those of this moment. ``q_over`` and ``q_grasp`` are joint positions over the
     objects of n targets and at them [rad], shape (n, 6).

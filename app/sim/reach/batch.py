@@ -116,7 +116,7 @@ class ReachSettings:
         for name, known in choices:
             value = getattr(self, name)
             if value not in get_args(known):
-                raise InvalidInput(name, value, "must name a rule", get_args(known))
+                raise InvalidInput(name, value, "must be one of the choices", get_args(known))
         if not (math.isfinite(self.time_limit_s) and self.time_limit_s > 0.0):
             raise InvalidInput("time_limit_s", self.time_limit_s, "must be positive")
         if not math.isfinite(self.start_clearance_m):

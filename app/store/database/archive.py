@@ -84,7 +84,7 @@ def opened(path: Path) -> Iterator[tuple[tarfile.TarFile, dict[str, Any]]]:
     except OSError as error:
         raise InvalidInput("FILE", str(path), f"cannot be read: {error.strerror}") from error
     except tarfile.TarError as error:
-        raise InvalidInput("FILE", str(path), f"is no backup of Tandem: {error}") from error
+        raise InvalidInput("FILE", str(path), f"is not a backup of Tandem: {error}") from error
     with archive:
         try:
             text = _member(archive, HEAD, path).read()

@@ -93,11 +93,11 @@ def test_wide_margin_offers_moves_with_more_attempts(client: TestClient) -> None
     [
         ({"held": "z"}, "held", "must be the id of one of the objects"),
         ({"cell": "pick-and-place"}, "cell", "needs stations of kind clutter"),
-        ({"cell": "nowhere"}, "cell", "is no known work cell"),
+        ({"cell": "nowhere"}, "cell", "is not a known work cell"),
         ({"goal": {"red": ["medium"]}}, "goal", "must be met by the objects"),
         ({"margin": 11.0}, "margin", "must be at most 10"),
         ({"robot": {"q": [0.0] * 6, "qd": [9.0] * 6}}, "robot.qd[0]", "must lie in"),
-        ({"checkpoint": "none"}, "checkpoint", "is no stored checkpoint"),
+        ({"checkpoint": "none"}, "checkpoint", "is not a stored checkpoint"),
         ({"layout": {}}, "layout", "is not a known field"),
     ],
 )

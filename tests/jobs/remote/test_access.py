@@ -283,7 +283,7 @@ def test_inputs_are_those_of_the_database(
     for one, two in zip(remote.motions(["waves"]), local.motions(["waves"]), strict=True):
         assert (one.name, one.source, one.size) == (two.name, two.source, two.size)
         assert np.array_equal(one.q, two.q) and np.array_equal(one.times, two.times)
-    with pytest.raises(InvalidInput, match=r"recordings\[0\] = 'nods' is no stored"):
+    with pytest.raises(InvalidInput, match=r"recordings\[0\] = 'nods' is not a stored"):
         remote.motions(["nods"])
     with pytest.raises(ServiceError, match="no checkpoint 'nobody'"):
         remote.checkpoint("nobody")

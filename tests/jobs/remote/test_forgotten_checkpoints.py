@@ -30,5 +30,5 @@ def test_checkpoint_that_goes_with_an_old_job_is_forgotten(
         services.checkpoints.mark_damaged(Damaged("checkpoint", "old", "", made.sha256))
         replace(services.retention, keep_jobs=0).apply(services.store)
         assert services.checkpoints.damaged == ()
-        with pytest.raises(InvalidInput, match="is no stored checkpoint"):
+        with pytest.raises(InvalidInput, match="is not a stored checkpoint"):
             services.task_policies.load(made.sha256)

@@ -139,7 +139,7 @@ def test_a_range_has_the_length_of_its_group(alias, group, entry):
     ("alias", "group"), [("pick", "human"), ("reach", "human_q"), ("sorting-e0", "q")]
 )
 def test_a_range_of_another_purpose_is_refused(alias, group):
-    with pytest.raises(InvalidInput, match="is no group of the training range") as caught:
+    with pytest.raises(InvalidInput, match="is not a group of the training range") as caught:
         loaded(alias, trained_range=ranges_of(alias, **{group: GOAL}))
     assert caught.value.field == f"manifest.trained_range.{group}"
 

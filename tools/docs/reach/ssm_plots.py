@@ -20,7 +20,7 @@ RESULT = RESULTS / "reach-ssm.json"
 PICTURES = IMAGES / "reach"
 ROWS = {
     "policy-rollout": ("policy with rollout", BLUE, "-"),
-    "policy-rollout-ssm-agnostic": ("rollout without SSM", BLUE, "--"),
+    "policy-rollout-ssm-agnostic": ("rollout that does not model SSM", BLUE, "--"),
     "policy": ("policy without rollout", BLUE, ":"),
     "rrtstar-once": ("RRT*, planned once", ORANGE, "-"),
     "rrtconnect-blocked": ("RRT-Connect, replan when blocked", RED, "-"),
@@ -84,7 +84,8 @@ def arrivals(seconds: Json, cap: float) -> Figure:
 def main() -> int:
     """Draw both pictures if the result exists."""
     if not RESULT.exists():
-        print(f"{RESULT.relative_to(ROOT)} is not there: run `evaluate reach-ssm` first")
+        name = RESULT.relative_to(ROOT)
+        print(f"{name} does not exist: write it by `python -m app evaluate reach-ssm --json`")
         return 1
     result = read_result(RESULT)
     example, seconds = result["example"][LAYER], result["seconds"][LAYER]

@@ -44,7 +44,8 @@ class Visit:
     speed: np.ndarray
     """Speed of the TCP [m/s], shape (n,)."""
     protective: float
-    """Smallest distance while the robot moves [m]."""
+    """Distance that the layer keeps while the robot moves [m]: C + Z_d + Z_r + protective
+    distance."""
 
 
 def pelvis_y(t: float) -> float:

@@ -1,7 +1,7 @@
 """Validate the simulator: measure, draw and write ``docs/world.md``.
 
     python -m tools.docs.world.page          measure, draw and write
-    python -m tools.docs.world.page --page   write the text only, from ``docs/results``
+    python -m tools.docs.world.page --page   write the text and scaling.png from docs/results
 
 Writes ``docs/results/world.json``, ``docs/img/world/*.png`` and the page, which is the text of
 ``tools/docs/world.template.md`` with these numbers and with tables from ``docs/results``.
@@ -135,7 +135,7 @@ def measure_and_draw() -> Json:
 
 
 def draw_scaling() -> None:
-    """Draw what ``bench sim-scaling`` measured."""
+    """Draw the results of ``bench sim-scaling``."""
     scaling = read_result(RESULTS / "sim-scaling.json")
     world_plots.save(world_plots.scaling, PICTURES / "scaling.png", scaling["results"])
 
@@ -144,7 +144,9 @@ def main() -> None:
     """Measure, draw, write."""
     parser = argparse.ArgumentParser(description="Write docs/world.md.")
     parser.add_argument(
-        "--page", action="store_true", help="from docs/results, measuring nothing"
+        "--page",
+        action="store_true",
+        help="write the page and scaling.png from docs/results, without measuring",
     )
     if not parser.parse_args().page:
         write_result(RESULTS / "world.json", measure_and_draw())

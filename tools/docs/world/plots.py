@@ -74,7 +74,7 @@ def mesh_gap(found: Sequence[Gap]) -> Figure:
     meshes = 1e3 * np.array([one.meshes for one in found])
     for mask, colour, label in (
         (~tool, BLUE, "a link is nearest"),
-        (tool, ORANGE, "the tool is"),
+        (tool, ORANGE, "the tool is nearest"),
     ):
         left.plot(meshes[mask], capsules[mask], ".", ms=2.5, color=colour, label=label)
     top = max(meshes.max(), capsules.max())

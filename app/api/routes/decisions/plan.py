@@ -25,10 +25,10 @@ router = APIRouter(prefix="/v1/plan", tags=["deciding"])
     "", summary="Choose the next move of a sorting task and its motion", responses=MISMATCH
 )
 async def plan_move(request: PlanRequest, services: ServicesDep) -> PlanAnswer:
-    """Return the next move, its motion and every move that the choice was among.
+    """Return the next move, its motion and all moves that were compared.
 
-    The exact planner gives the moves that it expects to take about as many attempts; among them
-    the pick policy chooses, beside the people as they are now.
+    The exact planner lists the near-optimal moves, which need at most 0.25 expected attempts
+    more than the best one; the pick policy selects one of them, beside the people as they are.
     """
     services.readiness.require()
     cell = await services.known_cell(request.cell)

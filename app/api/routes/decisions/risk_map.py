@@ -20,9 +20,7 @@ MAX_INLINE_ROWS = 48
 router = APIRouter(prefix="/v1/risk-map", tags=["deciding"])
 
 
-@router.post(
-    "", summary="Choose beside a person at each position of a grid", responses=MISMATCH
-)
+@router.post("", summary="Map choice and risk over positions of a person", responses=MISMATCH)
 async def map_risk(request: RiskMapRequest, services: ServicesDep) -> RiskMapAnswer:
     """Return the choice, its value and its probabilities at every position of a person.
 

@@ -51,7 +51,7 @@ class ScriptedInterferences:
         self._after = np.array([*(np.inf if one is None else one for one in after), np.nan])
 
     def due(self, which: Index, moves: Index, solved: Flags) -> Flags:
-        """Return the environments with an interference now; at a goal there always is one.
+        """Return which environments have an interference now; at a goal all have.
 
         Args:
             which: Environments that just made an attempt, shape (k,).
@@ -257,7 +257,7 @@ def run_episodes(
         batch: Environments at their starts, with the horizon factor ENDLESS.
         choose: Policy.
         script: Interferences; none by default.
-        fallback: Whether the exact planner replaces the policy after a planner fallback.
+        fallback: Whether the exact planner replaces the policy once the monitor triggers.
         only: Environments to run, shape (n_envs,); the others time out at once.
     """
     if only is not None:

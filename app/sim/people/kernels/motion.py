@@ -63,7 +63,7 @@ def worker_at(
     """Write joints, joint speeds and pelvis height of one worker.
 
     Args:
-        state: Rows; the worker's position in its script is updated too.
+        state: People of all environments; the worker's position in its script is updated too.
         e: Environment.
         w: Worker.
         when: Time in its script or track [s].
@@ -160,7 +160,7 @@ def draw_script_of(
     """Draw a script for one worker.
 
     Args:
-        state: Rows; the script of the worker is written.
+        state: People of all environments; the script of the worker is written.
         e: Environment.
         w: Worker.
         who: Index of the worker's body.
@@ -200,7 +200,7 @@ def advance_people(
     """Advance the people of one environment by one control period.
 
     Args:
-        state: Rows; joints and cylinders are written.
+        state: People of all environments; joints and cylinders are written.
         e: Environment.
         robot: The robot's capsules at the start of the period, shape (9, n).
         dt: Period [s].
@@ -239,7 +239,7 @@ def record_palms(
     """Record the workers' palms over the start of an episode.
 
     Args:
-        state: Rows; row 0 is used.
+        state: People of all environments; environment 0 is used.
         robot: The robot's capsules, shape (9, n).
         dt: Time between samples [s].
         geometry: Work space.

@@ -292,7 +292,7 @@ def observe_people(
     with any people.
 
     Args:
-        state: Rows of the people.
+        state: People of all environments.
         e: Environment.
         robot: The robot's capsules as columns, shape (9, n).
         geometry: The people, placed as they are now.

@@ -2,8 +2,8 @@
 
 With clearance ``d`` between person and robot, closeness is ``u = (D_SLOW - d) / (D_SLOW -
 D_STOP)`` in [0, 1]. A person of yielding ``k`` works at ``1 - k u`` of its pace and leans its
-trunk away from the tool by ``k u LEAN`` with a first-order lag of ``LAG``. Yielding 0 is the
-source's person, without reaction; a person of yielding 1 stops at ``D_STOP``.
+trunk away from the tool by ``k u LEAN`` with a first-order lag of ``LAG``. A person of
+yielding 0 does not react, as in the thesis; one of yielding 1 stops at ``D_STOP``.
 
 Source: docs/method.md 4 (reacting people), future work in the thesis; form and constants are
 ours. LAG lies between a simple visual reaction (0.15 to 0.25 s) and the motion time of a trunk.

@@ -6,13 +6,15 @@ object down. The policy moves the robot in all phases; this module decides which
 
 | from | to | when |
 |---|---|---|
-| approach | descend | tool at the target, upright and slow, nobody near |
+| approach | descend | tool at the target, upright and slow, nobody within ``start_clearance`` |
 | descend | lift | tool held at the object for ``close_s`` |
-| descend | approach | somebody comes near, or the tool leaves the line over the object |
+| descend | approach | somebody within ``abort_clearance``, or the tool off the line |
 | lift | end | the tool is up again: success |
 
-Source: ours. The thesis counts a target as reached within 0.1 m (section 5.3.1); the object is
-not picked up in its simulator.
+The line is the vertical over the object.
+
+Source: this project. The thesis counts a target as reached within 0.1 m (section 5.3.1); the
+object is not picked up in its simulator.
 """
 
 import math
@@ -27,7 +29,7 @@ APPROACH, DESCEND, LIFT = range(3)
 
 
 class GraspRules(NamedTuple):
-    """Geometry and times of a grasp; ``depth`` 0 asks for the approach only."""
+    """Geometry and times of a grasp; with ``depth`` 0 the task is the approach only."""
 
     depth: float = PICK_DEPTH_M
     """Descent from the target to the object [m]."""
@@ -38,9 +40,10 @@ class GraspRules(NamedTuple):
     hold_distance: float = 0.02
     """Largest distance from the object at which the gripper closes [m]."""
     tilt: float = 0.1
-    """Largest angle of the tool to the vertical for both [rad]."""
+    """Largest angle of the tool to the vertical at the start of the descent and while the
+    gripper closes [rad]."""
     speed: float = 0.1
-    """Largest tcp speed for both [m/s]."""
+    """Largest tcp speed then [m/s]."""
     start_clearance: float = 0.06
     """Least clearance to people for the descent to start [m]."""
     abort_clearance: float = 0.05
@@ -105,7 +108,7 @@ def next_phase(
         phase: Phase of the pick.
         closing: Time for which the tool has been held at the object [s].
         goal: Target over the object [m], shape (3,).
-        tool: The tool at the end of the cycle.
+        tool: The tool at the end of the control period.
         dt: Control period [s].
     """
     tcp = tool.tcp

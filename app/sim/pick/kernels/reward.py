@@ -59,7 +59,7 @@ def reward(
         tilt_old: Angle of the tool to the vertical before [rad].
         tilt: Angle of the tool to the vertical after [rad].
         speed: Speed of the tcp after [m/s].
-        collided: Whether the cycle ended in a collision.
+        collided: Whether the control period ended in a collision.
         succeeded: Whether it ended in success.
         weights: Coefficients.
     """

@@ -136,7 +136,7 @@ def outcome_of(
     """Return the outcome of an episode after a control period.
 
     Args:
-        collided: Whether there was a collision in this cycle.
+        collided: Whether there was a collision in this control period.
         touched: Whether there was a collision in the episode so far, which excludes success.
         near: Whether the tcp is within ``SUCCESS_DISTANCE`` of the goal.
         unfeasible: Whether the one-step bounds left no admissible coefficient.

@@ -52,11 +52,11 @@ class ReachObservationWorkspace(NamedTuple):
     observed: Vec
     """The observed person, shape (N_PERSON,)."""
     clearances: Vec
-    """Clearances extrapolated to the horizons [m], shape (3,)."""
+    """Clearances extrapolated to ``HORIZONS`` [m], shape (3,)."""
     body: PersonWorkspace
     """A worker's capsules, now and extrapolated."""
     gap: Vec
-    """Distance of each of a worker's capsules to the robot [m], shape (16,)."""
+    """Distance of each of a worker's capsules to the robot [m], padded to shape (16,)."""
     moved: RobotPose
     """The robot further along a motion."""
     lanes: Vec
@@ -74,11 +74,11 @@ class ReachObservationWorkspace(NamedTuple):
     person: Vec
     """One person, shape (N_PERSON,)."""
     people: Vec
-    """All people that count, each as ``person``, shape (MAX_PEOPLE, N_PERSON)."""
+    """All considered people, each as ``person``, shape (MAX_PEOPLE, N_PERSON)."""
     predicted: Vec
-    """x, y and radius of all people that count [m], (N_TIMES, MAX_PEOPLE, 3)."""
+    """x, y and radius of all considered people [m], (N_TIMES, MAX_PEOPLE, 3)."""
     n: NDArray[np.int64]
-    """Number of people that count, and index of the observed one, shape (2,)."""
+    """Number of considered people, and index of the observed one, shape (2,)."""
     retreats: Vec
     """Configurations to retreat to [rad], shape (N_RETREATS, 6)."""
     aside: Vec

@@ -73,11 +73,11 @@ GOAL, GROWTH = LAYOUT["goal_gap_ahead"].start, LAYOUT["radius_ahead"].start
 def predict_motion(
     state: PeopleState, e: int, which: int, observed: int, work: ReachObservationWorkspace
 ) -> None:
-    """Fill ``work.people``, ``predicted`` and ``n`` with the people that count.
+    """Fill ``work.people``, ``predicted`` and ``n`` with the considered people.
 
     Args:
         e: Environment.
-        which: The one person that counts, workers first, or ALL_PEOPLE.
+        which: The only person to consider, workers first, or ALL_PEOPLE.
         observed: The observed person; below 0 for none.
         work: Holds the people, placed as they are now.
     """
@@ -124,7 +124,9 @@ def _cut(d: float) -> float:
 
 @kernel()
 def _measure_people(arm: Arm, top_z: float, n: int, work: ReachObservationWorkspace) -> None:
-    """Fill the clearances of ``n`` configurations, at the looks in turn, to all people.
+    """Fill the clearances of ``n`` configurations to all people.
+
+    Configuration ``m`` is evaluated at the time of ``LOOKS[m % N_LOOKS]``.
 
     Args:
         top_z: Height of people's tops [m].

@@ -2,9 +2,10 @@
 
 ``r = c_p (d_old - gamma d) - c_d d - c_a |c| - c_step - c_c [collision] + c_s [success]``, with
 ``d`` the distance of tcp and goal and ``|c|`` the Euclidean norm of the control period's second
-coefficients; speed and separation monitoring subtracts ``c_o`` in each cycle that it stops.
-``c_p = c_step = 0`` is the thesis' reward; ``c_d = c_a = 0`` rewards progress, which learned
-far better where a collision ends the episode: a cost of distance alone rewards an early end.
+coefficients; speed and separation monitoring subtracts ``c_o`` in each control period that it
+stops. ``c_p = c_step = 0`` is the thesis' reward; ``c_d = c_a = 0`` rewards progress, which
+learned far better where a collision ends the episode: a cost of distance alone rewards an early
+end.
 """
 
 import math
@@ -56,9 +57,9 @@ def reward(
     Args:
         d_old: Distance to the goal before [m].
         d: Distance to the goal after [m].
-        c: Second coefficients of the cycle [rad/s^2], shape (6,).
-        collided: Whether there was a collision in the cycle.
-        succeeded: Whether the cycle ended in success.
+        c: Coefficients of t^2 in the control period [rad/s^2], shape (6,).
+        collided: Whether there was a collision in it.
+        succeeded: Whether it ended in success.
         weights: Coefficients.
     """
     bonus = weights.c_s if succeeded else 0.0

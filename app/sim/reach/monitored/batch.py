@@ -125,7 +125,7 @@ class MonitoredReachBatch(ReachBatch):
         """Move one environment through one control period toward joint speeds, for planners.
 
         Args:
-            wanted: Joint speeds after the cycle [rad/s], shape (6,).
+            wanted: Joint speeds after the control period [rad/s], shape (6,).
         """
         require_shape("wanted", wanted, (6,))
         require_finite("wanted", wanted)

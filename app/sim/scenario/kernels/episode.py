@@ -179,7 +179,7 @@ def move(
         state: Environments; changed.
         e: Environment.
         act: Action in [-1, 1].
-        work: Holds the poses at the end afterwards, and the coefficients of the cycle.
+        work: Holds the poses at the end afterwards, and the coefficients of the control period.
 
     Returns:
         Whether there was a contact, and whether a joint had no admissible coefficient.

@@ -78,7 +78,7 @@ AT_REST = 1e-3
 def follow_track(state: EpisodeState, e: int, monitor: MonitoredState, dt: float) -> None:
     """Move the pedestrian of environment ``e`` to the present place of its track.
 
-    After its end a track stays where it is.
+    After the end of the track the pedestrian stands at its last point.
     """
     track, k = monitor.tracks[e], monitor.period[e]
     last = track.shape[0] - 1
@@ -105,9 +105,9 @@ def begin_rows(
     monitor: MonitoredState,
     work: StepWorkspace,
 ) -> None:
-    """Clear the accounts of environments, shape (k,), that were just reset.
+    """Start the episode statistics of environments, shape (k,), that were just reset.
 
-    Their pedestrians move onto their tracks, if any.
+    Their pedestrians move to the start of their tracks, if any.
     """
     for e in envs:
         for k in range(N_ACCOUNT):
@@ -245,7 +245,7 @@ def _arrive(
     monitor: MonitoredState,
     work: StepWorkspace,
 ) -> None:
-    """Move the robot to the end of the cycle."""
+    """Move the robot to the end of the control period."""
     end, account = monitor.trial.ssm.end, monitor.account[e]
     place_robot(arm, state.q[e], work.robot)
     x, y, z = work.robot.tcp[0], work.robot.tcp[1], work.robot.tcp[2]
@@ -300,9 +300,9 @@ def move_monitored(
     Args:
         state: Environments; changed.
         e: Environment.
-        monitor: Safety layer, tracks and accounts.
+        monitor: Safety layer, tracks and episode statistics.
         work: ``c``, ``d`` are the command; ``q``, ``qd``, ``qdd`` its end. Afterwards ``robot``
-            and ``geometry`` are the poses at the end of the cycle.
+            and ``geometry`` are the poses at that end.
 
     Returns:
         Whether there was a contact that ends the episode.
@@ -320,6 +320,6 @@ def move_monitored(
 
 @kernel(inline="always")
 def close_account(monitor: MonitoredState, e: int) -> None:
-    """Store the account of environment ``e``, whose episode ended."""
+    """Store the statistics of environment ``e``, whose episode ended."""
     for i in range(N_ACCOUNT):
         monitor.closed[e, i] = monitor.account[e, i]

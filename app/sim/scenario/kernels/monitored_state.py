@@ -25,7 +25,7 @@ N_ACCOUNT = 13
     TOUCHED_AT_REST,
     ALLOWED,
 ) = range(N_ACCOUNT)
-"""Account of an episode: control periods; periods with override 0 and below one half;
+"""Statistics of an episode: control periods; periods with override 0 and below one half;
 periods that end at standstill, and those of them with override 0; path length of the joints
 [rad] and of the tcp [m]; NO_TOUCH, PERSON or CELL; speed of the touching link [m/s]; greatest
 speed of any person [m/s]; sum of the overrides; periods in which a person touches the robot at
@@ -35,7 +35,7 @@ NO_TOUCH, PERSON, CELL = range(3)
 
 
 class MonitoredState(NamedTuple):
-    """Safety layer, tracks and accounts of the environments."""
+    """Safety layer, tracks and episode statistics of the environments."""
 
     safety: SeparationRule
     """Assumptions of the safety layer."""

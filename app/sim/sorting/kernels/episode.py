@@ -54,7 +54,7 @@ def step_rows(
     A person may interfere after it; where that happens to meet the goal the episode ends too.
 
     Args:
-        rows: Rows; changed.
+        rows: All environments; changed.
         rules: Starts, disturbances and ends.
         weights: Reward coefficients.
         seed: Seed of the batch.

@@ -48,7 +48,7 @@ def write_goal(rows: SortingRows, rules: SortingRules, e: int, wanted: Ints) -> 
     """Write the goal of objects, on the tower of their colour, the largest at the bottom.
 
     Args:
-        rows: Rows.
+        rows: All environments.
         e: Row.
         wanted: Number of objects per code, shape (types + 1,).
     """
@@ -154,7 +154,7 @@ def start_row(rows: SortingRows, rules: SortingRules, seed: int, row: int, e: in
     """Draw the next episode of row ``e``.
 
     Args:
-        rows: Rows; changed.
+        rows: All environments; changed.
         seed: Seed of the batch.
         row: Number of the row in the random streams.
         e: Row.

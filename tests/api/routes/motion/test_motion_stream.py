@@ -223,7 +223,7 @@ def test_idle_socket_is_closed(services: Services, url: str) -> None:
         ("deadline_ms=soon", "deadline_ms = 'soon' must be a valid number"),
         ("deadline_ms=1_0", "deadline_ms = '1_0' must be a number in plain digits"),
         ("deadline_ms=5&deadline_ms=50", "deadline_ms = ['5', '50'] must be given once"),
-        ("anwser=each", "anwser = 'each' is no parameter; choices: answer, deadline_ms"),
+        ("anwser=each", "anwser = 'each' is not a parameter; choices: answer, deadline_ms"),
     ],
 )
 def test_bad_parameter_of_a_socket_is_named(url: str, query: str, reason: str) -> None:

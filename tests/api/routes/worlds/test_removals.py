@@ -56,7 +56,7 @@ def test_policy_that_is_deleted_while_it_is_loaded_is_not_chosen(
     services: Services, own: str
 ) -> None:
     services = loading(services, lambda: services.retention.delete_checkpoint(own))
-    with pytest.raises(InvalidInput, match="is no stored checkpoint"):
+    with pytest.raises(InvalidInput, match="is not a stored checkpoint"):
         choose(services, own)
     assert services.worlds["main"].handle.acting == frozenset()
 
@@ -74,7 +74,7 @@ def test_policy_is_not_chosen_while_it_is_deleted(services: Services, own: str) 
 
         services.retention.acting = acting
         services.retention.delete_checkpoint(own)
-        with pytest.raises(InvalidInput, match="is no stored checkpoint"):
+        with pytest.raises(InvalidInput, match="is not a stored checkpoint"):
             requests[0].result(30.0)
     assert services.worlds["main"].handle.acting == frozenset()
 
@@ -90,7 +90,7 @@ def test_world_does_not_start_with_a_policy_that_is_deleted_meanwhile(
         return started[0]
 
     body = WorldCell(cell="pick-and-place", checkpoint=own)
-    with pytest.raises(InvalidInput, match="is no stored checkpoint"):
+    with pytest.raises(InvalidInput, match="is not a stored checkpoint"):
         set_world_cell("main", body, replace(services, start_world=start))
     assert services.worlds["main"] is before
     with pytest.raises(Conflict, match="was stopped"):

@@ -12,10 +12,10 @@ class Commands(NamedTuple):
     """Commands of one control period: actions, or segments."""
 
     act: NDArray[np.float32]
-    """Actions of all environments, shape (n_envs, 6)."""
+    """Actions of all environments in [-1, 1], shape (n_envs, 6)."""
     segments: Vec
-    """Second coefficients of segments of degree 2, one per stepped environment [rad/s^2], shape
-    (k, 6); no rows for actions."""
+    """Coefficients of t^2 (half the acceleration) of segments, a row per stepped environment
+    [rad/s^2], shape (k, 6); no rows where actions are given."""
 
 
 class StepResults(NamedTuple):
