@@ -1,5 +1,6 @@
 """One person in the cell: state of the human model, or a cylinder."""
 
+import math
 from dataclasses import dataclass
 
 from app.sim.core.arrays import Vec
@@ -23,9 +24,9 @@ class Person:
     """x, y and radius [m], shape (3,), of a person known only as a cylinder
     (``observed_people.person_from_cylinder``); distances are then to the cylinder. None: a body
     of 18 joints."""
-    top: float | None = None
-    """z of the top of that cylinder [m], for the safety layer; None: that of the cell's tallest
-    pedestrian, or 2 m over the floor."""
+    top: float = -math.inf
+    """z of the top of that cylinder [m] for the safety layer, where it is above that of the
+    cell's tallest pedestrian or 2 m over the floor."""
     growth: float = 0.0
     """Growth rate of that cylinder's radius [m/s]; 0 if unknown."""
     past: Vec | None = None

@@ -27,6 +27,7 @@ from app.sim.human.person import Person
 from app.sim.people.kernels import people as people_kernel
 from app.sim.people.kernels.pedestrian import N_PAST
 from app.sim.people.kernels.people import MAX_PEOPLE, People, PeopleGeometry
+from app.sim.perception.bounding_cylinder import ABOVE_ROBOT
 from app.sim.perception.keypoints import FARTHEST_M
 from app.sim.perception.person_estimator import PersonEstimate
 from app.sim.robot.kernels import arm as arm_kernel
@@ -142,7 +143,8 @@ def _in_cylinder(estimate: PersonEstimate) -> Person | None:
 
 def person_anywhere() -> Person:
     """Return the unknown person of a safety layer, which makes the robot stop."""
-    return person_from_cylinder(0.0, 0.0, 0.0, 0.0, WIDEST, measured=False)
+    unknown = person_from_cylinder(0.0, 0.0, 0.0, 0.0, WIDEST, measured=False)
+    return replace(unknown, top=ABOVE_ROBOT)
 
 
 def degradations(person: Person) -> tuple[str, ...]:
@@ -331,7 +333,7 @@ def people_shapes(shared: People, people: Sequence[Person]) -> Shapes:
     geometry = _placed(shared, people)
     workers = [person for person in people if person.cylinder is None]
     cylinders = [person for person in people if person.cylinder is not None]
-    tops = [max(shared.top_z, person.top or shared.top_z) for person in cylinders]
+    tops = [max(shared.top_z, person.top) for person in cylinders]
     going = [
         (*person.qd[:2], person.growth) if person.measured else (math.nan,) * 3
         for person in cylinders

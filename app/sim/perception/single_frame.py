@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 
 from app.sim.core.arrays import Vec
 from app.sim.human.person import Person
-from app.sim.perception.bounding_cylinder import SafetyCylinder, safety_cylinder
+from app.sim.perception.bounding_cylinder import ABOVE_ROBOT, SafetyCylinder, safety_cylinder
 from app.sim.perception.keypoint_angles import joint_motion
 from app.sim.perception.keypoint_check import as_numbers, check_keypoints
 from app.sim.perception.keypoints import BODY_25, N_KEYPOINTS, Group, swap_sides
@@ -26,7 +26,7 @@ _EXCHANGED: dict[str, Group] = {"arms-swapped": "arms", "legs-swapped": "legs"}
 FASTEST_POINT = 20.0
 """Speed of a key-point beyond which its velocity is no person's [m/s]."""
 _ANYWHERE = SafetyCylinder(
-    center=np.zeros(2), radius=5.0, bottom=-5.0, top=5.0, velocity=np.zeros(2)
+    center=np.zeros(2), radius=5.0, bottom=-5.0, top=ABOVE_ROBOT, velocity=np.zeros(2)
 )
 """Cylinder of a person at an unknown place."""
 _STEP_S = 0.005

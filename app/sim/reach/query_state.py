@@ -125,7 +125,7 @@ class QueryState:
                 continue
             walker = rows.walkers.rows[0, i - first]
             self._measured[i - first] = person.measured
-            self._tops[i - first] = max(self.top_z, person.top or self.top_z)
+            self._tops[i - first] = max(self.top_z, person.top)
             walker[X], walker[Y], walker[R] = person.cylinder
             walker[VX], walker[VY], walker[GROWTH] = *person.qd[:2], person.growth
             remember_as_now(rows.walkers.rows, 0, i - first)

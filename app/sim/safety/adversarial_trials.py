@@ -114,12 +114,15 @@ def run_trial(
         seed: Seed; episode ``k`` is fixed by (seed, k).
 
     Raises:
-        InvalidInput: The number of episodes or of people is 0.
+        InvalidInput: The number of episodes or of people is 0, or the layer uses measured
+            velocities, which the people of a trial do not have.
     """
     if n_episodes < 1:
         raise InvalidInput("episodes", n_episodes, "must be at least 1")
     if not settings.people:
         raise InvalidInput("people", [], "must name at least one person")
+    if settings.safety.use_measured_velocity:
+        raise InvalidInput("safety.use_measured_velocity", True, "must be false in a trial")
     cell = with_people(load_cell(settings.cell), settings.people)
     arm, people = arm_of(cell), people_of(cell, REACHING)
     state = new_people_state(cell, people, 1)

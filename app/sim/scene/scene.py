@@ -41,6 +41,9 @@ HUMAN_KINDS: tuple[HumanKind, ...] = ("worker", "walker", "constant", "fixed-spe
 that vary, that are constant per episode, or with a given speed."""
 NO_CYLINDERS = np.zeros((0, 3))
 """Cylinders of a cell without walkers."""
+STANDING_TOP = 2.0
+"""Height above the floor of the cylinders of people whose height the cell does not state; reach
+policies observe workers as such cylinders [m]."""
 FAR_AWAY = (0.0, 4.0, -np.pi / 2.0)
 """Pelvis of the person assumed in an empty cell, out of reach [m, rad]."""
 
@@ -117,9 +120,11 @@ def with_people(cell: Cell, kinds: Sequence[HumanKind]) -> Cell:
 
 
 def _cylinder_of(cell: Cell, kind: HumanKind) -> CylinderPerson:
-    """Return a cylinder of a kind with the walking area of the cell's first person."""
+    """Return a cylinder as tall as those of the cell, in the area of its first person."""
     where = cell.people[0] if cell.people else PedestrianSettings()
     area = {name: getattr(where, name) for name in ("x_min", "x_max", "y_min", "y_max")}
+    if cell.cylinders:
+        area["height"] = max(one.height for one in cell.cylinders)
     if kind == "walker":
         return Walker(kind=kind, **area)
     if kind == "constant":
@@ -193,10 +198,11 @@ def people_of(cell: Cell, work: HumanMotionConfig | None = None) -> People:
     """
     check_people(kinds_of(cell))
     workers = len(cell.workers)
+    heights = [STANDING_TOP] * bool(workers) + [one.height for one in cell.cylinders]
     shared = People(
         bodies=as_kernel_array(cell.body[None]),
         floor_z=cell.floor_z,
-        top_z=cell.floor_z + max([p.height for p in cell.cylinders], default=2.0),
+        top_z=cell.floor_z + max(heights, default=STANDING_TOP),
         columns=body.capsule_columns(workers),
         postures=np.zeros((1, 18)),
         hands=np.zeros((1, 2, 3)),

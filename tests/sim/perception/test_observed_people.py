@@ -15,6 +15,8 @@ from app.sim.people.kernels.pedestrian import VX, VY, X, Y
 from app.sim.perception.observed_people import (
     checked_people,
     nearest_index,
+    people_shapes,
+    person_anywhere,
     person_from_cylinder,
 )
 from app.sim.pick.batch import PickBatch, PickSettings
@@ -113,3 +115,12 @@ def test_people_who_cannot_be_are_refused_by_name(people: list[Person], field: s
     with pytest.raises(InvalidInput) as refused:
         checked_people(people)
     assert refused.value.field == field
+
+
+@pytest.mark.parametrize("height", [0.0, -0.6])
+def test_an_unknown_person_reaches_over_the_robot_in_any_cell(height: float) -> None:
+    low = PEOPLE._replace(top_z=height)
+    assert people_shapes(low, [person_anywhere()]).cylinders[0, 3] > 2.0
+    person = person_from_cylinder(0.0, 1.0, 0.0, 0.0, 0.3)
+    assert people_shapes(low, [person]).cylinders[0, 3] == height
+    assert people_shapes(low, [replace(person, top=0.0)]).cylinders[0, 3] == 0.0

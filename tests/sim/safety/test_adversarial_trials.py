@@ -93,6 +93,13 @@ def test_no_episodes_and_no_people_are_refused():
         run_trial(replace(WORKER, people=()), 5, seed=1)
 
 
+def test_a_layer_that_needs_measured_velocities_is_refused():
+    with pytest.raises(InvalidInput, match="use_measured_velocity"):
+        run_trial(
+            replace(WALKER, safety=replace(NO_MARGINS, use_measured_velocity=True)), 5, seed=1
+        )
+
+
 @pytest.mark.slow
 @PLACES
 def test_fifty_thousand_episodes_without_a_moving_contact(place):

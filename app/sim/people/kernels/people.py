@@ -55,7 +55,7 @@ class People(NamedTuple):
     floor_z: float
     """Height of the floor [m]."""
     top_z: float
-    """Height of the pedestrians' cylinders [m]."""
+    """Height of the tops of people's cylinders [m]."""
     columns: Vec
     """Template of the workers' capsules, shape (9, n); see ``body.capsule_columns``."""
     postures: Vec

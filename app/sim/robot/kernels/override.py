@@ -148,7 +148,7 @@ def joint_keeps_limits(j: int, path: JointPath, limits: JointLimits, dt: float) 
     if not max(abs(2.0 * c), abs(2.0 * c + 6.0 * d * dt)) <= limits.qdd_max[j] + TOLERANCE:
         return False
     fastest = max(abs(qd), abs(qd + dt * (2.0 * c + 3.0 * d * dt)))
-    if abs(c) < abs(3.0 * d * dt):
+    if c * d < 0.0 and abs(c) < abs(3.0 * d * dt):  # the speed turns inside the segment
         fastest = max(fastest, abs(qd - c * c / (3.0 * d)))
     if not fastest <= limits.qd_max[j] + TOLERANCE:
         return False

@@ -5,6 +5,7 @@ import pytest
 
 from app.errors import InvalidInput
 from app.sim.cells.cell import load_cell, parse_definition
+from app.sim.cells.people import ConstantWalker
 from app.sim.collision.contact import clearance, contact
 from app.sim.human import model as human
 from app.sim.pick.batch import OUTCOMES, PickBatch, PickSettings
@@ -146,6 +147,28 @@ def test_unknown_kinds_and_crowds_are_refused_by_name() -> None:
         with_people(CELL, ("walker",) * 5)
     with pytest.raises(InvalidInput, match="no worker"):
         with_people(load_cell("shared-workspace"), ("worker",))
+
+
+def pedestrian(height: float) -> ConstantWalker:
+    area = {"x_min": -1.0, "x_max": 1.0, "y_min": 0.9, "y_max": 2.0}
+    return ConstantWalker(kind="constant", height=height, **area)
+
+
+def test_added_pedestrians_are_as_tall_as_those_of_the_cell() -> None:
+    cell = load_cell("shared-workspace")
+    cell = cell.model_copy(update={"people": (pedestrian(2.8),)})
+    mixes: tuple[tuple[HumanKind, ...], ...] = (("walker",), ("fixed-speed", "constant"))
+    for kinds in mixes:
+        top = people_of(with_people(cell, kinds)).top_z
+        assert top == pytest.approx(cell.floor_z + 2.8)
+
+
+def test_a_short_pedestrian_does_not_lower_the_cylinders_of_workers() -> None:
+    short = pedestrian(0.8)
+    alone = CELL.model_copy(update={"people": (short,)})
+    beside = CELL.model_copy(update={"people": (*CELL.workers, short)})
+    assert people_of(alone).top_z == pytest.approx(CELL.floor_z + 0.8)
+    assert people_of(beside).top_z == pytest.approx(CELL.floor_z + 2.0)
 
 
 def test_rows_of_a_later_batch_are_those_of_a_wider_one() -> None:
