@@ -133,7 +133,7 @@ class LivePickWorld(BaseWorld[LiveWorkers]):
     def _wanted(self) -> TrajectorySegment:
         if self.decision is not None and self.status in ("moving", "picking"):
             return self.planner.segment(self.decision)
-        return self.robot.segment(np.zeros(5))
+        return self.robot.segment(np.zeros(5), straight=True)
 
     def _move_robot(self, before: HumanGeometry) -> None:
         if self.follow_plan(before):

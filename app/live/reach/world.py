@@ -31,6 +31,7 @@ from app.live.snapshot import Status, WorldSnapshot
 from app.sim.cells.cell import Cell
 from app.sim.core.arrays import Vec
 from app.sim.core.jit import FAR
+from app.sim.reach.batch import DEFAULT_ACTION
 from app.sim.robot.trajectory_segment import TrajectorySegment
 from app.sim.scenario.kernels.episode import SUCCESS_DISTANCE
 
@@ -56,8 +57,8 @@ class LiveReachWorld(BaseWorld[LivePedestrians]):
     ) -> None:
         super().__init__(cell, None, id, LivePedestrians(cell, seed))
         self._goal = LiveGoal(cell, seed)
-        self._controller = ReachController(cell, policy)
-        self._goal.among = self._goals_drawn()
+        self._controller = ReachController(cell, None)
+        self._change_policy(policy)
         self._reset()
         self._plan()
 
@@ -96,12 +97,16 @@ class LiveReachWorld(BaseWorld[LivePedestrians]):
             case reach_commands.SetWalkingSpeed():
                 self.people.set_speed(command.speed)
             case SetPolicy():
-                self._controller.use(command.loaded)
-                self.decided_s = None
-                self._goal.among = self._goals_drawn()
+                self._change_policy(command.loaded)
                 self._follow_goal()
             case _:
                 pass
+
+    def _change_policy(self, policy: LiveReachPolicy | None) -> None:
+        self._controller.use(policy)
+        self.robot.action = DEFAULT_ACTION if policy is None else policy.action
+        self.decided_s = None
+        self._goal.among = self._goals_drawn()
 
     def _change_safety(self, command: SetSafety) -> None:
         super()._change_safety(command)
@@ -163,7 +168,7 @@ class LiveReachWorld(BaseWorld[LivePedestrians]):
             self.safety.settings if self.safety.on else None,
         )
         self.decided_s = self.t
-        return robot.segment(act, straight=self._controller.policy is None)
+        return robot.segment(act)
 
     # Read model.
 

@@ -11,6 +11,7 @@ from app.sim.cells.cell import Cell
 from app.sim.human import model as human
 from app.sim.human.person import Person
 from app.sim.pick.task_policy import Candidate, PickProgress
+from app.sim.robot.actions import ActionSettings
 from tests.live.pick.pick_scenes import run, until
 from tests.support.straight_policy import StraightPolicy
 
@@ -282,6 +283,19 @@ def test_pick_ends_when_its_policy_or_all_candidates_are_removed(
     assert after.status == status
     assert (after.chosen, after.counters.reached) == (None, 0)
     assert (after.previous, after.phase) == (None, "approach")
+    assert np.abs(after.robot_qd).max() < 1e-9
+
+
+def test_robot_without_a_target_stops_whatever_the_actions_of_its_policy_mean(
+    world: LivePickWorld, cell: Cell
+) -> None:
+    policy = StraightPolicy(cell)
+    policy.action = ActionSettings(meaning="coefficient")
+    world.apply(commands.SetPolicy(checkpoint="other").with_loaded(policy))
+    assert np.abs(run(world, 10).robot_qd).max() > 0.1
+    world.apply(commands.SetCandidates(ids=()))
+    after = run(world, 20)
+    assert (after.status, after.counters.contacts) == ("no candidates", 0)
     assert np.abs(after.robot_qd).max() < 1e-9
 
 

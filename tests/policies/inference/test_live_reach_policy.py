@@ -14,6 +14,7 @@ from app.policies.inference.reach_policy import ReachPolicy
 from app.policies.inference.rollout import NO_CONSTRAINT
 from app.sim.cells.cell import load_cell
 from app.sim.reach.batch import ReachBatch, ReachSettings
+from app.sim.robot.actions import ActionSettings
 from app.sim.safety.layer import SafetySettings
 from tests.policies.untrained import untrained_reach
 
@@ -158,6 +159,16 @@ def test_policy_moves_the_robot_of_a_live_cell_with_any_number_of_people(
     assert after.people == ()
     assert not np.array_equal(after.robot_q, shown.robot_q)
     assert after.elapsed_ms > 0.0
+
+
+def test_robot_executes_actions_by_the_rule_of_its_policy(policy: ReachPolicy) -> None:
+    smooth = TrainedReachPolicy(ReachPolicy(untrained_reach(width=32, degree=3)))
+    world = LiveReachWorld(CELL, smooth, seed=1)
+    rules = [world.robot.action]
+    for chosen in (None, smooth, TrainedReachPolicy(policy)):
+        world.apply(SetPolicy(checkpoint=None).with_loaded(chosen))
+        rules.append(world.robot.action)
+    assert rules == [ActionSettings(degree=n) for n in (3, 2, 3, 2)]
 
 
 def test_goals_jump_among_the_targets_unless_the_policy_is_interpolated(
