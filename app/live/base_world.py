@@ -247,8 +247,8 @@ class BaseWorld(ABC, Generic[P]):
         return False
 
     def use(self, policy: TaskPolicy | None) -> None:
-        """Replace the policy."""
-        self.policy = policy
+        """Replace the policy, which has the whole time limit."""
+        self.policy, self.time_left = policy, TIME_LIMIT_S
         self.robot.action = pick.DEFAULT_ACTION if policy is None else policy.action
 
     def in_contact(self) -> bool:

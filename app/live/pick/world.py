@@ -82,13 +82,19 @@ class LivePickWorld(BaseWorld[LiveWorkers]):
             case commands.ToggleCandidate():
                 self._choose_among(set(self._selected) ^ {command.id})
             case commands.SetPolicy():
-                self.use(command.loaded)
-                if self._case is None:
-                    self._refresh()
-                else:  # A run of a case study belongs to one policy.
-                    self._reset()
+                self._change_policy(command.loaded)
             case commands.StartCase():
                 self._start_case(find_case(command.id))
+
+    def _change_policy(self, policy: TaskPolicy | None) -> None:
+        grasps = {one.grasp for one in (self.policy, policy) if one is not None}
+        self.use(policy)
+        if self._case is not None:  # A run of a case study belongs to one policy.
+            self._reset()
+        elif self.status == "picking" and len(grasps) > 1:
+            self._begin()  # Phases of one grasp have no meaning in another.
+        else:
+            self._refresh()
 
     def _start_case(self, case: Case) -> None:
         self._case, self.paused = case, False
@@ -110,6 +116,8 @@ class LivePickWorld(BaseWorld[LiveWorkers]):
         self._leave_case()
         self._selected = tuple(name for name in self.cell.station_ids if name in ids)
         self._own_choice, self._picked = self._selected, set()
+        if self.decision is None or self.decision.chosen not in ids:
+            self.begin_motion()
         self._refresh()
 
     def _refresh(self) -> None:

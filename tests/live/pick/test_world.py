@@ -4,12 +4,14 @@ from pydantic import ValidationError
 
 from app.errors import InvalidInput
 from app.live import commands
+from app.live.base_world import TIME_LIMIT_S
 from app.live.command_checks import Command
 from app.live.pick.world import LivePickWorld
 from app.live.snapshot import PICK_PHASES, WorldSnapshot
 from app.sim.cells.cell import Cell
 from app.sim.human import model as human
 from app.sim.human.person import Person
+from app.sim.pick.kernels.grasp import REACH_ONLY
 from app.sim.pick.task_policy import Candidate, PickProgress
 from app.sim.robot.actions import ActionSettings
 from tests.live.pick.pick_scenes import run, until
@@ -297,6 +299,40 @@ def test_robot_without_a_target_stops_whatever_the_actions_of_its_policy_mean(
     after = run(world, 20)
     assert (after.status, after.counters.contacts) == ("no candidates", 0)
     assert np.abs(after.robot_qd).max() < 1e-9
+
+
+def test_policy_with_another_grasp_begins_a_new_motion_in_the_middle_of_a_pick(
+    world: LivePickWorld, cell: Cell
+) -> None:
+    until(world, "picking")
+    policy = StraightPolicy(cell)
+    policy.grasp = REACH_ONLY
+    world.apply(commands.SetPolicy(checkpoint="reach").with_loaded(policy))
+    begun = world.snapshot()
+    assert (begun.status, begun.phase, begun.time_left_s) == (
+        "moving",
+        "approach",
+        TIME_LIMIT_S,
+    )
+    after = run(world, 60)
+    assert (after.status, after.counters.timeouts) == ("moving", 0)
+    assert after.counters.reached >= 1
+
+
+def test_other_goals_and_another_policy_have_the_whole_time_limit(
+    world: LivePickWorld, cell: Cell
+) -> None:
+    world.apply(commands.SetCandidates(ids=("cube1",)))
+    left = run(world, 5).time_left_s
+    assert left < TIME_LIMIT_S
+    world.apply(commands.SetCandidates(ids=("cube1", "cube4")))
+    same = world.snapshot()
+    assert (same.chosen, same.time_left_s) == ("cube1", left)
+    world.apply(commands.SetCandidates(ids=("cube4",)))
+    assert world.snapshot().time_left_s == TIME_LIMIT_S
+    assert run(world, 5).time_left_s < TIME_LIMIT_S
+    world.apply(commands.SetPolicy(checkpoint="other").with_loaded(StraightPolicy(cell)))
+    assert world.snapshot().time_left_s == TIME_LIMIT_S
 
 
 def test_target_removed_in_its_pick_is_left_at_once(world: LivePickWorld) -> None:
