@@ -10,6 +10,7 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from app.live.snapshot import PlaybackSnapshot
 from app.sim.cells.cell import Cell
@@ -63,12 +64,15 @@ class PlayedMotion:
         observed[:, YAW] = path[:, YAW]
         clipped = np.abs(observed - path)[:, YAW + 1 :].max(axis=1) > 1e-6
         self._clipped_share = float(clipped.mean())
+        differs = (observed != path).any(axis=1)
+        heights = motion.pelvis_z[differs]
         wrists = [
-            model_points(q, motion.pelvis_z, motion.size)[:, [WRIST_R, WRIST_L]]
+            model_points(q[differs], heights, motion.size)[:, [WRIST_R, WRIST_L]]
             for q in (path, observed)
         ]
-        self._clipped_m = float(np.linalg.norm(wrists[1] - wrists[0], axis=2).max())
-        self._outside_share = float(np.mean([is_outside(q, worker) for q in self._q]))
+        errors = np.linalg.norm(wrists[1] - wrists[0], axis=2)
+        self._clipped_m = float(errors.max(initial=0.0))
+        self._outside_share = float(is_outside(path, worker).mean())
 
     def at(self, t: float) -> tuple[Vec, Vec]:
         """Return joint positions [m, rad] and speeds [m/s, rad/s] at ``t`` [s], (18,) each.
@@ -87,7 +91,12 @@ class PlayedMotion:
         return float(np.interp(t, self._times, self._rise))
 
     def _between(self, t: float) -> Vec:
-        return np.array([np.interp(t, self._times, joint) for joint in self._q.T])
+        # np.interp of a column copies all frames.
+        k = int(np.searchsorted(self._times, t, side="right")) - 1
+        k = min(max(k, 0), len(self._times) - 2)
+        share = (t - self._times[k]) / (self._times[k + 1] - self._times[k])
+        share = min(max(float(share), 0.0), 1.0)
+        return np.asarray(self._q[k] + share * (self._q[k + 1] - self._q[k]))
 
     def turn_near(self, yaw: float) -> None:
         """Shift the yaw by full turns so that the run starts near ``yaw`` [rad]."""
@@ -108,13 +117,13 @@ class PlayedMotion:
         )
 
 
-def is_outside(q: Vec, worker: Worker) -> bool:
-    """Return whether a pelvis is outside a walking area by more than 0.02 m.
+def is_outside(q: Vec, worker: Worker) -> NDArray[np.bool_]:
+    """Return whether a pelvis is outside a walking area by more than 0.02 m, shape (...).
 
     Args:
-        q: Joint positions [m, rad], shape (18,).
+        q: Joint positions [m, rad], shape (..., 18).
         worker: Person with the walking area.
     """
-    x, y, slack = float(q[0]), float(q[1]), 0.02
-    inside_x = worker.x_min - slack <= x <= worker.x_max + slack
-    return not (inside_x and worker.y_min - slack <= y <= worker.y_max + slack)
+    least = np.array([worker.x_min, worker.y_min]) - 0.02
+    most = np.array([worker.x_max, worker.y_max]) + 0.02
+    return np.asarray(np.any((q[..., :2] < least) | (q[..., :2] > most), axis=-1))

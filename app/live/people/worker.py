@@ -225,7 +225,7 @@ class LiveWorker:
             anthropometry=self.body.snapshot(),
             motion=None if played is None else played.snapshot(self._t),
             joining=self._joining,
-            outside_area=is_outside(self.q, self._cell.human),
+            outside_area=bool(is_outside(self.q, self._cell.human)),
             clearance_m=clearance_m,
             nearest=nearest,
         )
