@@ -57,6 +57,9 @@ ROUNDS = 10
 """Largest number of rounds of rejection sampling."""
 N_SAMPLES = 24
 """Samples per primitive and direction."""
+LIBRARIES = 32
+"""Libraries kept: up to four people in a live cell have 20 places and seeds, and any sizes. One
+has up to 8 MB."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -84,7 +87,7 @@ def people_sizes(cell: Cell) -> tuple[BodySize, ...]:
     return tuple(percentile_body(*row, cell.human.pelvis_height) for row in BODIES)
 
 
-@lru_cache(maxsize=8)
+@lru_cache(LIBRARIES)
 def motion_library(
     cell: Cell,
     seed: int,

@@ -13,6 +13,7 @@ from app.sim.collision.contact import clearance
 from app.sim.human import model as human
 from app.sim.human.anthropometry import percentile_body
 from app.sim.human.kernels.kinematics import PELVIS_Z, capsule_columns
+from app.sim.primitives.primitive_library import motion_library
 from app.sim.scene.scene import NO_CYLINDERS, arm_of, people_of
 from tests.live.pick.pick_scenes import run
 from tests.sim.recorded_motion import recorded
@@ -95,6 +96,17 @@ def test_ids_are_constant_and_reused_after_removal(cell: Cell) -> None:
     assert people.ids == (0, 2)
     people.change(commands.AddPerson())
     assert people.ids == (0, 1, 2)
+
+
+def test_work_of_people_who_come_again_is_not_computed_again(cell: Cell) -> None:
+    people, computed = LiveWorkers(cell, seed=3), []
+    for _ in range(2):
+        for _ in range(3):
+            people.change(commands.AddPerson())
+        for person in (3, 2, 1):
+            people.change(commands.RemovePerson(person=person))
+        computed.append(motion_library.cache_info().misses)
+    assert computed[0] == computed[1]
 
 
 def test_people_move_continuously_when_one_comes_or_leaves(world: LivePickWorld) -> None:
