@@ -109,6 +109,30 @@ def test_goal_editor_says_why_a_block_cannot_be_asked_for(
     until(sorting, lambda now: now["sorting"]["goal"] == [], 60.0)
 
 
+@pytest.mark.usefixtures("sorting")
+def test_chip_names_what_the_robot_does_after_the_goal_is_reached(
+    open_page: Callable[..., Page],
+) -> None:
+    page = open_page(scene=False)
+    status: list[str] = []
+
+    def reached(route: Route) -> None:
+        world = route.fetch().json()
+        world["sorting"]["solved"] = True
+        route.fulfill(json={**world, "status": status[-1]})
+
+    page.route("**/v1/worlds/main/events", lambda _: None)  # what was shown first stays
+    page.route("**/v1/worlds/main", reached)
+    for now, text in (
+        ("contact", "Contact"),
+        ("blocked", "Waiting"),
+        ("solved", "Goal reached"),
+    ):
+        status.append(now)
+        page.reload()
+        expect_chip(page, text)
+
+
 def test_page_counts_the_commands_that_a_world_refuses(
     open_page: Callable[..., Page], sorting: str
 ) -> None:

@@ -34,7 +34,6 @@ export function SortingDecision({ world, cell, send, checkpoints, jobs }) {
 
 /** What the story's chip says where the world's status is too coarse for sorting. */
 function chip({ status, sorting }) {
-  if (sorting.solved) return ["Goal reached", "good"];
   if (status === "moving" || status === "picking") return PHASES[sorting.phase] ?? null;
   return sorting.goal.length === 0 && status === "no candidates" ? ["No goal", "quiet"] : null;
 }
