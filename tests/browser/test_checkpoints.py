@@ -164,6 +164,8 @@ def test_two_checkpoints_are_compared_by_what_differs(open_page: Callable[..., P
     total = table.get_by_role("row", name="Total steps [env steps]")
     expect(total).to_contain_text("\u202f000")
     expect(total.locator("code")).to_have_text("learning.total_steps")
+    page.get_by_role("button", name="Close the comparison").press("Enter")
+    expect(page.locator("#checkpoints-title")).to_be_focused()
 
 
 def test_uploaded_checkpoint_is_deleted_after_a_question(

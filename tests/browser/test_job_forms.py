@@ -276,19 +276,6 @@ def job(server: str, job_id: str | None) -> dict[str, Any]:
     return found
 
 
-def test_choice_of_a_drawn_field_keeps_the_focus(open_page: Callable[..., Page]) -> None:
-    page = open_page((1280, 900), scene=False)
-    open_form(page)
-    page.click('[data-kind="sweep"]')
-    page.click('[data-action="add-range"]')
-    for row in (page.locator(".drawn").first, page.locator(".drawn").last):
-        before = row.get_attribute("data-path")
-        row.locator("select").focus()
-        page.keyboard.press("ArrowDown")
-        expect(row).not_to_have_attribute("data-path", before or "")
-        expect(row.locator("select")).to_be_focused()
-
-
 def test_rates_of_a_sweep_are_those_of_its_preset(open_page: Callable[..., Page]) -> None:
     page = open_page((1280, 900), scene=False)
     open_form(page)

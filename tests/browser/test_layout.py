@@ -9,6 +9,7 @@ from app.sim.cells.cell import cell_names, load_cell
 from tests.browser.conftest import show
 from tests.browser.contrast import faint_text
 from tests.browser.test_drag import state, tell, until
+from tests.browser.test_training import open_form
 
 pytestmark = pytest.mark.browser
 
@@ -145,3 +146,21 @@ def test_person_follows_the_mode_chosen_by_arrow_keys(
     expect(page.locator('[data-mode="manual"]')).to_be_focused()
     tell(server, {"tag": "set-mode", "mode": "auto"})
     assert state(server)["people"]
+
+
+def test_drawn_fields_keep_the_focus_when_one_is_changed_or_removed(
+    open_page: Callable[..., Page],
+) -> None:
+    page = open_page((1280, 900), scene=False)
+    open_form(page)
+    page.click('[data-kind="sweep"]')
+    page.click('[data-action="add-range"]')
+    for row in (page.locator(".drawn").first, page.locator(".drawn").last):
+        before = row.get_attribute("data-path")
+        row.locator("select").focus()
+        page.keyboard.press("ArrowDown")
+        expect(row).not_to_have_attribute("data-path", before or "")
+        expect(row.locator("select")).to_be_focused()
+    page.locator(".drawn").first.get_by_role("button").press("Enter")
+    expect(page.locator(".drawn")).to_have_count(1)
+    expect(page.locator(".drawn select")).to_be_focused()

@@ -44,6 +44,18 @@ def test_double_click_removes_one_person(open_page: Callable[..., Page]) -> None
 
 
 @pytest.mark.usefixtures("one_person")
+def test_focus_goes_to_the_person_who_is_shown_when_another_one_is_removed(
+    open_page: Callable[..., Page],
+) -> None:
+    page = open_page(scene=False)
+    page.click('[data-action="add-person"]')
+    page.click('[data-person="1"]')
+    page.locator('[data-action="remove-person"]').press("Enter")
+    expect(page.locator("[data-person]")).to_have_count(1)
+    expect(page.locator('[data-person="0"]')).to_be_focused()
+
+
+@pytest.mark.usefixtures("one_person")
 def test_page_says_how_many_of_the_people_the_policy_observes(
     open_page: Callable[..., Page],
 ) -> None:

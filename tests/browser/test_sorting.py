@@ -133,6 +133,34 @@ def test_chip_names_what_the_robot_does_after_the_goal_is_reached(
         expect_chip(page, text)
 
 
+@pytest.mark.usefixtures("sorting")
+def test_focus_returns_to_the_cell_of_a_picked_block(open_page: Callable[..., Page]) -> None:
+    page = open_page(scene=False)
+    page.click('[data-action="pause"]')
+    cell = page.locator('[data-cell="cell5"]')
+    for button in ("Done", "Remove"):
+        cell.press("Enter")
+        page.locator(".picked-acts").get_by_role("button", name=button).press("Enter")
+        expect(page.locator(".picked")).to_have_count(0)
+        expect(cell).to_be_focused()
+    expect(page.locator('[data-cell="cell5"][data-block]')).to_have_count(0)
+    expect(cell).to_be_focused()
+
+
+@pytest.mark.usefixtures("sorting")
+def test_focus_stays_in_the_goal_when_its_last_block_is_taken_out(
+    open_page: Callable[..., Page],
+) -> None:
+    page = open_page(scene=False)
+    page.click('[data-action="pause"]')
+    page.click('[data-goal-add="red-small"]')
+    page.locator('[data-goal-block="red-0"]').press("Enter")
+    expect(page.locator('[data-goal-add="red-large"]')).to_be_focused()
+    page.keyboard.press("Enter")
+    page.locator('[data-action="clear-goal"]').press("Enter")
+    expect(page.locator("#goal-title")).to_be_focused()
+
+
 def test_page_counts_the_commands_that_a_world_refuses(
     open_page: Callable[..., Page], sorting: str
 ) -> None:

@@ -226,8 +226,9 @@ def test_jobs_are_compared_with_a_band_over_seeds(
         patient_http.get(f"{server}/v1/jobs/{job['id']}/events")
     page = open_page((1280, 900), scene=False)
     page.click("#tab-training")
-    page.click('[data-action="compare"]')
+    page.locator('[data-action="compare"]').press("Enter")
     expect(page.locator('[data-action="show-comparison"]')).to_be_disabled()
+    expect(page.locator("#jobs-title")).to_be_focused()
     for job in made:
         page.check(f'[data-job="{job["id"]}"] [data-role="compare"]')
     page.click('[data-action="show-comparison"]')

@@ -6,12 +6,16 @@ import { People } from "./people.js";
 import { Presets } from "./presets.js";
 import { SafetyControls } from "./safetycontrols.js";
 import { ReachControls } from "../reach/reachcontrols.js";
+import { useListFocus } from "../training/listfocus.js";
 
 const SPEEDS = [1, 2, 4, 8];
+/** What gets the focus when a person has left. */
+const SHOWN_PERSON = '[data-person][aria-pressed="true"], [data-action="add-person"]';
 
 export function Controls({ world, cell, cases, send, colourOf, labelOf }) {
   const tests = cell?.sorting_tests ?? [];
-  return html`<section class="dock" aria-label="Controls of the cell">
+  const dock = useListFocus(SHOWN_PERSON);
+  return html`<section class="dock" aria-label="Controls of the cell" ref=${dock}>
     <${People} world=${world} send=${send}>
       <div class="transport" role="group" aria-label="Clock">
         <button type="button" class="tool" onClick=${() =>

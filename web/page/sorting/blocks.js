@@ -12,7 +12,7 @@ export function Blocks({ sorting, cell, send, picked, onPick }) {
   const at = cells.find((one) => one.id === picked && !inCell(sorting, one.id));
   return html`<section class="card" aria-labelledby="blocks-title">
     <header class="card-head">
-      <h2 id="blocks-title">Blocks</h2>
+      <h2 id="blocks-title" tabindex="-1">Blocks</h2>
       <span class="faint">${sorting.blocks.length} of at most ${cells.length}</span>
     </header>
     <${Plan} cells=${cells} sorting=${sorting} picked=${picked} onPick=${onPick} />
@@ -65,6 +65,11 @@ function Picked({ block, cells, cell, sorting, send, onPick }) {
   const places = [...free, ...towers];
   const name = nameOf(block);
   const inClutter = cells.some((one) => one.id === block.place);
+  const leave = () => { // the focus returns to the button that picked the block
+    const picker = document.querySelector(`[data-block="${block.id}"]`);
+    (picker ?? document.getElementById("blocks-title")).focus();
+    onPick(null);
+  };
   return html`<div class="picked" role="group" aria-label=${`The ${name}`} data-picked=${block.id}>
     <span class="picked-name"><${Block} ...${block} sizes=${sorting.sizes} />
       <span><b>${capital(name)}</b>
@@ -88,9 +93,9 @@ function Picked({ block, cells, cell, sorting, send, onPick }) {
       <button type="button" class="tool" data-action="remove-block"
         onClick=${() => {
           send({ tag: "remove-block", id: block.id });
-          onPick(null);
+          leave();
         }}>Remove</button>
-      <button type="button" class="text-button" onClick=${() => onPick(null)}>Done</button>
+      <button type="button" class="text-button" onClick=${leave}>Done</button>
     </span>
   </div>`;
 }

@@ -4,15 +4,17 @@ import { html, useState } from "../vendor/htm-preact-standalone.module.js";
 import { Block, kindOf, nameOf } from "./block-icon.js";
 import * as format from "../format.js";
 import { BLOCKS } from "../palette.js";
+import { useListFocus } from "../training/listfocus.js";
 
 export function GoalEditor({ sorting, cell, send, picked, onPick }) {
   const [goal, setGoal] = useGoal(sorting, send);
+  const section = useListFocus();
   const towers = cell.stations.filter((one) => one.kind === "cluster");
   const wanted = Object.values(goal).flat().length;
   const put = (tower, sizes) => setGoal({ ...goal, [tower]: sorted(sizes, sorting.sizes) });
-  return html`<section class="card" aria-labelledby="goal-title">
+  return html`<section class="card" aria-labelledby="goal-title" ref=${section}>
     <header class="card-head">
-      <h2 id="goal-title">Goal</h2>
+      <h2 id="goal-title" tabindex="-1">Goal</h2>
       ${wanted > 0 && html`<button type="button" class="text-button" data-action="clear-goal"
         onClick=${() => setGoal({})}>Clear</button>`}
     </header>
@@ -38,12 +40,14 @@ function progress(sorting, wanted) {
 /** One tower: now and goal side by side on its plate, and the kinds it can still be given. */
 function Tower({ tower, sorting, sizes, onPut, picked, onPick }) {
   const { colour } = tower;
+  const group = useListFocus(".offer:enabled");
   const now = sorting.blocks.filter((one) => one.place === tower.id && !one.held)
     .sort((a, b) => a.level - b.level);
   const done = new Set(sorting.goal.filter((one) => one.tower === tower.id && one.done)
     .map((one) => one.level));
   const out = (level) => onPut(sizes.filter((_, k) => k !== level));
-  return html`<div class="tower" role="group" aria-label=${`${format.capital(colour)} tower`}>
+  return html`<div class="tower" role="group" aria-label=${`${format.capital(colour)} tower`}
+    ref=${group}>
     <div class="stacks">
       <div class="stack" role="group" aria-label="On it now">
         ${now.map((one) => html`<button type="button" key=${one.id} class="block-button"

@@ -73,9 +73,10 @@ export function Training({ link, cell, presets, jobs: newest, error, waiting, re
 
 /** The form of a new job: a choice of its kind, or a clone of a job, of the same kind. */
 function NewJob({ from, ...rest }) {
+  const section = useListFocus(".drawn:last-of-type select"); // where a drawn field has left
   const [kind, setKind] = useState(from?.kind ?? "train");
   const [, Form] = KINDS[kind];
-  return html`<section class="card" aria-label="New job">
+  return html`<section class="card" aria-label="New job" ref=${section}>
     ${!from && html`<${Segmented} label="Kind of job" value=${kind} onPick=${setKind}
       items=${Object.entries(KINDS).map(([name, [label]]) => [name, label])}
       mark=${(name) => ({ "data-kind": name })} />`}
