@@ -82,6 +82,22 @@ def test_shipped_checkpoints_are_choices_behind_a_page_of_newer_ones(
     expect(page.locator("#evaluate-checkpoint")).to_contain_text("pick-monitored · ")
 
 
+def test_choice_of_the_active_policy_says_why_it_is_nearly_empty(
+    open_page: Callable[..., Page],
+) -> None:
+    page, newest = open_page(scene=False), "**/v1/checkpoints?limit=100"
+    page.route(newest, lambda route: route.fulfill(status=500, body=""))
+    page.reload()
+    acting = page.locator("[data-role=acting]")
+    fault = acting.locator("option:disabled", has_text="could not be loaded")
+    expect(fault).to_have_text("The checkpoints could not be loaded: the server answered 500.")
+    expect(acting.locator("optgroup")).to_have_count(0)
+    page.unroute(newest)
+    acting.focus()
+    expect(acting.locator("optgroup[label=Shipped] option")).not_to_have_count(0)
+    expect(fault).to_have_count(0)
+
+
 def test_active_policy_that_is_no_longer_stored_says_so(open_page: Callable[..., Page]) -> None:
     page, none = open_page(scene=False), {"items": [], "next_cursor": None}
     acting = page.locator("[data-role=acting]").input_value()

@@ -25,20 +25,22 @@ export async function storedCheckpoints() {
 }
 
 /**
- * Known checkpoints, and the ids of policies that act and are no longer stored; asked for again when `stamp`
- * changes and by `refresh`. Presets, whose titles name them, asked for again for another `cell`: cells are choices.
+ * Known checkpoints, the error of the last request for them, and the ids of policies that act and are no longer
+ * stored; asked for again when `stamp` changes and by `refresh`. Presets, whose titles name them, asked for again
+ * for another `cell`: cells are choices.
  */
 export function useCheckpoints(link, stamp, cell) {
   const presets = useItems(link, "v1/presets", cell);
   const [list, setList] = useState([]);
+  const [error, setError] = useState(null);
   const [unstored, setUnstored] = useState([]);
   const [ask] = useState(() => inTurn(() => Promise.allSettled([
-    storedCheckpoints().then(setList),
+    storedCheckpoints().then((stored) => { setList(stored); setError(null); }, setError),
     get("v1/worlds").then(({ items }) => setUnstored(items.flatMap((one) => one.unstored))),
   ])));
   const refresh = useCallback(() => answers(link) && ask.run(), [link]);
   useEffect(() => void refresh(), [refresh, stamp]);
-  return { list, unstored, presets, refresh };
+  return { list, error, unstored, presets, refresh };
 }
 
 export function Acting({ world, checkpoints, jobs, send }) {
@@ -70,15 +72,17 @@ export function TaskPlanner({ sorting, cell, checkpoints, jobs, send }) {
     </select></label>`;
 }
 
-/** The checkpoints of groups, after the one that acts now if it is in none of them. */
-function options(groups, now, title, { unstored, presets }) {
+/** The checkpoints of groups, after the one that acts now if it is in none of them; the error of their request. */
+function options(groups, now, title, { error, unstored, presets }) {
   const known = groups.some((g) => g.items.some((c) => c.sha256 === now));
   const state = unstored.includes(now) ? " · no longer stored" : "";
   return html`
     ${now && !known && html`<option value=${now}>${title ?? format.short(now)}${state}</option>`}
     ${groups.map((group) => html`<optgroup key=${group.label} label=${group.label}>
       ${group.items.map((c) => html`<option key=${c.sha256} value=${c.sha256}>
-        ${name(c, group.job, presets)}</option>`)}</optgroup>`)}`;
+        ${name(c, group.job, presets)}</option>`)}</optgroup>`)}
+    ${error && html`<option value="error" disabled>
+      ${format.sentence(`The checkpoints could not be loaded: ${error.message}`)}</option>`}`;
 }
 
 /** Shipped checkpoints first, then uploaded ones, each job's newest few, and the active one. */
