@@ -130,6 +130,67 @@ def test_list_of_jobs_says_that_it_is_old_or_not_complete(
     expect(page.locator(".job").first).to_be_visible()
 
 
+@pytest.fixture
+def cancelled(server: str) -> dict[str, Any]:
+    """An evaluation that was cancelled before it began."""
+    body = {"kind": "evaluate", "protocol": "pick-single", "episodes": 1, "priority": -100}
+    job = patient_http.post(f"{server}/v1/jobs", json=body).json()
+    path = f"{server}/v1/jobs/{job['id']}/cancel"
+    found: dict[str, Any] = patient_http.post(path).raise_for_status().json()
+    return found
+
+
+@pytest.mark.parametrize(
+    ("kind", "answered", "text"),
+    [
+        ("train", "events", "The connection to this job was lost; trying again."),
+        ("sweep", "trials", "Its parts could not be loaded: the server answered 500."),
+    ],
+)
+def test_open_job_says_what_could_not_be_read(
+    open_page: Callable[..., Page],
+    cancelled: dict[str, Any],
+    kind: str,
+    answered: str,
+    text: str,
+) -> None:
+    failed = {"id": "job-1", "kind": kind, "state": "failed", "error": "its worker ended"}
+    page = open_page(scene=False)
+    page.route(
+        "**/v1/jobs?*",
+        lambda route: route.fulfill(json=page_of([{**cancelled, **failed}], route)),
+    )
+    page.route(f"**/v1/jobs/job-1/{answered}", lambda route: route.fulfill(status=500, body=""))
+    page.reload()  # or a job of the server stays open
+    page.click("#tab-training")
+    detail = page.locator('[data-job="job-1"] .job-detail')
+    expect(detail).to_contain_text(text)
+    expect(detail).to_contain_text("Its worker ended.")
+    expect(detail.locator(".empty")).to_have_count(0)
+
+
+def test_followed_job_is_asked_for_again_after_a_failure(
+    open_page: Callable[..., Page],
+) -> None:
+    page = open_page(scene=False)
+    follow = {"job": "job-1", "active": False, "step": None, "reason": "it has ended"}
+    world = {"id": "main", "follow": follow, "unstored": []}
+    page.route("**/v1/worlds", lambda route: route.fulfill(json={"items": [world]}))
+    page.route("**/v1/worlds", lambda route: route.fulfill(status=500, body=""), times=3)
+    page.evaluate(
+        """async () => {
+          const page = (path) => import(`/static/${path}`);
+          const { html, render } = await page("vendor/htm-preact-standalone.module.js");
+          const { Follow } = await page("training/follow.js");
+          const job = { id: "job-1", state: "cancelled" };
+          const box = document.body.appendChild(document.createElement("div"));
+          render(html`<${Follow} job=${job} />`, box);
+        }"""
+    )
+    text = page.locator('[data-role="follow"]')
+    expect(text).to_have_text("Followed no longer: it has ended.")
+
+
 def page_of(jobs: list[dict[str, Any]], route: Route) -> dict[str, Any]:
     """Return the page of a list of jobs that a request asks for, as the service gives it."""
     asked = parse_qs(urlsplit(route.request.url).query)

@@ -6,7 +6,7 @@ import * as format from "../format.js";
 import { WORLD } from "../live/world-stream.js";
 import { isActive } from "./jobactions.js";
 
-/** The server looks at a followed job once a second, and so does the page once it has ended. */
+/** The server looks at a followed job once a second, and so does the page once it has ended or a request failed. */
 const LOOK_MS = 1000;
 
 export function Follow({ job }) {
@@ -27,7 +27,9 @@ export function Follow({ job }) {
         setFollow(now);
         const isBehind = now?.job === job.id && now.active && !isActive(job);
         if (isBehind) timer = setTimeout(look, LOOK_MS);
-      }, () => {});
+      }, () => {
+        if (!over) timer = setTimeout(look, LOOK_MS);
+      });
     };
     look();
     return () => {

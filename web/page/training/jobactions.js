@@ -21,11 +21,11 @@ export function isActive(job) {
   return !FINAL.has(job.state);
 }
 
-/** Its fault, the children, its notes, `actions` beside those of any job, and its labels. */
+/** Its fault, the `error` of the request for its parts, the children, its notes, `actions` and labels. */
 export function JobFrame({ job, error, actions, children, onChanged, onOpen, onClone }) {
-  const fault = job.error ?? error?.message;
   return html`<div class="job-detail">
-    ${fault && html`<${Alert}>${format.sentence(fault)}</${Alert}>`}
+    ${job.error && html`<${Alert}>${format.sentence(job.error)}</${Alert}>`}
+    ${error && html`<${Alert}>${format.sentence(`Its parts could not be loaded: ${error.message}`)}</${Alert}>`}
     ${children}
     ${job.notes && html`<p class="notes" data-role="notes">${job.notes}</p>`}
     <div class="job-actions">${actions}

@@ -329,7 +329,7 @@ function useCurve(job, onChanged) {
       setState({ rows: null, checkpoint: null, lost: false });
     }
     let { points, checkpoint } = known.current;
-    const show = (lost = false) => setState({ checkpoint, lost,
+    const show = () => setState({ checkpoint, lost: false,
       rows: [...points.values()].sort((a, b) => a.step - b.step) });
     const onEvent = (name, data, id) => {
       if (name === "progress") points.set(data.step, data);
@@ -353,7 +353,7 @@ function useCurve(job, onChanged) {
     const stop = whileSeen(() => follow(`v1/jobs/${job.id}/events`, {
       onEvent,
       onUp: schedule,
-      onDown: () => show(true),
+      onDown: () => setState((now) => ({ ...now, lost: true })),
       lastId: known.current.lastId,
     }));
     return () => {
