@@ -58,6 +58,13 @@ CLONED = """(job) => Promise.all(["/vendor/htm-preact-standalone.module.js",
   .then(([{html, render}, {TrainForm}]) => render(html`<${TrainForm} from=${job}
     presets=${{items: [{name: job.preset, title: "Preset", fields: []}], error: null}}
     onStarted=${() => {}} onClose=${() => {}} />`, document.body))"""
+RANGES = """(all) => Promise.all(["/vendor/htm-preact-standalone.module.js",
+    "/live/status.js"].map((path) => import(path)))
+  .then(([{html, render}, {TrainingRange}]) => all.map((outside) => {
+    const world = {elapsed_ms: 1, outside: [], people: [], candidates: [{outside}]};
+    render(html`<${TrainingRange} world=${world} />`, document.body);
+    return document.body.textContent;
+  }))"""
 VALUES = [-5.126, -0.52, -0.004, 0.0, 0.004, 3.3201]
 
 
@@ -229,6 +236,12 @@ def test_input_outside_the_training_range_has_the_name_of_its_person_and_its_uni
         [{"field": field, "value": value, "low": 0.0, "high": 1.0}, people],
     )
     assert " ".join(text).replace("\u00a0", " ") == shown
+
+
+def test_inputs_are_in_distribution_only_if_those_of_all_candidates_are(page: Page) -> None:
+    far = {"field": "position.x", "value": 3.0, "low": 0.0, "high": 1.0}
+    texts = page.evaluate(RANGES, [[], [far]])
+    assert ["In distribution" in text for text in texts] == [True, False]
 
 
 @pytest.mark.parametrize(

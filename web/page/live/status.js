@@ -90,9 +90,10 @@ export function Tiles({ counters, names }) {
 }
 
 /** Whether the inputs of the last decision lie within the training range, and those that do not. */
-export function TrainingRange({ world: { elapsed_ms: ms, outside: listed, people } }) {
+export function TrainingRange({ world: { elapsed_ms: ms, outside: listed, people, candidates } }) {
   const outside = listed ?? [];
-  return html`${Number.isFinite(ms) && outside.length === 0 && html`<p class="range good"><${Icon} name="check" />
+  const inside = outside.length === 0 && !candidates.some((one) => one.outside?.length);
+  return html`${Number.isFinite(ms) && inside && html`<p class="range good"><${Icon} name="check" />
         In distribution: all inputs within the training range.</p>`}
   ${outside.length > 0 && html`<div class="range warn"><${Icon} name="alert" /><div>
         Out of distribution: inputs outside the training range
