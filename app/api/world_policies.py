@@ -75,11 +75,13 @@ def _object_of(command: NamingCommand, cell: Cell, services: Services) -> object
 
 def _recording(command: SetMotion, services: Services) -> Recording:
     if command.name not in (known := services.recordings.names()):
-        raise InvalidInput("name", command.name, "is not a stored motion", known[:MAX_CHOICES])
+        raise InvalidInput(
+            "name", command.name, "is not a stored recording", known[:MAX_CHOICES]
+        )
     runs = services.recordings.get(command.name)
     if command.run >= len(runs):
         choices = [str(run) for run in range(min(len(runs), MAX_CHOICES))]
-        rule = f"is not a run of this motion: it has {len(runs)}, counted from 0"
+        rule = f"is not a run of this recording: it has {len(runs)}, counted from 0"
         raise InvalidInput("run", command.run, rule, choices)
     return Recording(runs[command.run], command.name, command.run, len(runs))
 

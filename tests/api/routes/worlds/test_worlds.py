@@ -141,8 +141,10 @@ def test_imported_motion_is_played(client: TestClient) -> None:
         assert moving["people"][0]["anthropometry"]["recorded"]
         refused = send(client, tag="set-motion", name="played", run=4)
         assert (refused.status_code, refused.json()["field"]) == (422, "run")
+        assert refused.json()["rule"].startswith("is not a run of this recording")
         unknown = send(client, tag="set-motion", name="unknown").json()
         assert (unknown["field"], unknown["choices"]) == ("name", ["played"])
+        assert unknown["rule"] == "is not a stored recording"
     finally:
         client.delete("/v1/recordings/played")
 
