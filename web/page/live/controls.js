@@ -6,7 +6,7 @@ import { People } from "./people.js";
 import { Presets } from "./presets.js";
 import { SafetyControls } from "./safetycontrols.js";
 import { ReachControls } from "../reach/reachcontrols.js";
-import { useListFocus } from "../training/listfocus.js";
+import { useListFocus } from "../listfocus.js";
 
 const SPEEDS = [1, 2, 4, 8];
 /** What gets the focus when a person has left. */

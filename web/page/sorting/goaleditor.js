@@ -4,7 +4,7 @@ import { html, useState } from "../vendor/htm-preact-standalone.module.js";
 import { Block, kindOf, nameOf } from "./block-icon.js";
 import * as format from "../format.js";
 import { BLOCKS } from "../palette.js";
-import { useListFocus } from "../training/listfocus.js";
+import { useListFocus } from "../listfocus.js";
 
 export function GoalEditor({ sorting, cell, send, picked, onPick }) {
   const [goal, setGoal] = useGoal(sorting, send);

@@ -7,7 +7,7 @@ import { Alert, Icon } from "../icons.js";
 import { answers } from "../live/world-stream.js";
 import { dotted, Facts, FieldName, fieldValue, presetTitle } from "./fieldnames.js";
 import { PURPOSES, protocolTitle } from "./formfields.js";
-import { useListFocus } from "./listfocus.js";
+import { useListFocus } from "../listfocus.js";
 import { measuresOf } from "./measures.js";
 import { PAGE, storedCheckpoints } from "./checkpoints.js";
 

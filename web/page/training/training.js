@@ -8,7 +8,7 @@ import { isActive } from "./jobactions.js";
 import { JobList, QueueWaits, useOpened } from "./jobs.js";
 import { EvaluateForm } from "./evaluateform.js";
 import { useItems } from "./formfields.js";
-import { useListFocus } from "./listfocus.js";
+import { useListFocus } from "../listfocus.js";
 import { ReportForm } from "./reportform.js";
 import { SweepForm } from "./sweepform.js";
 import { TrainForm } from "./trainform.js";

@@ -1,5 +1,5 @@
 // The keyboard's focus in a section whose rows and buttons leave: it stays in the section.
-import { useEffect, useRef } from "../vendor/htm-preact-standalone.module.js";
+import { useEffect, useRef } from "./vendor/htm-preact-standalone.module.js";
 
 const ROW = "li[data-job], li[data-checkpoint]";
 
