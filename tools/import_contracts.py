@@ -20,7 +20,7 @@ class KernelsContract(Contract):
             f"{name} imports {target}"
             for name in kernels
             for target in graph.find_modules_directly_imported_by(name)
-            if target in modules and not self._may_import(target)
+            if target.startswith("app.") and not self._may_import(target)
         )
         return ContractCheck(kept=bool(kernels) and not faults, metadata={"faults": faults})
 

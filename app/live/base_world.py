@@ -37,6 +37,7 @@ from app.sim.cells.cell import Cell
 from app.sim.collision.contact import Contact
 from app.sim.core.arrays import Vec
 from app.sim.pick import batch as pick
+from app.sim.pick.kernels.grasp import DESCEND
 from app.sim.pick.task_policy import NOT_BEGUN, Candidate, Decision, TaskPolicy
 from app.sim.robot.trajectory_segment import TrajectorySegment
 
@@ -317,6 +318,8 @@ class BaseWorld(ABC, Generic[P]):
             return None
         self.decision, self.decided_s = decision, self.t
         if decision.chosen != self.previous:
+            if self.progress.phase == DESCEND:
+                self.count(broken_off=1)
             self.progress = NOT_BEGUN
         if self.previous is None or decision.chosen == self.previous:
             return None

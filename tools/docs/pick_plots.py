@@ -1,10 +1,9 @@
-"""Draw the case studies and the calibration of the pick policy, and the curve of the recipe.
+"""Draw the case studies and the calibration of the pick policy.
 
     python -m tools.docs.pick_plots
 
-Reads ``docs/results/pick-cases.json``, ``risk-calibration.json`` and ``thesis-pick.json``;
-writes ``docs/img/pick/cases.png``, like figures 5.4 to 5.7 of the thesis, ``reliability.png``,
-and ``curve-thesis.png``, like figure 5.3.
+Reads ``docs/results/pick-cases.json`` and ``risk-calibration.json``; writes
+``docs/img/pick/cases.png``, like figures 5.4 to 5.7 of the thesis, and ``reliability.png``.
 """
 
 import numpy as np
@@ -60,33 +59,11 @@ def reliability(result: Json) -> Figure:
     return figure
 
 
-def curve(result: Json) -> Figure:
-    """Draw return and rates of the recipe of the thesis over the steps of its training."""
-    figure, axes = panels(1, 2, 2.9, sharex=True)
-    left, right = axes[0]
-    for one in result["curves"]:
-        steps = [point["step"] / 1e6 for point in one["played"]]
-        left.plot(steps, [point["reward"] for point in one["played"]], color=BLUE)
-        left.axhline(one["standing_still"], color=GREY, lw=0.9, ls="--")
-        for end, colour in (("timeout", ORANGE), ("collision", RED), ("success", GREEN)):
-            rates = [100.0 * point[end] for point in one["played"]]
-            right.plot(steps, rates, color=colour, label=end)
-    right.axhline(75.0, color=GREY, lw=0.9, ls="--")
-    left.set_title("return; dashed: standing still")
-    right.set_title("rates [%]; dashed: success in the thesis")
-    right.legend(loc="center right")
-    for view in (left, right):
-        view.set_xlabel("environment steps [1e6]")
-        view.set_xlim(left=0.0)
-    return figure
-
-
 def main() -> None:
     """Draw all pictures."""
     for name, draw, image in (
         ("pick-cases", cases, "cases.png"),
         ("risk-calibration", reliability, "reliability.png"),
-        ("thesis-pick", curve, "curve-thesis.png"),
     ):
         save(draw, PICTURES / image, read_result(RESULTS / f"{name}.json"))
 

@@ -70,7 +70,7 @@ def excess_of(excess: Sequence[float]) -> Json:
     }
 
 
-def nearness(n_tasks: int, seed: int) -> Json:
+def optimality_gap(n_tasks: int, seed: int) -> Json:
     """Return the optimality gap of the planner on random unsolved tasks."""
     rng = np.random.default_rng(seed)
     wrong = 0
@@ -147,7 +147,7 @@ def main() -> None:
     options = parser.parse_args()
     results = {
         "seed": options.seed,
-        "nearness": nearness(options.tasks, options.seed),
+        "optimality_gap": optimality_gap(options.tasks, options.seed),
         "cpu_time": [
             times(*size, on_towers, options.seed) for size in SIZES for on_towers in (0.0, 0.5)
         ],

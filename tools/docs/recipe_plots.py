@@ -5,7 +5,9 @@
 Reads the curves in ``docs/results``: ``thesis-sorting``, ``thesis-reach`` and ``thesis-pick``
 of the recipes, ``sorting-curves``, ``reach-curves`` and ``pick-curves`` of ours. Writes
 ``docs/img/recipes.png``: success and collisions over environment steps, updates and processor
-time, a line per seed. A curve without a result file is left out.
+time, a line per seed. A curve without a result file is left out. Writes also
+``docs/img/reach/curves-thesis.png`` and ``docs/img/pick/curve-thesis.png``: return and rates of
+the recipes, like figures 4.4 and 5.3 of the thesis.
 """
 
 from collections.abc import Sequence
@@ -19,6 +21,7 @@ from numpy.typing import NDArray
 
 from app.policies.configs import presets
 from tools.arguments import parser_of
+from tools.docs.reach.style import THESIS_SUCCESS
 from tools.docs.results import IMAGES, RESULTS, Json, read_if_measured
 from tools.docs.world.plots import BLUE, GREEN, GREY, ORANGE, RED, panels, save
 
@@ -76,7 +79,7 @@ ROWS = (
             ("thesis-reach", "reach-ddpg-thesis", RED),
             ("reach-curves", "reach-td3", BLUE),
         ),
-        (("success", 0.9176),),
+        (("success", THESIS_SUCCESS),),
     ),
     Row(
         "pick",
@@ -158,6 +161,34 @@ def recipes(results: Path) -> Figure:
     return figure
 
 
+def recorded(results: Path, file: str, names: Sequence[str], printed: float) -> Figure:
+    """Draw return and rates over the steps, a row per recipe and a line per seed.
+
+    Args:
+        results: Folder of the result files.
+        file: Name of the file with the curves.
+        names: Names of the recipes in it.
+        printed: Success in the thesis, 0 to 1.
+    """
+    figure, axes = panels(len(names), 2, 2.9 * len(names), sharex=True)
+    for name, (left, right) in zip(names, axes, strict=True):
+        for k, one in enumerate(curves_of(results, file, name)):
+            steps = [point["step"] / 1e6 for point in one["played"]]
+            left.plot(steps, [point["reward"] for point in one["played"]], color=BLUE, lw=1.0)
+            left.axhline(one["standing_still"], color=GREY, lw=0.9, ls="--")
+            for end, colour in (("timeout", ORANGE), ("collision", RED), ("success", GREEN)):
+                rates = [100.0 * point[end] for point in one["played"]]
+                right.plot(steps, rates, color=colour, lw=1.0, label=None if k else end)
+        right.axhline(100.0 * printed, color=GREY, lw=0.9, ls="--")
+        left.set_title(f"{name}: return; dashed: standing still", fontsize="medium")
+        right.set_title("rates [%]; dashed: success in the thesis", fontsize="medium")
+        right.set_ylim(-2.0, 102.0)
+    axes[0, 1].legend(loc="center right")
+    for view in axes[-1]:
+        view.set(xlabel="environment steps [1e6]", xlim=(0.0, None))
+    return figure
+
+
 def _short(value: float, _place: int) -> str:
     for factor, unit in ((1e6, " M"), (1e3, " k")):
         if value >= factor:
@@ -166,8 +197,14 @@ def _short(value: float, _place: int) -> str:
 
 
 def main() -> None:
-    """Draw the picture."""
+    """Draw all pictures."""
     save(recipes, IMAGE, RESULTS)
+    reach = ("reach-ddpg-authors", "reach-ddpg-thesis")
+    for file, names, printed, image in (
+        ("thesis-reach", reach, THESIS_SUCCESS, "reach/curves-thesis.png"),
+        ("thesis-pick", ("pick-td3-thesis",), 0.75, "pick/curve-thesis.png"),
+    ):
+        save(recorded, IMAGES / image, RESULTS, file, names, printed)
 
 
 if __name__ == "__main__":

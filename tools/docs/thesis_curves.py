@@ -31,9 +31,7 @@ from tools.docs.learning_curves import add_curves, lines
 from tools.docs.results import RESULTS, Json
 from tools.docs.training_curves import read
 
-KEYS = (
-    "step", "updates", "cpu_s", "episodes", "success", "collision", "timeout", "reward",
-)  # fmt: skip
+KEYS = tuple("step updates cpu_s episodes success collision timeout reward".split())
 """Content of a point."""
 
 

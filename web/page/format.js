@@ -48,6 +48,11 @@ export function count(n, one, many = `${one}s`) {
   return `${steps(n)} ${n === 1 ? one : many}`;
 }
 
+/** Events per hour, of `n` in `t` seconds; a dash in the first minute. */
+export function perHour(n, t) {
+  return t >= 60 ? `${number((n / t) * 3600)}${NB}/${NB}h` : "–";
+}
+
 /** A rate in [0, 1] as percent. */
 export function percent(rate, digits = 1) {
   if (!Number.isFinite(rate)) return "–";

@@ -12,12 +12,12 @@ from app.api.schemas.people import PersonInput, PersonUse
 from app.api.schemas.people import PersonState as PersonState
 from app.api.schemas.robot_state import RobotState
 from app.errors import InvalidInput
+from app.policies.inference.task_selection import MAX_CANDIDATES
 from app.sim.core.arrays import Vec
 from app.sim.core.pick_depth import PICK_DEPTH_M
 from app.sim.perception.multi_person_tracker import MAX_SKELETONS
 from app.sim.pick.task_policy import Candidate, Decision, Objective, PickProgress
 
-MAX_CANDIDATES = 1000
 FrameName = Literal["robot-base", "base_link"]
 """Two names of one frame."""
 FRAME_TEXT = (

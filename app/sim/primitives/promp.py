@@ -31,9 +31,8 @@ import numpy as np
 
 from app.errors import InvalidInput
 from app.sim.core.arrays import Vec
+from app.sim.primitives.kernels.primitives import N_BASIS
 
-N_BASIS = 12
-"""Gaussians per joint."""
 RIDGE = 1e-7
 """Default lambda of the regression."""
 FLOOR = 0.01

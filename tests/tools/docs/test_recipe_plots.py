@@ -3,8 +3,12 @@
 import json
 from pathlib import Path
 
+import numpy as np
+import pytest
+
 from tests.policies.conftest import TINY, preset_of
-from tools.docs.recipe_plots import curves_of, pooled, recipes, updates_at
+from tools.docs.recipe_plots import curves_of, pooled, recipes, recorded, updates_at
+from tools.docs.results import RESULTS
 from tools.docs.thesis_curves import curve_of
 from tools.docs.training_curves import record
 
@@ -36,6 +40,17 @@ def test_picture_has_a_row_per_scenario_also_without_curves(tmp_path: Path) -> N
     one = {"name": "pick-td3", "seed": 1, "played": played}
     (tmp_path / "pick-curves.json").write_text(json.dumps({"curves": [one, one]}))
     assert [len(view.lines) for view in recipes(tmp_path).axes[9:]] == [6] * 3
+
+
+def test_each_recipe_has_a_row_with_its_return_and_rates() -> None:
+    names = ("reach-ddpg-authors", "reach-ddpg-thesis")
+    axes = recorded(RESULTS, "thesis-reach", names, 0.9176).axes
+    for name, left, right in zip(names, axes[::2], axes[1::2], strict=True):
+        first = curves_of(RESULTS, "thesis-reach", name)[0]["played"]
+        assert list(left.lines[0].get_ydata()) == [point["reward"] for point in first]
+        rates = sum(line.get_ydata() for line in right.lines[:3])
+        np.testing.assert_allclose(rates, 100.0)  # time-out, collision and success
+        assert right.lines[-1].get_ydata()[0] == pytest.approx(91.76)
 
 
 def test_folder_of_a_training_is_a_curve(tmp_path: Path) -> None:

@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullFormatter
 
-from tools.docs.reach.style import INK, MODES, PURPLE, draw_rates, percent
+from tools.docs.reach.style import INK, MODES, PURPLE, THESIS_SUCCESS, draw_rates, percent
 from tools.docs.results import Json
 from tools.docs.world.plots import BLUE, GREEN, GREY, ORANGE, RED, panels
 
@@ -30,8 +30,6 @@ TRACKERS = {
 """Labels of the rows of ``reach-tracker``."""
 PRESET_COLOURS = {"td3": BLUE, "thesis": ORANGE, "stock": GREY}
 """Colour of a learning curve by a part of its name; later entries take precedence."""
-THESIS_SUCCESS = 0.9176
-"""Success on the targets in the thesis (docs/method.md 2.6)."""
 JOINTS = ("shoulder pan", "shoulder lift", "elbow", "wrist 1", "wrist 2", "wrist 3")
 JOINT_COLOURS = (BLUE, ORANGE, GREEN, RED, PURPLE, GREY)
 

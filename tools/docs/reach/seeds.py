@@ -16,12 +16,11 @@ import torch
 
 from app.policies.evaluation.reach.bench import ReachBench, suffix_of
 from tools.docs.learning_curves import lines
+from tools.docs.reach.style import THESIS_SUCCESS
 from tools.docs.results import RESULTS, Json, write_result
 from tools.docs.training_curves import read
 
 RESULT = RESULTS / "reach-seeds.json"
-THESIS_SUCCESS = 0.9176
-"""Success on the targets in the thesis."""
 PER_TARGET = 100
 
 

@@ -75,7 +75,7 @@ function Clearance({ metres, people, safety }) {
 /** Counters, training range and provenance. */
 export function SmallPrint({ world }) {
   return html`<section class="card small-print" aria-label="Counters and provenance">
-    <${Tiles} counters=${world.counters ?? {}} names=${{ reached: "Picked", broken_off: "Broken off",
+    <${Tiles} world=${world} counters=${world.counters ?? {}} names=${{ reached: "Picked", broken_off: "Broken off",
       contacts: "Contacts", contacts_at_rest: "Contacts at standstill", timeouts: "Timed out",
       switches: "Target switches" }} />
     <${TrainingRange} world=${world} />
@@ -83,10 +83,11 @@ export function SmallPrint({ world }) {
   </section>`;
 }
 
-/** Counters by the names of `names`, in its order. */
-export function Tiles({ counters, names }) {
+/** Counters by the names of `names`, in its order, and their rates over the time of the world. */
+export function Tiles({ world, counters, names }) {
   return html`<dl class="tiles">${Object.entries(names).map(([key, label]) => html`<div key=${key}>
-    <dt>${label}</dt><dd data-counter=${key}>${counters[key] ?? 0}</dd></div>`)}</dl>`;
+    <dt>${label}</dt><dd data-counter=${key}>${counters[key] ?? 0}</dd>
+    <dd class="rate">${format.perHour(counters[key] ?? 0, world.t_s)}</dd></div>`)}</dl>`;
 }
 
 /** Whether the inputs of the last decision lie within the training range, and those that do not. */

@@ -19,7 +19,7 @@ export function ReachDecision({ world }) {
 function Outcomes({ world }) {
   const { counters, reach } = world;
   return html`<section class="card small-print" aria-label="Outcomes and provenance">
-    <${Tiles} counters=${counters} names=${{ reached: "Reached", contacts: "Contacts",
+    <${Tiles} world=${world} counters=${counters} names=${{ reached: "Reached", contacts: "Contacts",
       contacts_at_rest: "Contacts at standstill", timeouts: "Timed out" }} />
     <dl class="facts">
       <div><dt>Mean time to a goal</dt><dd>${counters.reached

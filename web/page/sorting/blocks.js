@@ -81,7 +81,7 @@ function Picked({ block, cells, cell, sorting, send, onPick }) {
         ${block.in_goal ? "Out of the goal" : "Into the goal"}</button>
       <select value="" data-role="move-to" aria-label=${`Move the ${name} to`}
         disabled=${block.held || places.length === 0}
-        title=${block.held ? "The robot holds it" : "Put it into a free cell or onto a tower"}
+        title=${block.held ? "The robot holds it" : "Put it into a free slot or onto a tower"}
         onChange=${(event) => {
           send({ tag: "move-block", id: block.id, to: event.target.value });
           event.target.value = "";
@@ -100,18 +100,18 @@ function Picked({ block, cells, cell, sorting, send, onPick }) {
   </div>`;
 }
 
-/** One of every kind, to be put into the picked free cell, or into any. */
+/** One of every kind, to be put into the picked free slot, or into any. */
 function Shelf({ sorting, at, cells, send }) {
   const full = sorting.blocks.length >= cells.length;
   const reason = `There is room for ${count(cells.length, "block")} at most`;
   return html`<div class="shelf" role="group" aria-labelledby="shelf-title">
-    <span id="shelf-title">${full ? `${reason}.` : `Add to ${at ? at.label : "any free cell"}`}</span>
+    <span id="shelf-title">${full ? `${reason}.` : `Add to ${at ? at.label : "any free slot"}`}</span>
     <div class="shelf-kinds">
       ${sorting.colours.map((colour) => html`<span key=${colour} class="shelf-colour">
         ${sorting.sizes.map((size) => html`<button type="button" key=${size} class="block-button"
           data-add=${kindOf({ colour, size })} disabled=${full}
           title=${full ? reason : `Add a ${nameOf({ colour, size })}`}
-          aria-label=${full ? reason : `Add a ${nameOf({ colour, size })} to ${at ? at.label : "any free cell"}`}
+          aria-label=${full ? reason : `Add a ${nameOf({ colour, size })} to ${at ? at.label : "any free slot"}`}
           onClick=${() => send({ tag: "add-block", colour, size, at: at?.id ?? null })}>
           <${Block} colour=${colour} size=${size} sizes=${sorting.sizes} /></button>`)}</span>`)}
     </div>

@@ -105,7 +105,7 @@ function Order({ order, send }) {
 export function SortingSmallPrint({ world, cell, checkpoints, jobs, send }) {
   const counters = { ...world.sorting.counters, ...world.counters };
   return html`<section class="card small-print" aria-label="Counters and provenance">
-    <${Tiles} counters=${counters} names=${{ attempts: "Grasps", failures: "Failed", moves: "Moves",
+    <${Tiles} world=${world} counters=${counters} names=${{ attempts: "Grasps", failures: "Failed", moves: "Moves",
       planner_fallbacks: "Planner fallbacks", contacts: "Contacts",
       contacts_at_rest: "Contacts at standstill" }} />
     <${TaskPlanner} sorting=${world.sorting} cell=${cell} checkpoints=${checkpoints} jobs=${jobs}

@@ -26,8 +26,8 @@ Bones = dict[str, Vec]
 
 PELVIS_HEIGHT = 0.95
 """Pelvis height of the mannequin in the bind pose [m]."""
-HIP_SIDE, HIP_DROP = 0.09, 0.05
-"""Half of the distance between the hips, and their depth below the pelvis, at girth 1 [m]."""
+HIP_SIDE = 0.09
+"""Half of the distance between the hips at girth 1 [m]."""
 THIGH, SHIN = 0.42, 0.42
 """Lengths of the median person's legs [m]."""
 ANKLE_HEIGHT = 0.09
@@ -78,7 +78,11 @@ def _leg(pelvis: Vec, foot: Vec, side: str, size: Vec) -> tuple[Vec, Vec]:
     """Return the frames of thigh and shin between hip and ankle, with the knee in front."""
     sign, girth = -1.0 if side == "r" else 1.0, float(size[lengths.GIRTH])
     thigh, shin = THIGH * girth, SHIN * girth
-    hip = pelvis[:3, 3] + pelvis[:3, :3] @ [0.0, sign * size[lengths.HIP], -HIP_DROP * girth]
+    hip = pelvis[:3, 3] + pelvis[:3, :3] @ [
+        0.0,
+        sign * size[lengths.HIP],
+        -lengths.HIP_DROP * girth,
+    ]
     ankle = foot[:3, 3]
     line = ankle - hip
     distance = float(np.linalg.norm(line))

@@ -148,12 +148,13 @@ def run_rest(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
         "stops": replace(usual.work, at_rest=1.0, off_task=0.5),
         "works": usual.work,
     }
-    results = request.rows(len(rows) * len(planners))
+    stated, results = Json(), request.rows(len(rows) * len(planners))
     for name, work in rows.items():
         evaluator = bench.evaluator(replace(usual, work=work))
         for run, row in _runs(evaluator, selection_rules.fixed(0), name, planners):
             results.append(row | _timeouts(evaluator.batch, run))
-    return {"settings": settings_of(evaluator.batch), "results": results}
+        stated[name] = settings_of(evaluator.batch)
+    return {"settings": stated, "results": results}
 
 
 def _timeouts(batch: PickBatch, run: Episodes) -> dict[str, dict[str, float]]:

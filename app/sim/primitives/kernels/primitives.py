@@ -36,7 +36,7 @@ from app.sim.primitives.kernels.script import (
 Index = NDArray[np.int64]
 
 N_BASIS = 12
-"""Gaussians per joint; those of ``promp.N_BASIS``."""
+"""Gaussians per joint."""
 WIDTH = 0.7 / (N_BASIS - 1)
 """Their width [phase]; that of ``promp.usual_width``."""
 SHORTEST_SEGMENT = 0.35

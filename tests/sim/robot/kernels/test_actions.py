@@ -330,7 +330,7 @@ def unfeasible_share(qdd_max: float, push: str, n: int) -> float:
 
 @pytest.mark.parametrize(
     ("qdd_max", "push", "low", "high"),
-    [  # FACTS: 17, 46 and 0.05 % with random actions, 92, 93 and 88 % with a constant push
+    [  # measured: 17, 46 and 0.05 % with random actions, 92, 93 and 88 % with a constant push
         (2.0, "random", 0.10, 0.25),
         (5.0, "random", 0.36, 0.56),
         (50.0, "random", 0.0, 0.01),
