@@ -15,7 +15,7 @@ from app.sim.cells.cell import (
     parse_definition,
 )
 from app.sim.sorting.layout import lacks_for_tasks
-from app.store.cells import get_cell, list_cells, put_cell, remove_cell
+from app.store.cells import get_cell, list_cells, list_names, put_cell, remove_cell
 from app.store.engine import Store
 
 logger = logging.getLogger(__name__)
@@ -50,7 +50,7 @@ class CellCatalog:
 
     def names(self) -> tuple[str, ...]:
         """Return the names of all cells, shipped ones first."""
-        return (*cell_names(), *(record.name for record in list_cells(self._store)))
+        return (*cell_names(), *list_names(self._store))
 
     def all(self) -> list[Cell]:
         """Return all cells of this version, shipped ones first."""
@@ -71,9 +71,9 @@ class CellCatalog:
         name = preset.cell
         try:
             cell = self.get(name)
-        except NotFound:
+        except NotFound as error:
             rule = "is not a known work cell"
-            raise InvalidInput("overrides.cell", name, rule, self.names()) from None
+            raise InvalidInput("overrides.cell", name, rule, error.known) from None
         if (lack := lacks_for_training(preset, cell)) is not None:
             raise InvalidInput("overrides.cell", name, f"cannot be trained in: it {lack}")
         return cell

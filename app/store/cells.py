@@ -68,10 +68,20 @@ def list_cells(store: Store) -> tuple[CellRecord, ...]:
     """Return all undamaged cells, by name."""
     with store.reading() as connection:
         rows = connection.execute(sa.select(cells).order_by(cells.c.name)).mappings().all()
+    found = []
     for row in rows:
-        if not _is_sound(row):
+        if _is_sound(row):
+            found.append(_record(row))
+        else:
             logger.error("cell %s is damaged and left out", row["name"])
-    return tuple(_record(row) for row in rows if _is_sound(row))
+    return tuple(found)
+
+
+def list_names(store: Store) -> tuple[str, ...]:
+    """Return the names of all cells, damaged ones too."""
+    query = sa.select(cells.c.name).order_by(cells.c.name)
+    with store.reading() as connection:
+        return tuple(connection.execute(query).scalars())
 
 
 def _is_sound(row: sa.RowMapping) -> bool:

@@ -1,5 +1,8 @@
+from typing import Any
+
 import pytest
 
+from app.digests import has_digest
 from app.errors import Conflict, NotFound
 from app.store import cells, completion, jobs
 from app.store.engine import Store
@@ -32,6 +35,24 @@ def test_cells_are_listed_by_name(store: Store) -> None:
     for name in ("b", "a", "c"):
         cells.put_cell(store, name, {"name": name})
     assert [record.name for record in cells.list_cells(store)] == ["a", "b", "c"]
+
+
+def test_cells_are_listed_with_one_digest_each_and_names_without(
+    store: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("b", "a"):
+        cells.put_cell(store, name, {"name": name})
+    compared = list[str]()
+
+    def noted(expected: str | None, content: dict[str, Any]) -> bool:
+        compared.append(content["definition"]["name"])
+        return has_digest(expected, content)
+
+    monkeypatch.setattr(cells, "has_digest", noted)
+    assert cells.list_names(store) == ("a", "b")
+    assert compared == []
+    cells.list_cells(store)
+    assert compared == ["a", "b"]
 
 
 def test_unknown_cell_is_not_found(store: Store) -> None:

@@ -5,6 +5,7 @@ Source: docs/method.md 2.
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 from starlette.concurrency import run_in_threadpool
 
@@ -27,25 +28,47 @@ NO_WEIGHT = {"separation": None, "weight": 0.0}
 """Distance and weight of a person who is not used."""
 
 
-async def answer(
-    request: MotionRequest, services: Services, left_out: Sequence[LeftOut] = ()
-) -> Data:
-    """Return the data of the answer to one request, a :class:`MotionAnswer`.
+class NamedObjects(NamedTuple):
+    """Stored objects that a request names."""
 
-    Args:
-        left_out: Parts that a late request is answered without.
+    cell: Cell
+    """The work cell."""
+    decider: MotionDecider
+    """The policy, which was trained in the cell."""
+
+
+async def objects_of(cell: str, checkpoint: str | None, services: Services) -> NamedObjects:
+    """Return the objects that a request names; those not in memory are read on a thread.
 
     Raises:
         ServiceError: The request cannot be answered.
     """
     services.readiness.require()
-    cell = await services.known_cell(request.cell)
-    decider = await services.reach_policies.get(request.checkpoint)
-    require_cell(cell, decider.actor.cell, decider.actor.cell_sha256)
+    known = await services.known_cell(cell)
+    decider = await services.reach_policies.get(checkpoint)
+    require_cell(known, decider.actor.cell, decider.actor.cell_sha256)
+    return NamedObjects(known, decider)
+
+
+async def answer(
+    request: MotionRequest,
+    objects: NamedObjects,
+    services: Services,
+    left_out: Sequence[LeftOut] = (),
+) -> Data:
+    """Return the data of the answer to one request, a :class:`MotionAnswer`.
+
+    Args:
+        objects: What the request names.
+        left_out: Parts that a late request is answered without.
+
+    Raises:
+        ServiceError: The request cannot be answered.
+    """
 
     def decided() -> Data:
         with services.span("decision"):
-            return decide(request, cell, decider, services.trackers, left_out)
+            return decide(request, *objects, services.trackers, left_out)
 
     # A decision takes less time than a change of thread usually does, on the event loop.
     found = (

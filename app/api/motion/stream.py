@@ -3,18 +3,19 @@
 Three tasks: one receives messages and notes their times, one answers, one closes the socket
 when it is idle or the server stops. Decisions of all sockets take turns, in order of arrival at
 the turn; the event loop reads messages between any two of them, so that the request that is
-answered is the newest one and its waiting time is known.
+answered is the newest one and its waiting time is known. Cells and policies are read before
+the turn: the database delays no other socket.
 """
 
 import asyncio
 import json
 import logging
-import re
 import time
 from collections import deque
 from collections.abc import Awaitable, Callable
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal
 
 import anyio
@@ -22,7 +23,7 @@ from pydantic import ValidationError
 from pydantic_core import to_json
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from app.api.motion.decision import answer
+from app.api.motion.decision import NamedObjects, answer, objects_of
 from app.api.motion.load import SocketRate
 from app.api.problems import (
     ProblemResponse,
@@ -31,7 +32,6 @@ from app.api.problems import (
     service_problem,
     validation_problem,
 )
-from app.api.registry import MAX_POLICIES
 from app.api.schemas.motion import LeftOut, MotionRequest, StreamUse
 from app.api.services import Services
 from app.api.sockets import MAX_MESSAGE, POLICY
@@ -51,13 +51,13 @@ CHECK_S = 0.2
 SHARES: tuple[tuple[LeftOut, float], ...] = (("search", 0.25), ("rollout", 0.5))
 """What is left out once a request has waited for more than this share of its deadline."""
 GOING_AWAY = 1001
-_CHECKPOINT = re.compile(r'"checkpoint"\s*:\s*"([^"\\]{1,64})"')
-"""The member that names a policy; found without reading the whole request."""
 
 Which = Literal["newest", "each"]
+Names = tuple[str, str | None]
+"""The cell and the checkpoint that a request names."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class PendingMessage:
     """A message that waits for its answer."""
 
@@ -65,6 +65,24 @@ class PendingMessage:
     """The message; None: it is no text."""
     at: float
     """Time of its arrival on the clock ``time.perf_counter`` [s]."""
+    instance: str
+    """Path of its socket."""
+
+    @cached_property
+    def content(self) -> tuple[MotionRequest | ProblemResponse, dict[str, object]]:
+        """Its request, or the problem of a message that is none, and its stamp."""
+        body: object = None
+        try:
+            refused, body = _malformed(self.text, self.instance)
+            return refused or MotionRequest.model_validate(body), _stamp_of(body)
+        except Exception as error:
+            return _problem(error, self.instance), _stamp_of(body)
+
+    @property
+    def names(self) -> Names | None:
+        """What its request names; None without a request."""
+        asked, _ = self.content
+        return (asked.cell, asked.checkpoint) if isinstance(asked, MotionRequest) else None
 
 
 class MotionSocket:
@@ -86,7 +104,7 @@ class MotionSocket:
         self._arrived, self._taken = asyncio.Event(), asyncio.Event()
         self._last_s = time.monotonic()
         self._close: tuple[int, str] | None = None
-        self._named: set[str] = set()
+        self._read: dict[Names, NamedObjects | Exception] = {}
 
     async def serve(self) -> None:
         """Answer requests until the client leaves, the socket is idle or the server stops."""
@@ -121,7 +139,9 @@ class MotionSocket:
             if self._which == "newest" and self._waiting:
                 self._waiting.clear()
                 self._superseded += 1
-            self._waiting.append(PendingMessage(message.get("text"), time.perf_counter()))
+            instance: str = self._client.scope["path"]
+            now = time.perf_counter()
+            self._waiting.append(PendingMessage(message.get("text"), now, instance))
             self._arrived.set()
             while len(self._waiting) >= MAX_WAITING:
                 self._taken.clear()
@@ -140,29 +160,40 @@ class MotionSocket:
     async def _answer(self) -> None:
         while True:
             await self._arrived.wait()
-            await self._load_policy()
+            begin = time.perf_counter()
+            names = self._unread()
+            parsed_s = time.perf_counter() - begin
+            if names is not None:
+                self._read[names] = await self._objects_of(names)
             async with self._load.turn:
                 await asyncio.sleep(0)  # messages are received between two decisions
+                begin = time.perf_counter()
+                if self._unread() is not None:  # a newer request, which names others
+                    continue
                 request = self._waiting.popleft()
                 if not self._waiting:
                     self._arrived.clear()
                 self._taken.set()
-                begin = time.perf_counter()
                 text = await self._reply(request, begin)
                 whole = begin - request.at <= SHARES[0][1] * self._deadline_s
-                self._load.note(self._rate, time.perf_counter() - begin, whole=whole)
+                spent_s = parsed_s + time.perf_counter() - begin
+                self._load.note(self._rate, spent_s, whole=whole)
+            self._read.clear()
             await self._client.send_text(text)
 
-    async def _load_policy(self) -> None:
-        """Load a policy that a request names first, before its turn: others go on meanwhile."""
-        named = _CHECKPOINT.search(self._waiting[0].text or "")
-        if named is None or named[1] in self._named:
-            return
-        if len(self._named) >= MAX_POLICIES:
-            self._named.clear()
-        self._named.add(named[1])
-        with suppress(ServiceError):  # the answer to the request says so
-            await self._services.reach_policies.get(named[1])
+    def _unread(self) -> Names | None:
+        """Return what the next request names, None where it was read or there is no request."""
+        names = self._waiting[0].names
+        return None if names is None or names in self._read else names
+
+    async def _objects_of(self, names: Names) -> NamedObjects | Exception:
+        """Return what a request names, or the error that the answer states."""
+        if len(self._read) >= MAX_WAITING:
+            self._read.clear()
+        try:
+            return await objects_of(*names, self._services)
+        except Exception as error:
+            return error
 
     async def _reply(self, request: PendingMessage, begin: float) -> str:
         """Return the answer to a message as JSON: a :class:`MotionAnswer` or a problem."""
@@ -183,23 +214,23 @@ class MotionSocket:
                 left_out=left_out,
             )
 
-        instance: str = self._client.scope["path"]
-        body: object = None
-        try:
-            refused, body = _malformed(request.text, instance)
-            if refused is None:
-                asked = MotionRequest.model_validate(body)
-                # A rollout that was asked for is not left out; without one there is nothing to.
-                if asked.rollout is not None:
-                    left_out = []
-                found = await answer(asked, self._services, left_out)
+        asked, stamp = request.content
+        if isinstance(asked, MotionRequest):
+            # A rollout that was asked for is not left out; without one there is nothing to.
+            if asked.rollout is not None:
+                left_out = []
+            try:
+                objects = self._read[asked.cell, asked.checkpoint]
+                if isinstance(objects, Exception):
+                    raise objects
+                found = await answer(asked, objects, self._services, left_out)
                 found["stream"] = use(left_out, 200)
                 return str(to_json(found, inf_nan_mode="null"), "utf-8")
-        except Exception as error:
-            refused = _problem(error, instance)
-        content: dict[str, object] = json.loads(bytes(refused.body))
+            except Exception as error:
+                asked = _problem(error, request.instance)
+        content: dict[str, object] = json.loads(bytes(asked.body))
         return json.dumps(
-            {**content, "stream": use([], refused.status_code).model_dump(), **_stamp_of(body)}
+            {**content, "stream": use([], asked.status_code).model_dump(), **stamp}
         )
 
 

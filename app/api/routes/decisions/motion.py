@@ -14,7 +14,7 @@ from fastapi import APIRouter, Query
 from starlette.websockets import WebSocket
 
 from app.api.description import MISMATCH
-from app.api.motion.decision import answer
+from app.api.motion.decision import answer, objects_of
 from app.api.motion.stream import MotionSocket, Which
 from app.api.schemas.motion import MotionAnswer, MotionRequest
 from app.api.schemas.numbers import Data
@@ -38,7 +38,8 @@ async def decide_motion(request: MotionRequest, services: ServicesDep) -> Data:
     Calls are independent: state, people and goal may change at any time. For loops,
     `/v1/motion/stream` takes the same requests over a WebSocket.
     """
-    return await answer(request, services)
+    objects = await objects_of(request.cell, request.checkpoint, services)
+    return await answer(request, objects, services)
 
 
 @router.websocket("/stream")

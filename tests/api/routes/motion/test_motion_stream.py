@@ -2,8 +2,9 @@
 
 import json
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from typing import Any
 
 import pytest
@@ -101,26 +102,53 @@ def test_answer_says_how_its_request_was_served(url: str) -> None:
     assert stream == {"missed_deadline": False, "superseded": 0, "left_out": []}
 
 
-def test_policy_that_one_client_names_first_is_loaded_beside_the_decisions_of_others(
+class SlowReading:
+    """The reading of the cell and the checkpoint ``slow``, which ends when it is released."""
+
+    def __init__(self, services: Services, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.began, self.release = threading.Event(), threading.Event()
+        for place, name in ((services.cells, "get"), (services.reach_policies, "load")):
+            monkeypatch.setattr(place, name, partial(self._read, getattr(place, name)))
+
+    def _read(self, read: Callable[[str | None], object], name: str | None) -> object:
+        if name == "slow":
+            self.began.set()
+            assert self.release.wait(PATIENCE_S)
+        return read(name)
+
+
+@pytest.mark.parametrize("member", ["cell", "checkpoint"])
+def test_objects_that_one_client_names_are_read_beside_the_decisions_of_others(
+    services: Services, url: str, monkeypatch: pytest.MonkeyPatch, member: str
+) -> None:
+    slow = SlowReading(services, monkeypatch)
+    with connect(url) as one, connect(url) as other:
+        for _ in range(2):  # unknown ones are looked for each time
+            slow.began.clear()
+            slow.release.clear()
+            send(one, **{member: "slow"})
+            assert slow.began.wait(PATIENCE_S)
+            send(other, stamp="other")
+            assert received(other)["stamp"] == "other"
+            slow.release.set()
+            refused = received(one)
+            assert (refused["status"], refused["field"]) == (422, member)
+
+
+def test_request_that_arrives_during_the_reading_is_answered_with_its_own_cell(
     services: Services, url: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    release, began, load = threading.Event(), threading.Event(), services.reach_policies.load
-
-    def slow(reference: str | None) -> Any:
-        if reference == "slow":
-            began.set()
-            assert release.wait(PATIENCE_S)
-        return load(reference)
-
-    monkeypatch.setattr(services.reach_policies, "load", slow)
-    with connect(url) as one, connect(url) as other:
-        send(one, checkpoint="slow")
-        assert began.wait(PATIENCE_S)
-        send(other, stamp="other")
-        assert received(other)["stamp"] == "other"
-        release.set()
-        refused = received(one)
-        assert (refused["status"], refused["field"]) == (422, "checkpoint")
+    slow = SlowReading(services, monkeypatch)
+    with connect(url) as socket, connect(url) as other:
+        send(socket, cell="slow")
+        assert slow.began.wait(PATIENCE_S)
+        send(socket, stamp="newer")
+        send(other)
+        received(other)  # the server has received the newer request, too
+        slow.release.set()
+        newer = received(socket)
+        assert (newer["stamp"], newer["stream"]["superseded"]) == ("newer", 1)
+        assert newer["segment"] is not None
 
 
 def test_only_the_newest_request_of_a_client_is_answered(services: Services, url: str) -> None:
