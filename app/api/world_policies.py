@@ -6,6 +6,8 @@ from it only in stations and assumptions of the safety layer (``layout.require_w
 
 import logging
 
+from starlette.concurrency import run_in_threadpool
+
 from app.api.registry import REACH_ALIAS, SORTING_ALIASES, P, PolicyRegistry
 from app.api.services import LiveWorld, Services
 from app.errors import CheckpointMismatch, Damaged, InvalidInput, NotFound
@@ -16,7 +18,7 @@ from app.live.sorting.commands import SetSortingPolicy
 from app.policies.checkpoints.checkpoint import CHOOSING, REACHING, purpose_of
 from app.policies.checkpoints.trained_cell import is_for
 from app.policies.inference.live_reach_policy import TrainedReachPolicy
-from app.sim.cells.cell import Cell, require_cell
+from app.sim.cells.cell import Cell, cell_names, require_cell
 from app.sim.pick.task_policy import TaskPolicy
 from app.sim.sorting.batch import shape_of
 from app.sim.sorting.layout import is_sorting, require_workspace
@@ -101,6 +103,19 @@ def require_task_policy(policy: TaskPolicy, cell: Cell, services: Services) -> N
         raise CheckpointMismatch("cell", cell.name, policy.cell) from None
     require_cell(trained, policy.cell, policy.cell_sha256)
     require_workspace(cell, trained)
+
+
+async def require_policy_for_decision(
+    policy: TaskPolicy, cell: Cell, services: Services
+) -> None:
+    """Check a policy as :func:`require_task_policy`, on the event loop.
+
+    A cell of the user's own that is not the one of the decision is read on a thread.
+    """
+    if policy.cell in (cell.name, *cell_names()):
+        require_task_policy(policy, cell, services)
+    else:
+        await run_in_threadpool(require_task_policy, policy, cell, services)
 
 
 def may_select_tasks(policy: TaskPolicy, cell: Cell, services: Services) -> bool:

@@ -1,12 +1,15 @@
 """A cell of the user's own through the whole service: stored, trained in, deciding, shown."""
 
+import asyncio
 from collections.abc import Iterator
 from typing import Any
 
 import pytest
 from fastapi.testclient import TestClient
 
+from app.api.schemas.examples import PLAN, RISK_MAP, TASK_SELECTION
 from app.policies.training.train import train
+from app.sim.cells.cell import Cell
 from app.store.checkpoints import put_checkpoint
 from jobs.checkpoints import to_store
 from tests.api.conftest import services_of
@@ -52,6 +55,43 @@ def test_policy_decides_in_its_own_cell_and_where_only_the_stations_differ(
     for reference, cell in ((checkpoint, "pick-and-place"), (None, "workshop")):
         other = client.post("/v1/task-selection", json=asked(state, reference, cell))
         assert (other.status_code, other.json()["chosen"]) == (200, "part2")
+
+
+def is_on_event_loop() -> bool:
+    try:
+        asyncio.get_running_loop()
+    except RuntimeError:
+        return False
+    return True
+
+
+@pytest.mark.usefixtures("own")
+@pytest.mark.parametrize(
+    ("url", "body"),
+    [
+        ("/v1/task-selection", TASK_SELECTION),
+        ("/v1/plan", PLAN),
+        ("/v1/risk-map", RISK_MAP),
+    ],
+)
+def test_cell_of_a_policy_is_not_read_on_the_event_loop(
+    client: TestClient,
+    checkpoint: str,
+    monkeypatch: pytest.MonkeyPatch,
+    url: str,
+    body: dict[str, Any],
+) -> None:
+    catalog = services_of(client).cells
+    get, on_loop = catalog.get, list[bool]()
+
+    def watched(name: str) -> Cell:
+        if name == "workshop":
+            on_loop.append(is_on_event_loop())
+        return get(name)
+
+    monkeypatch.setattr(catalog, "get", watched)
+    client.post(url, json={**body, "checkpoint": checkpoint})
+    assert set(on_loop) == {False}
 
 
 def test_policy_refuses_a_cell_with_another_robot(

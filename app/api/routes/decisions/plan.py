@@ -12,7 +12,7 @@ from app.api.description import MISMATCH
 from app.api.known_people import is_slow_conversion, people_for_policy
 from app.api.schemas.plan import PlanAnswer, PlanRequest
 from app.api.services import ServicesDep
-from app.api.world_policies import require_task_policy
+from app.api.world_policies import require_policy_for_decision
 from app.policies.inference.sorting_plan import SortingPlanner
 from app.sim.sorting.batch import fail_of
 from app.sim.sorting.decision import is_slow_decision
@@ -34,7 +34,7 @@ async def plan_move(request: PlanRequest, services: ServicesDep) -> PlanAnswer:
     cell = await services.known_cell(request.cell)
     names, fail = names_of(cell), fail_of(cell)
     policy = await services.task_policies.get(request.checkpoint)
-    require_task_policy(policy, cell, services)
+    await require_policy_for_decision(policy, cell, services)
 
     def answer() -> PlanAnswer:
         q = request.robot.joints(request.robot.q)

@@ -10,7 +10,7 @@ from app.api.description import MISMATCH
 from app.api.known_people import is_slow_conversion, people_for_policy
 from app.api.schemas.risk_map import RiskMapAnswer, RiskMapRequest
 from app.api.services import ServicesDep
-from app.api.world_policies import require_task_policy
+from app.api.world_policies import require_policy_for_decision
 from app.errors import InvalidInput
 from app.sim.pick.task_policy import MovedPerson
 
@@ -30,7 +30,7 @@ async def map_risk(request: RiskMapRequest, services: ServicesDep) -> RiskMapAns
     cell = await services.known_cell(request.cell)
     q, qd, candidates = request.to_domain()
     policy = await services.task_policies.get(request.checkpoint)
-    require_task_policy(policy, cell, services)
+    await require_policy_for_decision(policy, cell, services)
 
     def answer() -> RiskMapAnswer:
         people = people_for_policy(request.people, cell, services.trackers, q)

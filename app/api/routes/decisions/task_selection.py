@@ -13,7 +13,7 @@ from app.api.known_people import is_slow_conversion, people_for_policy
 from app.api.schemas.numbers import Data
 from app.api.schemas.task_selection import TaskSelection, TaskSelectionRequest
 from app.api.services import ServicesDep
-from app.api.world_policies import require_task_policy
+from app.api.world_policies import require_policy_for_decision
 
 MAX_INLINE_CANDIDATES = 32
 """Larger requests are processed on a thread, so that the event loop is not blocked."""
@@ -34,7 +34,7 @@ async def select_task(request: TaskSelectionRequest, services: ServicesDep) -> D
     cell = await services.known_cell(request.cell)
     q, qd, candidates = request.to_domain()
     policy = await services.task_policies.get(request.checkpoint)
-    require_task_policy(policy, cell, services)
+    await require_policy_for_decision(policy, cell, services)
     decide = partial(
         policy.decide,
         q,
