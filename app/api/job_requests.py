@@ -1,6 +1,6 @@
 """Jobs in HTTP requests: lookup by path, pages of the list, checks before one is queued."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Annotated, Any, NamedTuple
 
@@ -66,19 +66,20 @@ IdempotencyKey = Annotated[
 ]
 
 
-def checked(body: AnySpec, services: Services) -> NewJob:
-    """Return the job to queue; everything that it names exists.
+def require_named(body: AnySpec, new: NewJob, services: Services) -> None:
+    """Check that everything that a job names exists.
+
+    Args:
+        body: Spec of the job.
+        new: The job to queue.
 
     Raises:
-        InvalidInput: A preset, protocol, checkpoint, cell or recording is unknown or unfit.
+        InvalidInput: A checkpoint, cell or recording is unknown or unfit.
     """
-    record = None
-    if isinstance(body, EvaluateSpec) and body.checkpoint is not None:
-        record, _ = services.checkpoints.read(body.checkpoint)
-    new = body.new_job()
     if isinstance(body, EvaluateSpec):
-        if record is not None:
-            check_task(body.protocol, record.manifest, str(body.checkpoint))
+        if body.checkpoint is not None:
+            record, _ = services.checkpoints.read(body.checkpoint)
+            check_task(body.protocol, record.manifest, body.checkpoint)
         services.recordings.check(body.recordings)
     if new.preset is not None:
         preset = presets.resolve(new.preset, new.overrides or {})
@@ -87,7 +88,6 @@ def checked(body: AnySpec, services: Services) -> NewJob:
             if (lack := lacks_for_choice(cell)) is not None:
                 rule = f"cannot be run in the cell {cell.name!r}: it {lack}"
                 raise InvalidInput("objective.protocol", body.objective.protocol, rule)
-    return new
 
 
 def queued(
@@ -95,26 +95,33 @@ def queued(
     services: Services,
     response: Response,
     key: str | None,
+    check: Callable[[], None],
     submitted: Mapping[str, Any] | None = None,
 ) -> JobPublic:
     """Queue a job; ``Location`` says where to follow it.
 
     Args:
         key: Idempotency key of the request.
+        check: Refuses a request of which no job is queued yet.
         submitted: JSON data that repetitions of the request have in common; None: spec, labels
             and budgets of the job.
 
     Raises:
         Conflict: The key was used for another request.
     """
-    job = jobs.create_job(
-        services.store,
-        new,
-        idempotency_key=key,
-        references=stored_references(new),
-        submitted=submitted,
-    )
-    services.supervisor.wake()
+    job = None
+    if key is not None:
+        job = jobs.find_submission(services.store, new, key, submitted)
+    if job is None:
+        check()
+        job = jobs.create_job(
+            services.store,
+            new,
+            idempotency_key=key,
+            references=stored_references(new),
+            submitted=submitted,
+        )
+        services.supervisor.wake()
     response.headers["Location"] = f"/v1/jobs/{job.id}"
     return JobPublic.from_domain(job)
 

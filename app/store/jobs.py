@@ -64,18 +64,32 @@ def create_job(
     """
     key: dict[str, str] = {}
     if idempotency_key is not None:
-        if not 1 <= len(idempotency_key) <= MAX_KEY_LENGTH:
-            rule = f"must have 1 to {MAX_KEY_LENGTH} characters"
-            raise InvalidInput("idempotency_key", idempotency_key, rule)
-        submission = digest(_members(new) if submitted is None else submitted)
-        key = {"idempotency_key": idempotency_key, "submission_digest": submission}
+        key = _key_of(new, idempotency_key, submitted)
     with store.writing() as connection:
-        if key:
-            for earlier in select_jobs(connection, jobs.c.idempotency_key == idempotency_key):
-                _require_same(earlier, new, key["submission_digest"])
-                return earlier
+        if key and (earlier := _submitted_before(connection, new, key)) is not None:
+            return earlier
         require_stored(connection, references)
         return _insert(connection, new, key)
+
+
+def find_submission(
+    store: Store,
+    new: NewJob,
+    idempotency_key: str,
+    submitted: Mapping[str, Any] | None = None,
+) -> JobRecord | None:
+    """Return the job that the same submission has queued; None before it was queued.
+
+    Args:
+        idempotency_key, submitted: As for :func:`create_job`.
+
+    Raises:
+        Conflict: The key was used for another submission.
+        InvalidInput: The key is empty or too long.
+    """
+    key = _key_of(new, idempotency_key, submitted)
+    with store.reading() as connection:
+        return _submitted_before(connection, new, key)
 
 
 def get_job(store: Store, job_id: str) -> JobRecord:
@@ -255,6 +269,28 @@ def _members(new: NewJob) -> dict[str, Any]:
         for name, value in members.items()
         if name not in DERIVED and value is not None
     }
+
+
+def _key_of(
+    new: NewJob, idempotency_key: str, submitted: Mapping[str, Any] | None
+) -> dict[str, str]:
+    """Return the columns of a job that identify its submission."""
+    if not 1 <= len(idempotency_key) <= MAX_KEY_LENGTH:
+        rule = f"must have 1 to {MAX_KEY_LENGTH} characters"
+        raise InvalidInput("idempotency_key", idempotency_key, rule)
+    submission = digest(_members(new) if submitted is None else submitted)
+    return {"idempotency_key": idempotency_key, "submission_digest": submission}
+
+
+def _submitted_before(
+    connection: sa.Connection, new: NewJob, key: Mapping[str, str]
+) -> JobRecord | None:
+    """Return the job with the key of a submission; refuse another submission under it."""
+    same_key = jobs.c.idempotency_key == key["idempotency_key"]
+    earlier = next(iter(select_jobs(connection, same_key)), None)
+    if earlier is not None:
+        _require_same(earlier, new, key["submission_digest"])
+    return earlier
 
 
 def _insert(connection: sa.Connection, new: NewJob, key: Mapping[str, str]) -> JobRecord:

@@ -9,9 +9,9 @@ from app.api.description import CREATED
 from app.api.job_requests import (
     IdempotencyKey,
     JobDep,
-    checked,
     known_spec,
     queued,
+    require_named,
     shown,
     stored_references,
 )
@@ -103,14 +103,18 @@ def retry_job(
 
     The first job stays as it is; its notes are not copied.
     """
-    job_actions.require_repeatable(job, "retry")
     labels = {"name": job.name, "priority": job.priority}
     spec = known_spec(job)
     if spec.get("checkpoint") is not None:
         spec["checkpoint"] = job.checkpoint or spec["checkpoint"]
     body = validated(SPEC_TYPES[job.kind], {**spec, **labels, **budgets(job)})
-    new = replace(checked(body, services), parent=job.id)
-    return queued(new, services, response, idempotency_key, {"retry": job.id})
+    new = replace(body.new_job(), parent=job.id)
+
+    def check() -> None:
+        job_actions.require_repeatable(job, "retry")
+        require_named(body, new, services)
+
+    return queued(new, services, response, idempotency_key, check, {"retry": job.id})
 
 
 @router.post(
@@ -131,9 +135,13 @@ def clone_job(
     Name, notes and priority are those of the changes, or the defaults.
     """
     body = validated(SPEC_TYPES[job.kind], merge({**known_spec(job), **budgets(job)}, changes))
-    new = replace(checked(body, services), parent=job.id)
+    new = replace(body.new_job(), parent=job.id)
+
+    def check() -> None:
+        require_named(body, new, services)
+
     submitted = {"clone": job.id, "changes": changes}
-    return queued(new, services, response, idempotency_key, submitted)
+    return queued(new, services, response, idempotency_key, check, submitted)
 
 
 @router.patch("", summary="Change name, notes, priority or budgets of a job", responses=ENDED)

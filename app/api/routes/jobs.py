@@ -14,9 +14,9 @@ from app.api.job_requests import (
     IdempotencyKey,
     JobDep,
     PageQuery,
-    checked,
     page_of_jobs,
     queued,
+    require_named,
     shown,
 )
 from app.api.schemas.examples import JOBS, named
@@ -55,7 +55,12 @@ def create_job(
     idempotency_key: IdempotencyKey = None,
 ) -> JobPublic:
     """Queue a job of any kind; ``Location`` says where to follow it."""
-    return queued(checked(body, services), services, response, idempotency_key)
+    new = body.new_job()
+
+    def check() -> None:
+        require_named(body, new, services)
+
+    return queued(new, services, response, idempotency_key, check)
 
 
 @router.get("", summary="List the jobs", response_model=JobList)

@@ -5,10 +5,13 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import sqlalchemy as sa
 from fastapi.testclient import TestClient
 
+from app.store.database import tables
 from app.store.engine import Store
 from tests.api.conftest import ADDRESS, require_description
+from tests.support import workshop
 from tests.support.idle_service import app_of, idle_service
 
 TRAIN = {"kind": "train", "preset": "pick-td3", "step_budget": 1000}
@@ -64,6 +67,38 @@ def test_repetition_is_the_same_job_after_its_parent_was_changed(
     idle.patch(ended, json=changes).raise_for_status()
     again = idle.post(f"{ended}/{action}", json={}, headers=KEY)
     assert (again.status_code, again.json()["id"]) == (202, first["id"])
+
+
+@pytest.mark.parametrize("action", ["", "/retry", "/clone"])
+def test_repetition_is_the_same_job_after_its_cell_was_removed(
+    idle: TestClient, action: str
+) -> None:
+    body, path = {**TRAIN, "overrides": {"cell": "workshop"}}, "/v1/jobs"
+    idle.post("/v1/cells", json=workshop.definition()).raise_for_status()
+    if action:
+        parent = idle.post("/v1/jobs", json=body).json()
+        idle.post(f"/v1/jobs/{parent['id']}/cancel").raise_for_status()
+        body, path = {}, f"/v1/jobs/{parent['id']}{action}"
+    first = idle.post(path, json=body, headers=KEY).json()
+    idle.post(f"/v1/jobs/{first['id']}/cancel").raise_for_status()
+    idle.delete("/v1/cells/workshop").raise_for_status()
+    again = idle.post(path, json=body, headers=KEY)
+    assert (again.status_code, again.json()["id"]) == (202, first["id"])
+    refused = idle.post(path, json=body, headers={"Idempotency-Key": "z2"})
+    assert (refused.status_code, refused.json()["field"]) == (422, "overrides.cell")
+
+
+def test_repeated_retry_is_the_same_job_after_its_parent_was_resumed(
+    idle: TestClient, ended: str, store: Store
+) -> None:
+    first = idle.post(f"{ended}/retry", headers=KEY).json()
+    is_parent = tables.jobs.c.id == ended.rpartition("/")[2]
+    with store.writing() as connection:
+        queued = {"state": "queued", "cancel_requested": False}
+        connection.execute(sa.update(tables.jobs).where(is_parent).values(queued))
+    again = idle.post(f"{ended}/retry", headers=KEY)
+    assert (again.status_code, again.json()["id"]) == (202, first["id"])
+    assert idle.post(f"{ended}/retry").status_code == 409
 
 
 @pytest.mark.parametrize(
