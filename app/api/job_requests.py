@@ -9,6 +9,7 @@ from fastapi import Depends, Header, Response
 from app.api.schemas.jobs import JobList, JobPublic
 from app.api.services import Services, ServicesDep
 from app.errors import InvalidInput
+from app.policies.checkpoints import pretrained
 from app.policies.configs import presets
 from app.policies.evaluation.registry import (
     OF_CHOICE,
@@ -16,11 +17,12 @@ from app.policies.evaluation.registry import (
     check_task,
     lacks_for_choice,
 )
+from app.policies.report.page import evaluations
 from app.sim.cells.cell import cell_names
 from app.store import job_actions, jobs, metrics
 from app.store.records import JobKind, JobRecord, JobState, MetricRow, NewJob, References
 from app.store.references import references_of
-from jobs.spec import AnySpec, EvaluateSpec, SweepSpec
+from jobs.spec import AnySpec, EvaluateSpec, ReportSpec, SweepSpec
 
 
 class PageQuery(NamedTuple):
@@ -75,7 +77,10 @@ def require_named(body: AnySpec, new: NewJob, services: Services) -> None:
 
     Raises:
         InvalidInput: A checkpoint, cell or recording is unknown or unfit.
+        NotReady: A shipped checkpoint is not stored yet.
     """
+    if not _shipped_of(body, new) <= services.checkpoints.aliases.keys():
+        services.readiness.require()
     if isinstance(body, EvaluateSpec):
         if body.checkpoint is not None:
             record, _ = services.checkpoints.read(body.checkpoint)
@@ -88,6 +93,14 @@ def require_named(body: AnySpec, new: NewJob, services: Services) -> None:
             if (lack := lacks_for_choice(cell)) is not None:
                 rule = f"cannot be run in the cell {cell.name!r}: it {lack}"
                 raise InvalidInput("objective.protocol", body.objective.protocol, rule)
+
+
+def _shipped_of(body: AnySpec, new: NewJob) -> set[str]:
+    """Return the aliases of the shipped checkpoints that a job needs."""
+    needed = {new.spec.get("checkpoint")}
+    if isinstance(body, ReportSpec) and body.measure:
+        needed = {checkpoint for _, checkpoint in evaluations().values()}
+    return needed.intersection(pretrained.ALIASES)
 
 
 def queued(

@@ -1,8 +1,15 @@
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
 from fastapi.testclient import TestClient
+
+from app.store.engine import Store
+from jobs.checkpoints import shipped
+from tests.api.answers import problem_of
+from tests.api.conftest import ADDRESS, require_description
+from tests.support.idle_service import app_of, idle_service
 
 
 @pytest.fixture(scope="module")
@@ -40,6 +47,29 @@ def test_evaluations_are_listed_by_protocol_and_checkpoint(
     assert listed(protocol="pick-single", checkpoint="pick") == [evaluated["id"]]
     assert listed(protocol="pick-cases") == []
     assert listed(checkpoint="reach") == []
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        {"kind": "evaluate", "protocol": "pick-single"},
+        {"kind": "evaluate", "protocol": "pick-single", "checkpoint": "pick"},
+        {"kind": "report", "measure": True},
+    ],
+)
+def test_job_of_a_shipped_checkpoint_that_is_not_stored_yet_is_to_be_posted_again(
+    store: Store, tmp_path: Path, body: dict[str, Any]
+) -> None:
+    services = idle_service(store, tmp_path)
+    with TestClient(app_of(services), base_url=ADDRESS) as starting:
+        starting.event_hooks = {"response": [require_description]}
+        services.readiness.reason = "warming up: loading the shipped checkpoints"
+        refused = starting.post("/v1/jobs", json=body)
+        assert problem_of(refused, 503)["detail"] == services.readiness.reason
+        assert refused.headers["Retry-After"] == "2"
+        for alias in ("pick", "reach", "sorting-e0", "sorting-e1"):
+            services.checkpoints.publish(alias, shipped(alias))
+        assert starting.post("/v1/jobs", json=body).status_code == 202
 
 
 def test_unknown_names_are_refused(client: TestClient) -> None:
