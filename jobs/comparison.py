@@ -26,8 +26,6 @@ from jobs.spec import SweepSpec, TrainSpec, parse_spec
 
 MAX_JOBS = 20
 """Most jobs of one comparison."""
-PAGE = 10_000
-"""Points of a curve that are read at once."""
 DEFAULT_QUANTITY = "success"
 
 
@@ -62,7 +60,7 @@ class JobComparison:
     quantity: str | None
     """The compared one; None without points."""
     steps: tuple[int, ...]
-    """Environment steps of all curves, increasing."""
+    """Environment steps of all curves, increasing; thinned evenly beyond ``MAX_POINTS``."""
     groups: tuple[Group, ...]
     """The groups, trainings only."""
 
@@ -81,7 +79,7 @@ def compare(store: Store, job_ids: Sequence[str], quantity: str | None = None) -
     found = read_jobs(store, job_ids)
     fields = [settings_of(job) for job in found]
     trained = [job for job in found if job.kind == "train"]
-    curves = {job.id: whole_curve(store, job.id) for job in trained}
+    curves = {job.id: metrics.thinned_curve(store, job.id) for job in trained}
     names = recorded(curves.values())
     if quantity is not None and quantity not in names:
         rule = "is not recorded by these jobs"
@@ -95,6 +93,7 @@ def compare(store: Store, job_ids: Sequence[str], quantity: str | None = None) -
     steps = sorted(
         {step for line in lines.values() for step, value in line if value is not None}
     )
+    steps = steps[:: -metrics.every_nth(len(steps))][::-1]
     return JobComparison(
         jobs=found,
         differences=differing(fields),
@@ -118,17 +117,6 @@ def read_jobs(store: Store, job_ids: Sequence[str]) -> tuple[JobRecord, ...]:
         if job_id in job_ids[:place]:
             raise InvalidInput(f"job[{place}]", job_id, "must be named once")
     return tuple(jobs.get_job(store, job_id) for job_id in job_ids)
-
-
-def whole_curve(store: Store, job_id: str) -> list[MetricRow]:
-    """Return all points of a job's curve."""
-    rows: list[MetricRow] = []
-    while True:
-        after = rows[-1].step if rows else -1
-        page = metrics.list_metrics(store, job_id, after_step=after, limit=PAGE)
-        rows += page
-        if len(page) < PAGE:
-            return rows
 
 
 def recorded(curves: Iterable[Sequence[MetricRow]]) -> tuple[str, ...]:
@@ -196,13 +184,13 @@ def band(
 
 
 def curves_as_csv(store: Store, job_ids: Sequence[str]) -> str:
-    """Return every point of several jobs as CSV, one row per job and step.
+    """Return the curves of several jobs as CSV, one row per job and step.
 
     Raises:
         NotFound, InvalidInput: As for :func:`read_jobs`.
     """
     found = read_jobs(store, job_ids)
-    curves = {job.id: whole_curve(store, job.id) for job in found}
+    curves = {job.id: metrics.thinned_curve(store, job.id) for job in found}
     names = recorded(curves.values())
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")

@@ -11,6 +11,9 @@ from app.store.database.tables import metrics as table
 from app.store.engine import Store
 from app.store.records import MetricRow
 
+MAX_POINTS = 10_000
+"""Largest number of points of a thinned curve."""
+
 
 def list_metrics(
     store: Store, job_id: str, *, after_step: int = -1, limit: int = 10_000
@@ -32,6 +35,28 @@ def list_metrics(
             raise NotFound("job", job_id)
         rows = connection.execute(query).mappings().all()
     return tuple(_point(row) for row in rows)
+
+
+def thinned_curve(store: Store, job_id: str) -> tuple[MetricRow, ...]:
+    """Return a job's curve in order of steps.
+
+    Of more than ``MAX_POINTS`` points it has the last one and, from there, every n-th.
+    """
+    mine = table.c.job_id == job_id
+    place = sa.func.row_number().over(order_by=table.c.step.desc()) - 1
+    places = sa.select(table.c.step, place.label("place")).where(mine).subquery()
+    n_points = sa.select(sa.func.count()).select_from(table).where(mine)
+    with store.reading() as connection:
+        every = every_nth(connection.execute(n_points).scalar_one())
+        kept = sa.select(places.c.step).where(places.c.place % every == 0)
+        query = sa.select(table).where(mine, table.c.step.in_(kept)).order_by(table.c.step)
+        rows = connection.execute(query).mappings().all()
+    return tuple(_point(row) for row in rows)
+
+
+def every_nth(n_points: int) -> int:
+    """Return n so that every n-th of some points are at most ``MAX_POINTS``."""
+    return max(1, -(-n_points // MAX_POINTS))
 
 
 def newest_point(store: Store, job_id: str) -> MetricRow | None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from app.errors import InvalidInput, NotFound
-from app.store import attempts, checkpoints, completion, jobs
+from app.store import attempts, checkpoints, completion, jobs, metrics
 from app.store.engine import Store
 from app.store.records import NewJob
 from jobs.comparison import band, compare, curves_as_csv
@@ -152,6 +152,26 @@ def test_bad_lists_of_jobs_are_refused(store: Store) -> None:
         compare(store, [job, "gone"])
     with pytest.raises(InvalidInput, match="choices: success, reward"):
         compare(store, [job], "luck")
+
+
+def test_long_curves_are_thinned_evenly_and_keep_their_last_point(
+    store: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(metrics, "MAX_POINTS", 3)
+    long = trained(store, 1, [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7])
+    short = trained(store, 2, [0.5, 0.6])
+    rows = list(csv.DictReader(io.StringIO(curves_as_csv(store, [long, short]))))
+    assert [(r["seed"], r["step"], r["success"]) for r in rows] == [
+        ("1", "10", "0.1"),
+        ("1", "40", "0.4"),
+        ("1", "70", "0.7"),
+        ("2", "10", "0.5"),
+        ("2", "20", "0.6"),
+    ]
+    found = compare(store, [long, short])
+    assert found.steps == (20, 70)
+    assert found.groups[0].mean == pytest.approx([0.4, 0.7])
+    assert found.groups[0].n.tolist() == [2, 1]
 
 
 def test_csv_has_every_point_and_quantity(store: Store) -> None:

@@ -34,7 +34,8 @@ def get_comparison(
 ) -> ComparisonPublic:
     """Return the fields that differ, and the curves of jobs that differ in more than the seed.
 
-    A curve is the mean over the seeds, with the least and greatest value at each step.
+    A curve is the mean over the seeds, with the least and greatest value at each step. Curves
+    of more than 10,000 points, and more than 10,000 steps, are thinned evenly.
     """
     return ComparisonPublic.from_domain(compare(services.store, job, quantity))
 
@@ -46,7 +47,10 @@ def get_comparison(
     responses={**NO_JOB, 200: {"content": {"text/csv": {}}, "description": "points by job"}},
 )
 def get_comparison_csv(services: ServicesDep, job: JobIds) -> Response:
-    """Return every point of the jobs, one row per job and step, all quantities as columns."""
+    """Return the points of the jobs, one row per job and step, all quantities as columns.
+
+    A curve of more than 10,000 points is thinned evenly; its last point is kept.
+    """
     return Response(
         curves_as_csv(services.store, job),
         media_type="text/csv",

@@ -86,7 +86,9 @@ class ComparisonPublic(Answer):
     differences: list[Difference] = Field(description="only fields that differ")
     quantities: list[str] = Field(description="quantities that the curves have")
     quantity: str | None = Field(description="the compared one; null without points")
-    steps: list[int] = Field(description="environment steps of the curves")
+    steps: list[int] = Field(
+        description="environment steps of the curves; at most 10,000, more are thinned evenly"
+    )
     groups: list[CurveGroup] = Field(description="trainings, by their values but the seed")
 
     @classmethod
