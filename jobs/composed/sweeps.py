@@ -26,7 +26,7 @@ from app.policies.configs import presets
 from app.policies.configs.fields import entries
 from app.store import composed_jobs, metrics
 from app.store.engine import Store
-from app.store.records import JobRecord
+from app.store.records import JobRecord, MetricRow
 from jobs.composed.composer import Composer, queue_part
 from jobs.spec import SweepSpec, parse_spec
 
@@ -198,14 +198,19 @@ class Sweeps(Composer):
         complete = [one for one in trials if one.state == "succeeded"]
         if not fresh or len(complete) < STARTUP_TRIALS:
             return
-        study = _study(spec, 0)
-        for one in complete:
-            study.add_trial(_frozen(spec, one, _curve(store, spec, one)))
         for one in fresh:
             self._judged[one.training.id] = one.training.step
+            curve = _values(spec, metrics.thinned_curve(store, one.training.id))
+            before = max(curve, default=0) - 1
+            study = _study(spec, 0)
+            for other in complete:  # its value at the last step of the curve is compared
+                point = metrics.list_metrics(
+                    store, other.training.id, after_step=before, limit=1
+                )
+                study.add_trial(_frozen(spec, other, _values(spec, point)))
             warm_up = int(WARM_UP * (one.training.total_steps or 0))
             pruner = optuna.pruners.MedianPruner(STARTUP_TRIALS, warm_up)
-            if pruner.prune(study, _frozen(spec, one, _curve(store, spec, one))):
+            if pruner.prune(study, _frozen(spec, one, curve)):
                 composed_jobs.mark_pruned(store, one.training.id)
                 composed_jobs.request_cancel(store, one.training)
 
@@ -296,9 +301,8 @@ def _frozen(spec: SweepSpec, trial: SweepTrial, curve: Mapping[int, float]) -> F
     )
 
 
-def _curve(store: Store, spec: SweepSpec, trial: SweepTrial) -> dict[int, float]:
-    """Return the objective's quantity in the learning curve, by step."""
-    rows = metrics.list_metrics(store, trial.training.id)
+def _values(spec: SweepSpec, rows: Sequence[MetricRow]) -> dict[int, float]:
+    """Return the objective's quantity at points of a learning curve, by step."""
     values = {row.step: row.values.get(spec.objective.quantity) for row in rows}
     return {step: value for step, value in values.items() if value is not None}
 

@@ -1,6 +1,7 @@
 """Sweeps, looked at by a new server each time; their trials are ended by the test."""
 
 from collections.abc import Mapping
+from datetime import UTC, datetime
 from typing import Any
 
 import pytest
@@ -117,6 +118,21 @@ def test_training_below_the_median_is_pruned(store: Store) -> None:
     completion.finish(store, found[0], state="cancelled")
     job, trials = look(store, sweep)
     assert (trials[4].state, trials[5].state, job.state) == ("pruned", "queued", "running")
+
+
+def test_training_is_pruned_by_the_last_point_of_a_long_curve(store: Store) -> None:
+    sweep = post(store, trials=6)
+    for success in (0.8, 0.9, 0.7, 0.8):
+        run_trial(store, sweep, success)
+    look(store, sweep)
+    claim, _ = claimed(store)
+    point = {"job_id": claim.job_id, "values": {"success": 0.1}, "at": datetime.now(UTC)}
+    points = [{**point, "step": step} for step in range(1, metrics.MAX_POINTS + 1)]
+    with store.writing() as connection:
+        connection.execute(sa.insert(tables.metrics), points)
+    attempts.record_progress(store, claim, 51_200, {"success": 0.1})
+    look(store, sweep)
+    assert jobs.get_job(store, claim.job_id).ended_by == "pruned"
 
 
 def test_sweep_ends_after_a_trial_that_was_resumed_beside_its_replacement(
