@@ -7,11 +7,15 @@ type or size and unstorable text or integers (``texts.py``) are answered by prob
 from collections.abc import Mapping
 from functools import lru_cache
 
-from starlette.exceptions import HTTPException
 from starlette.routing import compile_path
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from app.api.problems import ProblemResponse, member_problem
+from app.api.problems import (
+    BodyTooLarge,
+    ProblemResponse,
+    body_too_large,
+    member_problem,
+)
 from app.api.security import headers_of, path_of
 from app.api.texts import fault_in_address, fault_in_json
 from app.api.validation import member
@@ -79,7 +83,7 @@ def _refused_head(
         return member_problem(422, "invalid-input", fault, instance)
     length = headers.get("content-length", "")
     if length.isdecimal() and exceeds(length, max_bytes):
-        return _too_large(f"{length} bytes", max_bytes, instance)
+        return body_too_large(f"{length} bytes", max_bytes, instance)
     if not _has_body(headers):
         return None
     encoding, given = headers.get("content-encoding", ""), headers.get("content-type", "")
@@ -133,7 +137,8 @@ def repeating(messages: list[Message], receive: Receive) -> Receive:
 def _refused_json(body: bytes, instance: str) -> ProblemResponse | None:
     """Return the problem of a body; None where there is none."""
     if len(body) > MAX_BODY_BYTES:
-        return _too_large(f"more than {MAX_BODY_BYTES} bytes", MAX_BODY_BYTES, instance)
+        value = f"more than {MAX_BODY_BYTES} bytes"
+        return body_too_large(value, MAX_BODY_BYTES, instance)
     fault = fault_in_json(body)
     return None if fault is None else member_problem(422, "invalid-input", fault, instance)
 
@@ -146,7 +151,7 @@ def _counted(receive: Receive, max_bytes: int) -> Receive:
         message = await receive()
         total += len(message.get("body", b""))
         if total > max_bytes:
-            raise HTTPException(413, f"the body must be at most {max_bytes} bytes")
+            raise BodyTooLarge(max_bytes)
         return message
 
     return receive_counted
@@ -163,11 +168,6 @@ def is_json(content_type: str) -> bool:
     return kind == "application/json" or (
         kind.startswith("application/") and kind.endswith("+json")
     )
-
-
-def _too_large(value: str, max_bytes: int, instance: str) -> ProblemResponse:
-    fault = member("body", value, f"must be at most {max_bytes} bytes")
-    return member_problem(413, "body-too-large", fault, instance, {"Connection": "close"})
 
 
 def _wrong_type(

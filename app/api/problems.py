@@ -149,6 +149,24 @@ def member_problem(
     return problem(status, detail, kind=kind, instance=instance, data=fault, headers=headers)
 
 
+class BodyTooLarge(HTTPException):
+    """A body of unstated length exceeds the limit while it is read.
+
+    Args:
+        max_bytes: The limit [bytes].
+    """
+
+    def __init__(self, max_bytes: int) -> None:
+        super().__init__(413)
+        self.max_bytes = max_bytes
+
+
+def body_too_large(value: str, max_bytes: int, instance: str) -> ProblemResponse:
+    """Return the problem of a body whose size, as text, exceeds the limit."""
+    fault = member("body", value, f"must be at most {max_bytes} bytes")
+    return member_problem(413, "body-too-large", fault, instance, {"Connection": "close"})
+
+
 def service_problem(error: ServiceError, instance: str) -> ProblemResponse:
     """Return the problem of an error."""
     known = ((status, kind) for one, status, kind in STATUS if isinstance(error, one))
@@ -192,6 +210,9 @@ def validation_problem(
 async def on_http_error(request: Request, error: Exception) -> ProblemResponse:
     """Answer an error of the framework: unknown path, wrong method, large body."""
     assert isinstance(error, HTTPException)
+    if isinstance(error, BodyTooLarge):
+        most = error.max_bytes
+        return body_too_large(f"more than {most} bytes", most, request.url.path)
     detail = {
         404: f"there is no route {request.url.path}; /docs lists all",
         405: f"{request.url.path} has no method {request.method}",

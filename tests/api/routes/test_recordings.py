@@ -230,7 +230,14 @@ def test_file_over_the_limit_is_refused(client: TestClient) -> None:
     assert problem["field"] == "body" and str(MAX_BYTES) in problem["rule"]
     chunks = (b" " * (1 << 20) for _ in range(33))
     answer = client.post("/v1/recordings?file_name=a.bvh", content=chunks, headers=FILE)
-    assert answer.status_code == 413
+    chunked = problem_of(answer, 413)
+    assert chunked.keys() == problem.keys() and answer.headers["Connection"] == "close"
+    assert [chunked[one] for one in ("type", "field", "value", "rule")] == [
+        "urn:tandem:problem:body-too-large",
+        "body",
+        f"more than {MAX_BYTES} bytes",
+        problem["rule"],
+    ]
 
 
 def test_file_over_the_limit_of_json_is_read(client: TestClient) -> None:
