@@ -101,10 +101,10 @@ def _refreshed(
     follow: FollowPublic, world: LiveWorld, choices: int, services: Services
 ) -> tuple[FollowPublic, int]:
     """Return a follow and its ``choices`` after a check; it has ended where its job has."""
-    job = find_job(services.store, follow.job)
-    if job is None:
-        return _ended(follow, f"job {follow.number} was deleted"), choices
     try:
+        job = find_job(services.store, follow.job)
+        if job is None:
+            return _ended(follow, f"job {follow.number} was deleted"), choices
         now, choices = _updated(follow, world, choices, services)
     except (StorageFull, StorageUnavailable) as error:
         text, about = "job %d cannot be looked at for now: %s", {"job_id": follow.job}

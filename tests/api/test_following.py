@@ -8,6 +8,7 @@ from app.api.services import Services
 from app.errors import Conflict
 from app.live.commands import SetPolicy
 from app.policies.checkpoints import pretrained
+from app.storage_errors import StorageUnavailable
 from app.store import attempts, completion, jobs
 from app.store.checkpoints import drop_job_checkpoints
 from app.store.engine import Store
@@ -91,6 +92,26 @@ def test_world_takes_the_next_checkpoint_of_a_training_that_starts_at_step_0_aga
     attempts.record_checkpoint(services.store, claim, 5, new)
     assert followed(services) == (True, 5, new.sha256)
     assert queued(services) == [new.sha256, pretrained.SHA256["pick"], new.sha256]
+
+
+@pytest.mark.parametrize("reading", ["find_job", "list_checkpoints"])
+def test_world_follows_on_after_a_time_without_the_database(
+    services: Services,
+    training: tuple[Claim, JobRecord],
+    monkeypatch: pytest.MonkeyPatch,
+    reading: str,
+) -> None:
+    (claim, job), new = training, own_policy()
+    following.start("main", job, services)
+    attempts.record_checkpoint(services.store, claim, 5, new)
+
+    def unavailable(*_: object, **__: object) -> None:
+        raise StorageUnavailable("sqlite:///x", "database is locked")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(following, reading, unavailable)
+        assert followed(services) == (True, None, None)
+    assert followed(services) == (True, 5, new.sha256)
 
 
 def test_follow_after_follow_leaves_one_thread(
