@@ -57,6 +57,7 @@ ROWS = (
         (
             ("thesis-sorting", f"sorting-e0-thesis, {PYTORCH}", ORANGE),
             ("thesis-sorting", f"sorting-e0-thesis, {FOUR}", GREEN),
+            ("thesis-sorting", f"sorting-e0-thesis, {FOUR}, until flat", GREEN),
             ("thesis-sorting", f"sorting-e0-thesis, {FOUR}, continued", GREEN),
             ("thesis-sorting", f"sorting-e0-thesis, {FOUR}, {PYTORCH}", RED),
             ("sorting-curves", "sorting-e0-dqn", BLUE),
@@ -183,7 +184,8 @@ def recorded(results: Path, file: str, names: Sequence[str], printed: float) -> 
         left.set_title(f"{name}: return; dashed: standing still", fontsize="medium")
         right.set_title("rates [%]; dashed: success in the thesis", fontsize="medium")
         right.set_ylim(-2.0, 102.0)
-    axes[0, 1].legend(loc="center right")
+    lines = axes[0, 1].get_legend_handles_labels()
+    figure.legend(*lines, loc="outside lower center", ncols=len(lines[0]))
     for view in axes[-1]:
         view.set(xlabel="environment steps [1e6]", xlim=(0.0, None))
     return figure
