@@ -63,12 +63,13 @@ def row_of(name: str, n: int, shares: Sequence[Shares]) -> Json:
 
 
 def shares_of(found: CaseEpisodes) -> Shares:
-    """Return the shares of the runs of one variant."""
+    """Return the shares of the runs of one variant; unfeasible ends count as time-outs."""
     case, run = found.case, found.run
     (other,) = {*case.goals} - {case.expected}
     alone = found.alone[case.expected]
+    ends = np.array([ENDS[OUTCOMES[outcome]] for outcome in run.outcome])
     flags = {
-        **{end: run.outcome == OUTCOMES.index(end) for end in ENDS},
+        **{name: ends == ENDS[name] for name in ("success", "collision", "timeout")},
         **found.clauses,
         "nearest": found.nearest.succeeded,
         "nearest_as_expected": found.nearest_clauses["as_expected"],

@@ -48,7 +48,13 @@ SETTINGS: Json = {
     "jitter": {"robot [rad]": JITTER_Q, "palm [m]": JITTER_PALM, "delay [s]": JITTER_DELAY},
 }
 """Settings stated with results."""
-ENDS: dict[str, End] = {"success": "reached", "collision": "contact", "timeout": "timeout"}
+ENDS: dict[str, End] = {
+    "success": "reached",
+    "collision": "contact",
+    "timeout": "timeout",
+    "unfeasible": "timeout",
+}
+"""End of a case by outcome; unfeasible ends count as time-outs."""
 
 
 @dataclass(slots=True)

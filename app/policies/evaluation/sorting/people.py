@@ -11,7 +11,8 @@ The safety layer lies between policy and robot, with the assumptions ``AMONG_HAN
 assumes; the layer of the row ``critic-fast-hands`` has ``FAST_HANDS``. A person may touch the
 robot at standstill. After a contact of the moving robot it stops, waits until the person is
 away and begins its motion again. A motion that reaches the time limit begins again, too, with
-the choice of the order rule. A task that is not finished within ``LIMIT_S`` has failed.
+the choice of the order rule, and so does one with one-step bounds that becomes unfeasible. A
+task that is not finished within ``LIMIT_S`` has failed.
 
 Each order rule (``order_rules.py``) runs the same tasks, with the same people and grasps.
 
@@ -59,7 +60,7 @@ from app.sim.pick.kernels.observation_layout import LAYOUT
 from app.sim.pick.monitored_batch import AMONG_HANDS, MonitoredPickBatch
 from app.sim.robot.kernels.arm import CONTROLLED, new_robot_pose, place_robot
 from app.sim.safety.layer import SafetySettings
-from app.sim.scenario.kernels.episode import COLLISION, RUNNING, SUCCESS, TIMEOUT
+from app.sim.scenario.kernels.episode import COLLISION, RUNNING, SUCCESS, TIMEOUT, UNFEASIBLE
 from app.sim.scenario.kernels.monitored_state import PERIODS, STOPPED, TOUCHED_AT_REST
 from app.sim.scenario.monitoring import MonitoringSettings
 from app.sim.sorting.layout import APPROACH_M, above, reaching_cell, require_workspace
@@ -260,7 +261,7 @@ class SortingBesidePeople:
         for e in rows[outcome == SUCCESS].tolist():
             if not self.tasks.advance(e, int(self._chosen[e])):
                 self._begin_motion(e)
-        for e in rows[outcome == TIMEOUT].tolist():
+        for e in rows[np.isin(outcome, (TIMEOUT, UNFEASIBLE))].tolist():
             self._late[e] += 1
             self._begin_motion(e)
         for e in rows[outcome == COLLISION].tolist():

@@ -1,15 +1,18 @@
 """Protocol ``pick-case-variants``: rows are means over variants."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from app.policies.checkpoints import pretrained
 from app.policies.evaluation.pick.case_variants import row_of, shares_of
-from app.policies.evaluation.pick.cases import run_together
+from app.policies.evaluation.pick.cases import _clauses, run_together
 from app.policies.evaluation.pick.episodes import PickBench
 from app.policies.evaluation.rows import EvaluationRequest
 from app.sim.pick.case_variants import variants_of
 from app.sim.pick.cases import find_case
+from app.sim.scenario.kernels.episode import TIMEOUT, UNFEASIBLE
 
 
 def bench_of(n: int) -> PickBench:
@@ -43,3 +46,17 @@ def test_cases_run_together_are_the_same_layouts_as_alone():
     for one in (found[0], found[2]):
         assert not one.alone["cube2"].any() and one.alone["cube0"].all()
     assert found[1].alone["cube0"].all() and found[1].alone["cube4"].all()
+
+
+def test_unfeasible_ends_count_as_time_outs():
+    (found,), choices = run_together(
+        bench_of(2), [(find_case("case-1"), np.random.default_rng(7))]
+    )
+    run = replace(found.run, outcome=np.array([UNFEASIBLE, TIMEOUT]))
+    assert shares_of(replace(found, run=run))["timeout"] == 1.0
+    late, same = (
+        _clauses(found.case, replace(run, outcome=np.full(2, end)), choices, range(2))
+        for end in (TIMEOUT, UNFEASIBLE)
+    )
+    for name, held in late.items():
+        np.testing.assert_array_equal(same[name], held)

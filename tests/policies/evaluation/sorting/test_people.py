@@ -16,6 +16,7 @@ from app.policies.evaluation.sorting.people import (
 from app.policies.evaluation.sorting.task_states import NOTHING, TaskStates
 from app.policies.inference.value_networks import ValueNetworks, pick_preset_of
 from app.sim.cells.cell import load_cell
+from app.sim.scenario.kernels.episode import RUNNING, TIMEOUT, UNFEASIBLE
 from app.sim.sorting.planner import solve
 
 CELL = load_cell("sorting-e0")
@@ -121,6 +122,15 @@ def test_safety_layer_stops_the_robot_and_prevents_contacts_of_the_moving_one() 
     assert runs[0].moving.sum() == 0 < runs[1].moving.sum()
     assert (runs[0].stopped > 0.0).all() and not runs[1].stopped.any()
     assert runs[0].cycle_s.mean() > runs[1].cycle_s.mean()
+
+
+def test_unfeasible_motion_begins_again_as_a_late_one_does() -> None:
+    ran = bench(2)
+    ran._begin()
+    ran.batch.state.outcome[:] = [UNFEASIBLE, TIMEOUT]
+    ran._settle(np.arange(2))
+    assert ran._late.tolist() == [1, 1]
+    assert (ran.batch.state.outcome == RUNNING).all()
 
 
 def test_task_that_is_cut_off_has_failed(monkeypatch: pytest.MonkeyPatch) -> None:
