@@ -119,6 +119,12 @@ def test_search_of_avoidable_contacts_is_of_policies_that_contacts_end():
     check_task("reach-smoothness", manifest, "authors")
 
 
+@pytest.mark.parametrize("name", sorted(OF_REACHING))
+def test_presets_of_uploaded_policies_may_leave_out_fields(name):
+    manifest = {**untrained_reach(width=16).manifest, "preset": {"name": "mine"}}
+    check_task(name, manifest, "mine")
+
+
 def test_every_protocol_has_a_checkpoint_and_a_most_number_of_episodes_of_its_own():
     assert default_checkpoint("sorting-grid") == "sorting-e0"
     assert default_checkpoint("pick-choice") == "pick"
