@@ -7,7 +7,8 @@ future can solve it. A resimulation is
 
 - *scripted*: to a configuration (home, the start of a retreat, or random) until some time, then
   straight to a configuration at the goal; or
-- *disturbed*: to a configuration until some time, then a policy with noise on its actions.
+- *disturbed*: to a configuration until some time, then a policy with noise on its actions; the
+  policy at once where its actions are no joint speeds.
 
 Unsolved episodes have two marks (docs/method.md 2.6): an episode is *presumably unsolvable* if
 a person covers the goal, or touches the robot's base, from before the earliest arrival that was
@@ -17,7 +18,7 @@ and an earlier arrival may exist.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -122,7 +123,12 @@ class OracleSearch:
         self._batch, self._arm, self._seed = batch, batch.arm, seed
         self._rng = np.random.default_rng(seed)
         self.n = batch.n_envs
-        self._copies = ReachBatch(batch.cell, n_copies, seed, batch.settings)
+        settings = batch.settings
+        self._by_speed = settings.action.meaning == "speed"
+        self._copies = self._scripted = ReachBatch(batch.cell, n_copies, seed, settings)
+        if not self._by_speed:
+            settings = replace(settings, action=replace(settings.action, meaning="speed"))
+            self._scripted = ReachBatch(batch.cell, n_copies, seed, settings)
         goals, self._which = np.unique(batch.state.goal, axis=0, return_inverse=True)
         found = goal_configurations_of(self._arm, goals, seed, SPREAD)
         home = np.array(self._arm.home)[None]
@@ -164,6 +170,8 @@ class OracleSearch:
         for rows in self._parts(episodes, n_each):
             first, until = sample_detours(self._arm, self._rng, len(rows))
             until[self._rng.uniform(size=len(rows)) < 0.5] = 0.0
+            if not self._by_speed:
+                until[:] = 0.0  # configurations are approached by joint speeds
             sigma = self._rng.choice(SIGMAS, size=len(rows))[:, None]
             noise = np.zeros((len(rows), 6))
 
@@ -203,7 +211,7 @@ class OracleSearch:
         last: Vec | None,
     ) -> None:
         """Simulate each row: to ``first``, from ``until`` on to ``last`` or with the policy."""
-        batch, k = self._copies, len(rows)
+        batch, k = self._copies if last is None else self._scripted, len(rows)
         batch.reset()
         batch.state.outcome[:] = COLLISION  # unused environments do not move
         copy_rows(self._batch.state, rows, batch.state)

@@ -1,9 +1,12 @@
 """Oracle search: resimulations repeat the episodes; solvable episodes are solved."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from app.sim.cells.cell import load_cell
+from app.sim.reach import oracle_search
 from app.sim.reach.batch import ReachBatch, ReachSettings
 from app.sim.reach.oracle_search import (
     OracleSearch,
@@ -11,11 +14,13 @@ from app.sim.reach.oracle_search import (
     future_cylinders,
     presumably_unsolvable,
 )
+from app.sim.robot.actions import ActionSettings
 from app.sim.scenario.kernels.episode import RUNNING, SUCCESS
 from tests.policies.straight_controller import Straight
 
 CELL = load_cell("shared-workspace")
 RULES = ReachSettings()
+BY_COEFFICIENT = replace(RULES, action=ActionSettings(meaning="coefficient"))
 SMALL = 256
 
 
@@ -75,6 +80,23 @@ def test_noise_and_detours_change_what_a_policy_does():
     search.disturbed(np.arange(20), 8, Straight().acts)
     assert (search.resimulations.n == 8).all()
     assert ((search.resimulations.reached > 0) & (search.resimulations.reached < 8)).any()
+
+
+def test_scripts_are_the_same_whatever_actions_mean():
+    found = []
+    for rules in (RULES, BY_COEFFICIENT):
+        search = OracleSearch(batch_of(20, rules=rules), 1, SMALL)
+        search.scripted(np.arange(20), 4)
+        found.append(search.resimulations.reached)
+    assert found[0].any()
+    np.testing.assert_array_equal(*found)
+
+
+def test_policies_of_coefficients_make_no_detours(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(oracle_search, "SIGMAS", (0.0,))
+    search = OracleSearch(batch_of(20, rules=BY_COEFFICIENT), 1, SMALL)
+    search.disturbed(np.arange(20), 8, Straight().acts)
+    assert set(search.resimulations.untouched.tolist()) == {0, 8}
 
 
 def test_the_search_leaves_the_episodes_as_they_were():

@@ -14,7 +14,8 @@ stage           resimulations of each unsolved episode
 ==============  ==============================================================================
 ``policy``      the policy by itself
 ``scripted``    to a random configuration, later straight to the goal: 64, then 256
-``disturbed``   to a random configuration, later the policy with noise: 32
+``disturbed``   to a random configuration, later the policy with noise: 32; the policy at once
+                where its actions are no joint speeds
 ``long``        scripted again: 2048
 ==============  ==============================================================================
 

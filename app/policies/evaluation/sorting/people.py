@@ -111,6 +111,9 @@ class SortingBesidePeople:
     ) -> None:
         self._networks, self._seed = networks, seed
         self._straight = condition.straight
+        if condition.straight:
+            by_speed = replace(settings.action, meaning="speed")
+            settings = replace(settings, action=by_speed)
         self.batch = MonitoredPickBatch(
             reaching_cell(cell),
             n_tasks,

@@ -1,5 +1,7 @@
 """Full sorting tasks beside a person: symbolic states, order rules and their execution."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -16,6 +18,7 @@ from app.policies.evaluation.sorting.people import (
 from app.policies.evaluation.sorting.task_states import NOTHING, TaskStates
 from app.policies.inference.value_networks import ValueNetworks, pick_preset_of
 from app.sim.cells.cell import load_cell
+from app.sim.robot.actions import ActionSettings
 from app.sim.scenario.kernels.episode import RUNNING, TIMEOUT, UNFEASIBLE
 from app.sim.sorting.planner import solve
 
@@ -131,6 +134,19 @@ def test_unfeasible_motion_begins_again_as_a_late_one_does() -> None:
     ran._settle(np.arange(2))
     assert ran._late.tolist() == [1, 1]
     assert (ran.batch.state.outcome == RUNNING).all()
+
+
+def test_straight_moves_are_the_same_whatever_actions_mean() -> None:
+    checkpoint = pretrained.load("pick")
+    usual = settings_for((1, 1), pick_preset_of(checkpoint))
+    other = replace(usual, action=ActionSettings(meaning="coefficient"))
+    straight, networks = CellCondition(straight=True), ValueNetworks(checkpoint)
+    runs = [
+        SortingBesidePeople(networks, CELL, each, 1, 3, straight).run(order_rules.nearest)
+        for each in (usual, other)
+    ]
+    assert runs[0].finished.all()
+    np.testing.assert_array_equal(runs[0].cycle_s, runs[1].cycle_s)
 
 
 def test_task_that_is_cut_off_has_failed(monkeypatch: pytest.MonkeyPatch) -> None:
