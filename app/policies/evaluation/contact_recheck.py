@@ -34,12 +34,14 @@ class Trace:
         self._rows = rows[rows < n]
         self._q0, self._qd0 = state.q[:n].copy(), state.qd[:n].copy()
         self._qdd0 = state.qdd[:n].copy()
+        self._touched0 = state.touched[:n].copy()
         self._people0 = tuple(part[:n].copy() for part in self._of_people())
 
     def after(self) -> None:
-        """Add the poses of the period, except where the episode ended in a contact."""
+        """Add the poses of the period, except where there was a contact in it."""
         state, dt, n = self._batch.state, self._batch.arm.dt, self._n
-        rows = self._rows[state.outcome[self._rows] != COLLISION]
+        contact = (state.outcome[:n] == COLLISION) | (state.touched[:n] > self._touched0)
+        rows = self._rows[~contact[self._rows]]
         ends = (self._qd0, state.qd[:n]), (self._qdd0, state.qdd[:n])
         c, d = executed_coefficients(self._batch.settings.action.degree, dt, *ends)
         for part in range(1, self._parts + 1):

@@ -18,6 +18,7 @@ from app.policies.evaluation.reach.episodes import (
 )
 from app.sim.cells.cell import load_cell
 from app.sim.reach.batch import ReachBatch, ReachSettings
+from app.sim.reach.recipe_rules import BlockedRules
 from app.sim.scenario.kernels.episode import COLLISION, RUNNING, SUCCESS, TIMEOUT
 from tests.policies.straight_controller import Straight
 
@@ -140,4 +141,11 @@ def test_the_recheck_finds_no_missed_contact() -> None:
     found = recheck_contacts(CELL, USUAL, Straight(), target_goals(TARGETS, 12), 5)
     assert found["episodes"] == 12
     assert found["poses"] > 500
+    assert found["missed_contacts"] == 0
+
+
+def test_contacts_that_block_the_arm_are_not_missed() -> None:
+    rules = replace(USUAL, blocked=BlockedRules(), collision_ends=False)
+    found = recheck_contacts(CELL, rules, Straight(), target_goals(TARGETS, 30), 5)
+    assert found["poses"] > 1000
     assert found["missed_contacts"] == 0
