@@ -1,10 +1,11 @@
 """Exploration in parallel environments: noise with a scale per environment, and options.
 
 The scale of the AR(1) noise grows from 0 in the first, greedy environments to ``sigma_max`` in
-the last. In half of the noisy environments a random *option* takes over from time to time, for
-4 to 29 control periods: hold still, move home, move to a configuration nearby or to that of
-another task; in picks, half of the time, move straight to the target. Options reach states near
-people that the policy alone would not visit, and leave states in which it hesitates.
+the last; environments with different numbers of people take turns in this order. In half of the
+noisy environments a random *option* takes over from time to time, for 4 to 29 control periods:
+hold still, move home, move to a configuration nearby or to that of another task; in picks, half
+of the time, move straight to the target. Options reach states near people that the policy alone
+would not visit, and leave states in which it hesitates.
 
 Deviates: the thesis explores by an Ornstein-Uhlenbeck process (table 4.2), which is here too,
 and by parameter-space noise (section 5.3.4; ``parameter_noise.py``).
@@ -35,7 +36,7 @@ class Exploration(Stateful, ABC):
     """Perturbs the actions of a policy."""
 
     n_greedy: int
-    """Environments without exploration, the first ones."""
+    """Environments without exploration; the first ones where no order is given."""
 
     @abstractmethod
     def apply(self, act: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -43,12 +44,14 @@ class Exploration(Stateful, ABC):
 
 
 class PerEnvAR1Noise(Exploration):
-    """AR(1) noise whose scale grows with the number of the environment.
+    """AR(1) noise with a scale per environment.
 
     Args:
         shape: Environments and numbers of an action, (n_envs, n_act).
         dt: Control period [s].
         config: Largest scale, correlation time and greedy share.
+        order: Environments in the order of growing scales, shape (n_envs,); by default that of
+            their numbers.
     """
 
     STATE = ("_noise", "_rng")
@@ -59,12 +62,16 @@ class PerEnvAR1Noise(Exploration):
         dt: float,
         config: NoiseExploration,
         rng: np.random.Generator,
+        order: NDArray[np.int64] | None = None,
     ) -> None:
         n_envs = shape[0]
         self.n_greedy = config.n_greedy(n_envs)
         scales = np.geomspace(0.1, 1.0, n_envs - self.n_greedy) * config.sigma_max
         scales[-1:] = config.sigma_max  # also where only one environment has noise
-        self._sigma = np.concatenate([np.zeros(self.n_greedy), scales])[:, None]
+        if order is None:
+            order = np.arange(n_envs)
+        self._sigma = np.zeros((n_envs, 1))
+        self._sigma[order[self.n_greedy :], 0] = scales
         self._memory = math.exp(-dt / config.noise_time_s)
         self._noise, self._rng = np.zeros(shape), rng
 

@@ -25,7 +25,7 @@ from app.sim.core.arrays import Vec
 from app.sim.envs.tasks import ArmTask
 from app.sim.people.kernels.pedestrian import VX, VY, R, X, Y
 from app.sim.pick.batch import OUTCOMES
-from app.sim.reach.batch import N_ACT, ReachSettings
+from app.sim.reach.batch import N_ACT, ReachBatch, ReachSettings
 from app.sim.reach.blocked_batch import new_reach_batch
 from app.sim.reach.kernels.observation import BASE_START
 from app.sim.reach.kernels.reward import ReachWeights
@@ -71,13 +71,27 @@ def exploration_of(
     rng, shape = np.random.default_rng(seed), (batch.n_envs, N_ACT)
     if config.noise == "ou":
         return OUNoise(shape, config, lambda: elapsed_times(batch) == 0.0, rng)
-    return PerEnvAR1Noise(shape, batch.arm.dt, config, rng)
+    return PerEnvAR1Noise(shape, batch.arm.dt, config, rng, noise_order(batch))
+
+
+def noise_order(batch: ReachEnvironments) -> NDArray[np.int64]:
+    """Return the environments in the order of growing noise scales, shape (n_envs,).
+
+    Environments with different numbers of people take turns: each number has small and large
+    scales.
+    """
+    places = np.concatenate([np.arange(part.n_envs) for part in _parts_of(batch)])
+    return places.argsort(kind="stable")
 
 
 def elapsed_times(batch: ReachEnvironments) -> Vec:
     """Return the times since the starts of the present episodes [s], shape (n_envs,)."""
-    parts = batch.parts if isinstance(batch, MixedReachBatch) else (batch,)
-    return np.concatenate([part.state.elapsed for part in parts])
+    return np.concatenate([part.state.elapsed for part in _parts_of(batch)])
+
+
+def _parts_of(batch: ReachEnvironments) -> tuple[ReachBatch, ...]:
+    """Return the batches of which environments consist."""
+    return batch.parts if isinstance(batch, MixedReachBatch) else (batch,)
 
 
 def networks_of(preset: ReachPreset, n_obs: int) -> Networks:
@@ -155,8 +169,7 @@ class ReachReporter(Reporter):
 
 def visited_states(batch: ReachEnvironments) -> dict[str, Vec]:
     """Return the present states of all environments."""
-    parts = batch.parts if isinstance(batch, MixedReachBatch) else (batch,)
-    states = [part.state for part in parts]
+    states = [part.state for part in _parts_of(batch)]
     visited = {
         "q": np.concatenate([state.q for state in states]),
         "qd": np.concatenate([state.qd for state in states]),

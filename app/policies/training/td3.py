@@ -27,7 +27,7 @@ class TrainingMonitor:
     """Data behind the learning curve of a TD3 training."""
 
     n_greedy: int
-    """Environments without exploration, the first ones."""
+    """Environments without exploration; in picks the first ones."""
     env: BatchVecEnv
     """The environments."""
     actor: torch.nn.Module

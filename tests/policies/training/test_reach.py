@@ -5,13 +5,20 @@ import pytest
 import torch
 
 from app.errors import InvalidInput
+from app.policies.algorithms.exploration import PerEnvAR1Noise
 from app.policies.algorithms.vecenv import BatchVecEnv
 from app.policies.configs import presets
 from app.policies.inference.reach_policy import ReachPolicy
 from app.policies.training.curve import play
 from app.policies.training.file_store import FileFolder
 from app.policies.training.memory_files import MemoryFiles
-from app.policies.training.reach import batch_of, settings_of, start, visited_states
+from app.policies.training.reach import (
+    batch_of,
+    exploration_of,
+    settings_of,
+    start,
+    visited_states,
+)
 from app.sim.cells.cell import load_cell
 from app.sim.envs.tasks import ArmTask
 from app.sim.reach.batch import ReachBatch, ReachSettings
@@ -200,6 +207,22 @@ def test_every_option_trains_and_moves_the_actor(option):
     assert all(np.isfinite(array).all() for array in after.values())
     assert not np.array_equal(before["actor.net.0.weight"], after["actor.net.0.weight"])
     ReachPolicy(recorder.checkpoints[-1][1])
+
+
+def test_noise_scales_do_not_grow_with_the_number_of_people():
+    scales = []
+    for name in ("reach-td3", "reach-td3-people-set"):
+        preset = preset_of(name, TINY)
+        batch = batch_of(preset, load_cell("shared-workspace"), 16, 3)
+        noise = exploration_of(preset.exploration, batch, 1)
+        assert isinstance(noise, PerEnvAR1Noise)
+        scales.append(noise._sigma[:, 0])
+    one_person, mixed = scales
+    assert (np.diff(one_person) > 0.0).all()
+    np.testing.assert_array_equal(np.sort(mixed), one_person)
+    by_number = mixed.reshape(4, 4)
+    assert (np.diff(by_number) > 0.0).all()
+    assert by_number[:, 0].max() < by_number[:, -1].min()
 
 
 def test_averaged_actor_normalises_like_the_trained_one():
