@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from app.errors import CheckpointMismatch
 from app.policies.checkpoints import pretrained
 from app.policies.inference.motion_decision import MotionDecider
 from app.policies.inference.reach_policy import ReachPolicy
@@ -15,6 +16,7 @@ from app.sim.reach.motion_types import MotionDecision, MotionQuery
 from app.sim.robot.actions import ActionSettings
 from app.sim.safety.layer import SafetySettings
 from tests.policies.reach_actor import RandomActor
+from tests.policies.untrained import overflowing_reach
 
 CELL = load_cell("shared-workspace")
 HOME, DT = np.array(CELL.robot.home_q), CELL.robot.dt
@@ -256,3 +258,9 @@ def test_a_wide_cylinder_stops_the_robot_however_far_its_axis_is() -> None:
     decision = one.decide(query(people=(wide,), qd=np.full(6, 0.2)))
     assert decision.safe is not None and decision.safe.override == 0.0
     assert decision.person_weights[0].separation < 0.0
+
+
+def test_a_policy_whose_actions_are_not_finite_gives_no_segment():
+    one = MotionDecider(ReachPolicy(overflowing_reach()), CELL)
+    with np.errstate(all="ignore"), pytest.raises(CheckpointMismatch, match="action is"):
+        one.decide(query())

@@ -76,3 +76,13 @@ def shipped_pick_of(*stations: str) -> Checkpoint:
     kept = tuple(cell.station(name) for name in stations)
     fewer = cell.model_copy(update={"name": "fewer-stations", "stations": kept})
     return formats.load({**shipped.manifest, **manifest_fields(fewer)}, shipped.tensors)
+
+
+def overflowing_reach() -> Checkpoint:
+    """Return a reach policy whose actions are NaN, although its weights are finite."""
+    whole = untrained_reach(width=16)
+    arrays = {name: array.copy() for name, array in whole.arrays().items()}
+    arrays["actor.net.0.weight"][:], arrays["actor.net.0.bias"][:] = 0.0, 10.0
+    arrays["actor.net.2.weight"][:] = 3e38
+    arrays["actor.net.4.weight"][:, ::2], arrays["actor.net.4.weight"][:, 1::2] = 1.0, -1.0
+    return formats.pack(whole.manifest, arrays)

@@ -113,6 +113,7 @@ class MotionDecider:
             InvalidInput: A number is out of range, or a person overlaps the robot without
                 monitoring.
             GoalOutside: The goal of an interpolated action lies outside the training targets.
+            CheckpointMismatch: The action of the policy is not finite.
         """
         started = time.perf_counter()
         robot, goal = self._numbers(query)

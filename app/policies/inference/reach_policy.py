@@ -7,7 +7,7 @@ Source: docs/method.md 2.2 to 2.4.
 """
 
 from collections.abc import Callable, Mapping
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -144,13 +144,14 @@ class ReachPolicy(TrainedPolicy):
 
         Raises:
             InvalidInput: They have another shape.
+            CheckpointMismatch: An action is not finite: sums of large weights overflow.
         """
         if obs.ndim != 2 or obs.shape[1] != self.n_obs:
             raise InvalidInput(
                 "obs", list(obs.shape), f"must have the shape ['n', {self.n_obs}]"
             )
         if self._few is not None and len(obs) <= FEW:
-            return self._compiled_acts(self._few, obs)
+            return _finite(self._compiled_acts(self._few, obs))
         seen = self._with_encoded_set(obs)
         if self.moments is not None:
             mean, spread = self.moments
@@ -162,7 +163,7 @@ class ReachPolicy(TrainedPolicy):
         if self.is_residual:
             base = obs[:, BASE_START : BASE_START + N_ACT].clip(-1.0, 1.0)
             rows += np.arctanh(np.float32(BASE_WEIGHT) * base)
-        return cast(NDArray[np.float32], np.tanh(rows, out=rows))
+        return _finite(np.tanh(rows, out=rows))
 
     def _compiled_acts(self, network: Network, obs: Floats) -> Floats:
         """Return the actions of :meth:`acts`, computed by the kernel."""
@@ -183,6 +184,17 @@ class ReachPolicy(TrainedPolicy):
         blocks = obs[:, PEOPLE_SET.first :].reshape(-1, PEOPLE_SET.n_people, PEOPLE_SET.n_block)
         found = _hidden(blocks, self._set_layers) * blocks[:, :, :1]
         return np.concatenate([obs[:, : PEOPLE_SET.first], found.max(axis=1)], axis=1)
+
+
+def _finite(acts: Floats) -> Floats:
+    """Return actions that are finite.
+
+    Raises:
+        CheckpointMismatch: One is not.
+    """
+    if not np.isfinite(acts).all():
+        raise CheckpointMismatch("action", "finite numbers", "NaN or infinite")
+    return acts
 
 
 def _hidden(rows: Floats, layers: tuple[Layer, ...]) -> Floats:
@@ -234,12 +246,17 @@ def _moments_of(arrays: Mapping[str, NDArray[Any]], n_obs: int) -> tuple[Floats,
     """Return mean and deviation of the observations in training, shape (n_obs,) each.
 
     Raises:
-        CheckpointMismatch: Their tensors are missing or have another shape.
+        CheckpointMismatch: Their tensors are missing, have another shape, or give no finite
+            mean and deviation.
     """
     norm = RunningNormalisation(n_obs)
     try:
         norm.load_state_dict(tensors_under(arrays, NORMALISATION))
     except RuntimeError as error:
         raise CheckpointMismatch("tensors", "those of its normalisation", str(error)) from None
-    mean, spread = norm.moments()
-    return mean.numpy(), spread.numpy()
+    mean, spread = (part.numpy() for part in norm.moments())
+    count = norm.count.item()
+    if count <= 0.0 or not np.isfinite([mean, spread]).all():
+        wanted = "a positive count with finite mean and deviation"
+        raise CheckpointMismatch(f"tensors.{NORMALISATION}", wanted, f"count {count:g}")
+    return mean, spread

@@ -18,7 +18,7 @@ from app.sim.reach.goal_sets import halton_targets
 from app.sim.reach.reach_actor import ReachActor
 from app.sim.reach.rollout.kernels.actor import FEW
 from app.sim.robot.actions import ActionSettings
-from tests.policies.untrained import reach_preset, untrained_reach
+from tests.policies.untrained import overflowing_reach, reach_preset, untrained_reach
 
 
 @pytest.fixture(scope="module")
@@ -178,6 +178,23 @@ def test_normalisation_without_its_tensors_is_refused(values):
     arrays = {name: array for name, array in arrays.items() if array is not None}
     with pytest.raises(CheckpointMismatch, match="checkpoint tensors"):
         ReachPolicy(formats.pack(checkpoint.manifest, arrays))
+
+
+@pytest.mark.parametrize("count", [0.0, -1.0, 1e-300])
+def test_normalisation_without_finite_moments_is_refused(count):
+    overrides = {"actor": "ddpg", "critic": "ddpg", "normalisation": "running"}
+    checkpoint = untrained_reach(width=24, **overrides)
+    arrays = {**checkpoint.arrays(), "actor.norm.count": np.array([count])}
+    with pytest.raises(CheckpointMismatch, match=r"tensors\.actor\.norm is 'count"):
+        ReachPolicy(formats.pack(checkpoint.manifest, arrays))
+
+
+@pytest.mark.parametrize("n", [1, FEW + 1])
+def test_actions_that_are_not_finite_are_refused(n):
+    policy = ReachPolicy(overflowing_reach())
+    obs = np.zeros((n, policy.n_obs), dtype=np.float32)
+    with np.errstate(all="ignore"), pytest.raises(CheckpointMismatch, match="finite numbers"):
+        policy.acts(obs)
 
 
 def test_layers_that_do_not_fit_each_other_are_refused(checkpoint):
