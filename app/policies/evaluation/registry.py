@@ -95,10 +95,11 @@ MAX_SORTING_EPISODES = 10_000
 FEWER_EPISODES: Mapping[str, int] = MappingProxyType(
     {**dict.fromkeys(OF_SORTING, MAX_SORTING_EPISODES), "reach-targets": 2_000}
     | {"reach-smoothness": 5_000, "reach-ssm": 20_000, "reach-oracle": 200}
-    | {"sorting-people": 2_000, "sorting-cycle-time": 2_000, "pick-case-variants": 1_000}
+    | {"sorting-people": 2_000, "sorting-cycle-time": 2_000}
+    | {"pick-cases": 5_000, "pick-case-variants": 100}
 )
-"""Maximum number of episodes where they count per pair, target or variant, or where paths are
-stored."""
+"""Maximum number of episodes where they count per pair, target or variant, or where paths of
+robots or motions of people are stored."""
 
 
 def evaluate(

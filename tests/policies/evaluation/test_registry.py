@@ -6,6 +6,8 @@ from app.errors import InvalidInput
 from app.policies.checkpoints import pretrained
 from app.policies.checkpoints.checkpoint import Checkpoint
 from app.policies.configs.reach import AUTHORS
+from app.policies.evaluation.pick import case_variants, cases
+from app.policies.evaluation.pick.people import SAMPLE_S
 from app.policies.evaluation.registry import (
     MAX_SORTING_EPISODES,
     OF_CHOICE,
@@ -123,6 +125,14 @@ def test_search_of_avoidable_contacts_is_of_policies_that_contacts_end():
 def test_presets_of_uploaded_policies_may_leave_out_fields(name):
     manifest = {**untrained_reach(width=16).manifest, "preset": {"name": "mine"}}
     check_task(name, manifest, "mine")
+
+
+@pytest.mark.parametrize(
+    ("name", "together"), [("pick-cases", 1), ("pick-case-variants", case_variants.TOGETHER)]
+)
+def test_motions_that_case_studies_store_fit_into_memory(name, together):
+    poses = together * most_episodes(name) * cases.TRACK_S / SAMPLE_S
+    assert 18 * 8 * poses < 0.5e9
 
 
 def test_every_protocol_has_a_checkpoint_and_a_most_number_of_episodes_of_its_own():
