@@ -201,7 +201,7 @@ def check_task(name: str, manifest: Mapping[str, Any], found: str) -> None:
     Raises:
         InvalidInput: It is of another scenario; the rule lists the protocols of its own. Or it
             is of another cell than that of the case studies, of a cell with too few stations,
-            or of an arm that contacts block.
+            of an arm that contacts block, or of other joint limits than those of its cell.
     """
     wanted, actual = task_measured(name), purpose_of(manifest)
     episode = manifest["preset"].get("episode", {})  # presets may leave out fields
@@ -216,6 +216,8 @@ def check_task(name: str, manifest: Mapping[str, Any], found: str) -> None:
         rule = f"must be of another cell for {name}: its cell {lack}"
     elif name == "reach-oracle" and episode.get("collision") == "blocks":
         rule = f"must be of a policy whose episodes end at contacts for {name}"
+    elif name == "reach-ssm" and episode.get("limits") == "authors":
+        rule = f"must be of a policy trained within the joint limits of its cell for {name}"
     else:
         return
     raise InvalidInput("checkpoint", found, rule)

@@ -121,6 +121,13 @@ def test_search_of_avoidable_contacts_is_of_policies_that_contacts_end():
     check_task("reach-smoothness", manifest, "authors")
 
 
+def test_comparison_with_planners_is_of_policies_within_the_joint_limits_of_the_cell():
+    manifest = {**untrained_reach(width=16).manifest, "preset": AUTHORS.model_dump()}
+    rule = "trained within the joint limits of its cell for reach-ssm"
+    with pytest.raises(InvalidInput, match=rule):
+        check_task("reach-ssm", manifest, "authors")
+
+
 @pytest.mark.parametrize("name", sorted(OF_REACHING))
 def test_presets_of_uploaded_policies_may_leave_out_fields(name):
     manifest = {**untrained_reach(width=16).manifest, "preset": {"name": "mine"}}

@@ -2,8 +2,8 @@
 
 A person crosses between the robot at home and its goal (``app/sim/reach/crossings.py``: 200
 crossings fixed before any tuning, and as many recorded crossings as are given). All rows have
-the same joint limits and the same speed and separation monitoring, with the protective distance
-of the thesis' comparison.
+the joint limits of the cell, within which the policy must have been trained, and the same speed
+and separation monitoring, with the protective distance of the thesis' comparison.
 
 ``policy``
     The checkpoint, queried every 20 ms.
