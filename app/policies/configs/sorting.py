@@ -245,8 +245,9 @@ E1_PURE = SortingPreset(
     people=SortingPeople(human_rate=0.0),
     expert=ExpertLabels(share=0.0),
 )
-"""``sorting-e1-dqn`` without expert labels and people, with a wider network and larger
-minibatches."""
+"""``sorting-e1-dqn`` without expert labels and people, with a wider network, larger
+minibatches, more disturbed starts (70 % of the episodes, not 60 %) and fewer partly solved ones
+(initially 20 %, not 30 %)."""
 SORTING_PRESETS = (
     E0,
     E1,
