@@ -1,5 +1,6 @@
 """Contact speeds of power and force limiting, against numbers worked out by hand."""
 
+import numpy as np
 import pytest
 
 from app.sim.human.kernels import kinematics as body
@@ -11,6 +12,7 @@ from app.sim.safety.contact_limits import (
     contact_speed,
     cylinder_contact_speed,
 )
+from app.sim.safety.layer import SafetySettings, contact_speeds
 
 BY_HAND = {
     # F [N], k [N/mm], mu = m_H m_R / (m_H + m_R) with m_R = 14.35 kg, v = F / sqrt(mu k)
@@ -61,6 +63,21 @@ def test_a_head_is_as_delicate_as_its_face_and_a_cylinder_as_any_part():
     assert speeds[body.C_HAND_R] == speeds[body.C_HAND_L]
     assert speeds[body.C_LEG_R] == pytest.approx(BY_HAND["lower legs"], rel=1e-4)
     assert cylinder_contact_speed(14.35, 1.0) == pytest.approx(speeds.min())
+
+
+def test_the_kernels_get_the_limits_of_load_and_contact_area_by_hand():
+    """With 5 kg, m_R = 28.7 kg / 2 + 5 kg = 19.35 kg; with 2 cm^2 every force counts."""
+    pelvis, abdomen = 2 * 180.0 / (13.0413 * 25e3) ** 0.5, 2 * 110.0 / (13.0413 * 10e3) ** 0.5
+    chest, face = 2 * 140.0 / (13.0413 * 25e3) ** 0.5, 65.0 / (3.58484 * 75e3) ** 0.5
+    upper_arm, forearm = 300.0 / (2.59732 * 30e3) ** 0.5, 320.0 / (1.81265 * 40e3) ** 0.5
+    hand, lower_leg = 280.0 / (0.581955 * 75e3) ** 0.5, 260.0 / (15.38156 * 60e3) ** 0.5
+    worker = [pelvis, abdomen, chest, face, *2 * [upper_arm], *2 * [forearm]]
+    worker += [*2 * [hand], *2 * [lower_leg]]
+    loaded = SafetySettings(pfl=True, load=5.0, contact_area=2.0)
+    np.testing.assert_allclose(contact_speeds(loaded, 12, 1), [*worker, face], rtol=1e-5)
+    two = contact_speeds(loaded, 24, 2)
+    np.testing.assert_allclose(two, [*worker, *worker, face, face], rtol=1e-5)
+    assert not contact_speeds(SafetySettings(load=5.0, contact_area=2.0), 12, 1).any()
 
 
 def test_the_moving_mass_is_that_of_the_robot_s_model():
