@@ -3,10 +3,12 @@ import pytest
 
 from app.sim.cells.cell import load_cell
 from app.sim.collision.checker import Shapes, no_people
-from app.sim.collision.contact import pedestrian_distances
+from app.sim.geometry.capsules import RADIUS, UX, UY, X, Y
+from app.sim.robot.kernels import arm as arm_kernel
+from app.sim.robot.ur10 import LINK_NAMES
 from app.sim.safety.layer import SafetyLayer, safety_settings
 from app.sim.safety.separation_zone import required_distances, separation_zone
-from app.sim.scene.scene import arm_of, people_of
+from app.sim.scene.scene import arm_of
 
 CELL = load_cell("shared-workspace")
 ARM, SETTINGS = arm_of(CELL), safety_settings(CELL)
@@ -23,28 +25,49 @@ def test_standing_robot_asks_for_what_a_person_covers_in_the_reaction_time() -> 
 
 
 def test_every_capsule_asks_for_what_the_safety_layer_tells_of_it() -> None:
-    layer, rest = SafetyLayer(ARM, SETTINGS), np.zeros(6)
-    for q, qd in states(12):
-        people = Shapes(columns=no_people().columns, cylinders=np.array([[0.2, 1.6, 0.3, 1.3]]))
+    layer, rest, rng = SafetyLayer(ARM, SETTINGS), np.zeros(6), np.random.default_rng(3)
+    of_capsule, told = np.array(LINK_NAMES)[ARM.link], set[str]()
+    for q, qd in states(60):
+        place = [*rng.uniform((-1.2, -1.0), (1.2, 1.6)), 0.1, rng.uniform(0.1, 1.8)]
+        people = Shapes(columns=no_people().columns, cylinders=np.array([place]))
         decision = layer.decide(q, qd, rest, rest, people)
         _, terms = layer.terms(decision, qd, people)
-        assert np.abs(required_distances(ARM, SETTINGS, qd) - terms.required).min() < 1e-12
+        same = required_distances(ARM, SETTINGS, qd)[of_capsule == terms.link]
+        np.testing.assert_allclose(same, terms.required, rtol=0.0, atol=1e-12)
+        told.add(terms.link)
+    assert len(told) >= 5
+
+
+def reserves(q: np.ndarray, qd: np.ndarray, places: np.ndarray) -> np.ndarray:
+    """Horizontal distance of each place to each capsule, less what it asks for, (n, m)."""
+    robot = arm_kernel.new_robot_pose(ARM)
+    arm_kernel.place_robot(ARM, q, robot)
+    columns = robot.columns[:, : len(ARM.link)]
+    start, along = columns[[X, Y]].T, columns[[UX, UY]].T
+    away = places[:, None] - start
+    part = (away * along).sum(axis=2) / np.maximum((along**2).sum(axis=1), 1e-12)
+    away -= np.clip(part, 0.0, 1.0)[..., None] * along
+    distance = np.linalg.norm(away, axis=2) - columns[RADIUS]
+    return np.asarray(distance - required_distances(ARM, SETTINGS, qd))
 
 
 def test_person_outside_the_zone_is_farther_away_than_any_capsule_asks_for() -> None:
-    shared, rng = people_of(CELL), np.random.default_rng(2)
+    rng, n_outside = np.random.default_rng(2), 0
     for q, qd in states(20):
         outline = separation_zone(ARM, SETTINGS, q, qd)
-        least = required_distances(ARM, SETTINGS, qd).min()
-        for place in rng.uniform((-2.0, -0.5), (2.0, 2.5), (20, 2)):
-            outward = np.roll(outline, -1, axis=0) - outline
-            side = outward[:, 0] * (place[1] - outline[:, 1]) - outward[:, 1] * (
-                place[0] - outline[:, 0]
-            )
-            if (side >= 0.0).all():
-                continue
-            gap = pedestrian_distances(ARM, shared, q, np.array([[*place, 1e-3]]))[0]
-            assert gap > least - 5e-3
+        edge = np.roll(outline, -1, axis=0) - outline
+        places = rng.uniform((-3.0, -3.0), (3.0, 3.0), (40, 2))
+        (x, y), (ex, ey) = (places[:, None] - outline).transpose(2, 0, 1), edge.T
+        outside = places[(ex * y - ey * x < 0.0).any(axis=1)]
+        assert (reserves(q, qd, outside) > -0.01).all()  # edges cut off some millimetres
+        n_outside += len(outside)
+    assert 200 < n_outside < 700
+
+
+def test_zone_reaches_as_far_as_the_capsules_ask_for() -> None:
+    for q, qd in states(20):
+        corners = reserves(q, qd, separation_zone(ARM, SETTINGS, q, qd))
+        np.testing.assert_allclose(corners.min(axis=1), 0.0, atol=1e-9)
 
 
 def test_zone_grows_with_the_robot_s_speed() -> None:
