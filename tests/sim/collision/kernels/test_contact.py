@@ -42,8 +42,8 @@ class Period:
         assert q is not None
         self.q = np.clip(q + rng.normal(0.0, 0.15, 6), *limits)
         self.qd = rng.uniform(-speed, speed)
-        end = np.clip(self.qd + rng.uniform(-1, 1, 6) * mount.qdd_max * dt, -speed, speed)
-        self.c, self.dt = (end - self.qd) / (2 * dt), dt
+        first, last = rng.uniform(-1, 1, (2, 6)) * mount.qdd_max
+        self.c, self.d, self.dt = first / 2.0, (last - first) / (6.0 * dt), dt
         rest = human.rest_posture(rng.uniform(-0.5, 0.5), rng.uniform(1.12, 1.3), -1.57)
         hand, near = rng.choice(["r", "l"]), robot.tcp_pose(self.q)[:3, 3]
         target = near + rng.normal(0.0, 0.15, 3)
@@ -51,11 +51,16 @@ class Period:
         step = rng.normal(size=18) * hurry * dt
         self.human1 = np.clip(self.human0 + step, human.Q_MIN, human.Q_MAX)
 
+    @property
+    def path(self) -> JointPath:
+        """The robot's path."""
+        return JointPath(self.q, self.qd, self.c, self.d)
+
     def rows(self, n: int) -> Trajectory:
         """The period as the robot and the person really move, n + 1 rows."""
         x = np.linspace(0.0, self.dt, n + 1)[:, None]
         return Trajectory(
-            q_robot=self.q + self.qd * x + self.c * x**2,
+            q_robot=self.q + self.qd * x + self.c * x**2 + self.d * x**3,
             q_human=self.human0 + (self.human1 - self.human0) * x / self.dt,
         )
 
@@ -69,8 +74,7 @@ def test_sweep_is_never_later_than_the_meshes_at_millisecond_substeps(
     for _ in range(250):
         period = Period(cell, rng, robot, hurry)
         human_q = period.human0[None], period.human1[None]
-        zero = np.zeros(6)
-        found = contact(arm, people, JointPath(period.q, period.qd, period.c, zero), human_q)
+        found = contact(arm, people, period.path, human_q)
         touches = recheck.first_contact(period.rows(SUBSTEPS)) is not None
         assert not (touches and found.kind == "none")
         verdicts.append((found.kind != "none", touches))
@@ -122,25 +126,21 @@ def test_standing_still_at_home_reports_no_contact_and_the_distance(cell: Cell) 
 def test_sweep_beside_walkers_is_never_later_than_poses_every_millisecond(cell: Cell) -> None:
     cell = with_people(cell, ("walker", "walker"))
     rng, robot, arm, people = np.random.default_rng(66), Robot(), arm_of(cell), people_of(cell)
-    no_worker, zero, verdicts = np.zeros((0, 18)), np.zeros(6), []
+    no_worker, verdicts = np.zeros((0, 18)), []
     for _ in range(300):
         period = Period(cell, rng, robot, 1.0)
         at = np.column_stack([rng.uniform(-0.9, 0.9, 2), rng.uniform(0.5, 1.6, 2)])
         before = np.column_stack([at, rng.uniform(0.2, 0.5, 2)])
         after = before + rng.uniform(-1.0, 1.0, (2, 3)) * [0.1, 0.1, 0.03]
-        found = contact(
-            arm,
-            people,
-            JointPath(period.q, period.qd, period.c, zero),
-            (no_worker, no_worker),
-            (before, after),
-        )
+        found = contact(arm, people, period.path, (no_worker, no_worker), (before, after))
         touches = False
         parts = np.linspace(0.0, 1.0, SUBSTEPS + 1)
         for part, q in zip(parts, period.rows(SUBSTEPS).q_robot, strict=True):
             free = clearance(arm, people, q, no_worker, before + part * (after - before))
             touches = touches or min(free.people_m, free.cell_m, free.self_m) <= 0.0
         assert not (touches and found.kind == "none")
+        if found.kind == "none":
+            assert found.clearance_m == pytest.approx(free.people_m, abs=1e-9)
         verdicts.append((found.kind != "none", touches))
     reported, touching = np.mean(verdicts, axis=0)
     assert 0.1 < touching <= reported < touching + 0.02
