@@ -132,7 +132,9 @@ def test_what_monitoring_executes_from_outside_the_limits_keeps_every_person_cle
         people = replace(no_people(), cylinders=np.array([place]))
         safe = layer.decide(q, qd, c, NONE, people)
         assert safe.stop_time == pytest.approx(float((np.abs(qd) / ARM.limits.qdd_max).max()))
-        assert safe.stop_distance >= 0.5 * safe.stop_time * float(np.abs(qd) @ ARM.lever) - 1e-9
+        assert safe.stop_distance == pytest.approx(
+            0.5 * safe.stop_time * float(np.abs(qd) @ ARM.lever)
+        )
         if safe.override == 0.0:
             continue
         admitted += 1

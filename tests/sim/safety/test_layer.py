@@ -7,7 +7,6 @@ import pytest
 
 from app.errors import InvalidInput, SimulationError
 from app.sim.collision.checker import capsule_shapes, no_people, shapes_of
-from app.sim.geometry.capsules import distances
 from app.sim.human.kernels import kinematics as body
 from app.sim.safety.decision import powers_of_time
 from app.sim.safety.layer import SafetyLayer, SafetySettings, safety_settings
@@ -125,12 +124,11 @@ def test_a_decision_names_person_part_link_and_distances():
     assert decision.person == 1
     assert decision.part is None
     assert decision.link in ("wrist_2_link", "wrist_3_link", "forearm_link", "wrist_1_link")
-    robot = np.empty(ARM.columns.shape[1])
-    distances(ball(tip).columns, 0, layer._space.columns[0], robot)
     assert 0.0 < decision.separation < 0.4
     assert decision.required > 0.54
     assert decision.lacking > 0.0
     assert decision.stop_time == pytest.approx(0.5 / 3.0)
+    assert decision.stop_distance == pytest.approx(0.5 * 0.5 / 3.0 * 0.5 * ARM.lever[0])
     assert decision.stop_distance >= 0.5 * lever * 0.5 / 6.0
 
 
@@ -190,6 +188,7 @@ def test_no_running_person_found_by_search_meets_a_robot_in_motion():
                 pose, speed = decision.at(q, qd, part * ARM.dt)
                 layer.decide(pose, NONE, NONE, NONE, ball(person + part * step))
                 gap = layer._space.gap[0].min()
+                assert np.isfinite([*pose, *speed, gap]).all()
                 if np.abs(speed).max() > 1e-6:
                     nearest = min(nearest, gap)
             q, qd, person = decision.q, decision.qd, person + step

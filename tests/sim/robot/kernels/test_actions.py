@@ -146,7 +146,7 @@ def worst_excess(one: Walk, limit: Limits) -> float:
         found.append(excess(q + x * (qd + x * (c + x * d)), limit.q_min, limit.q_max))
     x = np.where((still > 0) & (still < dt), still, 0.0)
     found.append(excess(qd + x * (2 * c + 3 * x * d), -limit.qd_max, limit.qd_max))
-    return max(found)
+    return float(np.max(found))  # NaN where one of them is
 
 
 def violations_and_empties(degree: int, n_steps: int) -> tuple[float, int, int]:
@@ -156,7 +156,7 @@ def violations_and_empties(degree: int, n_steps: int) -> tuple[float, int, int]:
     n_each = n_steps // (len(SETS) * len(PUSHES) * 2)
     for seed, (limit, kind, meaning) in enumerate(cases):
         one = walk(ActionRule(degree, VIABLE, meaning), limit, kind, n_each, seed)
-        worst = max(worst, worst_excess(one, limit))
+        worst = float(np.maximum(worst, worst_excess(one, limit)))
         n_empty, total = n_empty + one.n_empty, total + n_each
     return worst, n_empty, total
 
@@ -210,7 +210,8 @@ def test_no_limit_is_exceeded_from_states_that_are_just_viable(name: str, degree
         rule = ActionRule(degree, VIABLE, (SPEED, COEFFICIENT)[k % 2])
         kind = ("up", "down", "ends at random", "nearest limit")[k // 2 % 4]
         one = walk(rule, limit, kind, 12, k, just_viable(degree, limit, rng))
-        worst, n_empty = max(worst, worst_excess(one, limit)), n_empty + one.n_empty
+        worst = float(np.maximum(worst, worst_excess(one, limit)))
+        n_empty += one.n_empty
     assert worst <= TOLERANCE
     assert n_empty == 0
 
@@ -222,6 +223,7 @@ def test_the_measure_of_excess_sees_a_segment_that_leaves_its_limits_in_the_midd
     c, d = np.full((1, N), -2.0), np.zeros((1, N))
     # 0.69 + 0.5 x - 2 x^2 peaks at x = 0.125: 0.72125, with the limit at 0.7
     assert worst_excess(Walk(q, qd, c, d, 0), limit) == pytest.approx(0.02125)
+    assert np.isnan(worst_excess(Walk(q, qd, c, np.nan * d, 0), limit))
 
 
 @pytest.mark.parametrize("degree", [2, 3])
