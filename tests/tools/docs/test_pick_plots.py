@@ -18,11 +18,14 @@ def test_each_case_shows_the_values_of_both_goals_over_time() -> None:
 
 def test_the_reliability_diagram_shows_every_bin() -> None:
     result = read_result(RESULTS / "risk-calibration.json")
-    for view, row in zip(reliability(result).axes, result["results"], strict=False):
+    views = reliability(result).axes
+    assert len(views) >= len(result["results"])
+    for view, row in zip(views, result["results"], strict=False):
         assert view.get_title() == row["name"]
-        success = view.lines[0]
-        rates = [100.0 * one["rate"] for one in row["success"]["bins"]]
-        np.testing.assert_allclose(success.get_ydata(), rates)
+        for line, outcome in zip(view.lines, ("success", "contact"), strict=False):
+            bins = [(one["probability"], one["rate"]) for one in row[outcome]["bins"]]
+            np.testing.assert_allclose(line.get_xydata(), 100.0 * np.array(bins))
+            assert line.get_label() == outcome
 
 
 def test_the_page_shows_the_pictures() -> None:

@@ -3,11 +3,13 @@
 import json
 import re
 from pathlib import Path
+from string import Formatter
 
 import pytest
 
+from tests.tools.docs.test_people_plots import changed
 from tools.docs.results import RESULTS, read_result
-from tools.docs.world.page import PAGE, PICTURES, page, values
+from tools.docs.world.page import PAGE, PICTURES, TEMPLATE, page, values
 
 
 def test_page_is_what_the_results_give() -> None:
@@ -17,12 +19,19 @@ def test_page_is_what_the_results_give() -> None:
 def test_every_number_of_the_page_follows_the_results(tmp_path: Path) -> None:
     for path in RESULTS.glob("*.json"):
         (tmp_path / path.name).write_text(path.read_text(encoding="utf-8"), encoding="utf-8")
-    world = read_result(RESULTS / "world.json")
-    world["gap"]["links"]["mean_mm"], world["fast_hands"]["late"] = 77.7, 5
-    (tmp_path / "world.json").write_text(json.dumps(world), encoding="utf-8")
+    found = [read_result(RESULTS / f"{name}.json") for name in ("world", "sim-scaling")]
+    before, after = values(*found), values(*(others := [changed(one) for one in found]))
+    fields = Formatter().parse(TEMPLATE.read_text(encoding="utf-8"))
+    same = {
+        name
+        for _, name, form, _ in fields
+        if name and format(before[name], form or "") == format(after[name], form or "")
+    }
+    assert same == {"commit", "limits_cell", "visit_cell", "reach_cell"}
+    (tmp_path / "world.json").write_text(json.dumps(others[0]), encoding="utf-8")
     text = page(tmp_path)
-    assert "the difference is 77.7 mm on average" in " ".join(text.split())
-    assert "5 of these were reported later" in " ".join(text.split())
+    assert f"the difference is {after['gap_mean']:.1f} mm on average" in " ".join(text.split())
+    assert f"{after['hand_late']} of these were reported later" in " ".join(text.split())
 
 
 def test_page_shows_every_picture_and_no_other() -> None:
