@@ -1,6 +1,5 @@
 import sys
 import threading
-import time
 
 import pytest
 
@@ -9,6 +8,7 @@ from app.sim.mocap.read_options import ReadOptions
 from jobs import import_process
 from jobs.import_process import ImportProcess, import_here
 from tests.sim.recorded_person import bvh_text, csv_text, working
+from tests.support.waiting import wait_until
 
 CLIP = csv_text(working(100)).encode()
 ASKED = ("nod.csv", "nod", "a" * 64)
@@ -94,8 +94,7 @@ def test_stopping_ends_what_runs_and_refuses_more() -> None:
 
     thread = threading.Thread(target=ask)
     thread.start()
-    while not imports._running:
-        time.sleep(0.005)
+    wait_until(lambda: imports._running)
     imports.stop()
     thread.join(timeout=30.0)
     assert not thread.is_alive() and len(raised) == 1

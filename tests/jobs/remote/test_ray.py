@@ -7,7 +7,6 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from collections.abc import Iterator, Mapping
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
@@ -158,8 +157,7 @@ def test_stopped_server_keeps_the_last_step_and_a_killed_one_ends_its_worker(
         assert driver is not None and worker is not None
         jobs.request_cancel(store, job_id)
         os.kill(driver, signal.SIGKILL)
-        while process_of(job_id) == worker:
-            time.sleep(0.05)
+        wait_until(lambda: process_of(job_id) != worker)
         assert wait_until_final(store, job_id).state == "cancelled"
 
 
@@ -171,7 +169,6 @@ def test_job_without_a_free_processor_waits_and_says_so(
         job_id = train(store, **FIELDS)
         job = wait_for(store, job_id, lambda job: job.waiting is not None)
         assert (job.state, job.waiting) == ("running", "no free CPU in the Ray cluster")
-        while supervisor.waiting != job.waiting:
-            time.sleep(0.05)
+        wait_until(lambda: supervisor.waiting == job.waiting)
         jobs.request_cancel(store, job_id)
         assert wait_until_final(store, job_id).state == "cancelled"
