@@ -19,7 +19,8 @@ from tests.sim.recorded_person import CMU, bvh_text, csv_text, working
 from tests.sim.recorded_skeleton import Person, skeleton
 
 ROOT = Path(__file__).resolve().parents[3]
-CLIPS = sorted(Path(os.environ.get("MOCAP_CLIPS", ROOT.parent / "mocap")).glob("**/*.bvh"))
+FOLDER = Path(os.environ.get("MOCAP_CLIPS", ROOT.parent / "shared" / "mocap"))
+CLIPS = sorted(FOLDER.glob("**/*.bvh"))
 """Recorded clips, which are not part of the checkout; found beside it or where one says."""
 
 

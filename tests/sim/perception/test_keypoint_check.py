@@ -1,7 +1,5 @@
 """What passes as key-points: what is missing, what one point costs, who cannot stand here."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -10,12 +8,12 @@ from app.sim.human.kernels.kinematics import PELVIS_Z
 from app.sim.mocap.importer import read_motion
 from app.sim.perception.keypoint_check import check_keypoints
 from app.sim.perception.keypoints import BODY_25, K, keypoints_of
+from tests.sim.mocap.test_importer import CLIPS
 from tests.sim.postures import FRAMES, POSTURES, posture
 from tests.sim.tracked_person import CELL, seen, work
 
 FLOOR = CELL.floor_z
 NAN, INF = np.nan, np.inf
-CLIPS = sorted((Path(__file__).parents[4] / "shared" / "mocap").glob("*/*.bvh"))
 
 
 def person() -> np.ndarray:
