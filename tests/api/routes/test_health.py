@@ -9,6 +9,7 @@ import pytest
 from fastapi.testclient import TestClient
 
 from app.api.routes import health
+from app.api.schemas.examples import MOTION, PLAN, RISK_MAP, SORTING, TASK_SELECTION
 from app.errors import Conflict
 from app.live.commands import SetCandidates, SetPolicy
 from app.main import create_app
@@ -23,6 +24,14 @@ from web.viewer.loop import LiveCell
 
 SMALL = {"learning": {"n_envs": 8, "batch_size": 16}, "networks": {"width": 16}}
 """A training that begins and ends quickly; it is stopped long before its end."""
+DECISIONS = {
+    "/v1/motion": MOTION,
+    "/v1/plan": PLAN,
+    "/v1/risk-map": RISK_MAP,
+    "/v1/sorting": SORTING,
+    "/v1/task-selection": TASK_SELECTION,
+}
+"""Examples of requests by route."""
 
 
 def test_service_that_is_ready_says_so(client: TestClient) -> None:
@@ -38,10 +47,22 @@ def test_service_says_that_it_warms_up_and_then_decides(cold_app_settings: Setti
         assert "warming up" in first.json()["detail"]
         assert cold.get("/healthz").json() == {"status": "ok", "worlds": []}
         assert cold.get("/v1/worlds/main").status_code == 503
-        assert cold.post("/v1/task-selection", json={}).status_code in (422, 503)
         assert cold.get("/").status_code == 200
         wait_until_ready(cold)
         assert cold.get("/v1/worlds/main").status_code == 200
+        assert cold.post("/v1/task-selection", json=TASK_SELECTION).status_code == 200
+
+
+@pytest.mark.parametrize("path", DECISIONS)
+def test_decisions_are_refused_until_the_service_is_ready(
+    client: TestClient, monkeypatch: pytest.MonkeyPatch, path: str
+) -> None:
+    with monkeypatch.context() as cold:
+        cold.setattr(services_of(client).readiness, "ready", False)
+        refused = client.post(path, json=DECISIONS[path])
+        assert (refused.status_code, refused.headers.get("retry-after")) == (503, "2")
+        assert refused.json()["type"] == "urn:tandem:problem:not-ready"
+    assert client.post(path, json=DECISIONS[path]).status_code == 200
 
 
 class HangingPolicy(StraightPolicy):
