@@ -132,7 +132,9 @@ def test_people_are_stale_before_the_first_frame() -> None:
     assert known.estimates[0].flags == ("never-seen", "stale")
 
 
-def test_the_service_clock_never_runs_backwards_and_counts_a_suspended_machine() -> None:
-    times = [service_clock() for _ in range(1000)]
-    assert times == sorted(times)
-    assert times[-1] >= time.monotonic() - 1.0
+def test_the_service_clock_counts_the_time_of_a_suspended_machine(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(time, "CLOCK_BOOTTIME", 7, raising=False)  # Linux only
+    monkeypatch.setattr(time, "clock_gettime", {7: 77.0}.__getitem__)
+    assert service_clock() == 77.0

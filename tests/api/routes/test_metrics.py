@@ -1,5 +1,6 @@
 import re
 import shutil
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -21,17 +22,28 @@ def scrape(client: TestClient) -> dict[str, Any]:
     return {one.name: one for one in text_string_to_metric_families(answer.text)}
 
 
-def value(client: TestClient, name: str, **labels: str) -> float:
+def values(client: TestClient, name: str, labels: dict[str, str]) -> list[float]:
     family = name.removesuffix("_total").removesuffix("_count")
     samples = scrape(client)[family].samples
-    found = [s.value for s in samples if s.name == name and labels.items() <= s.labels.items()]
+    return [s.value for s in samples if s.name == name and labels.items() <= s.labels.items()]
+
+
+def value(client: TestClient, name: str, **labels: str) -> float:
+    """Return the sum of the samples with some labels, of which there is one at least."""
+    found = values(client, name, labels)
+    assert found, f"no sample of {name} with {labels}"
     return sum(found)
+
+
+def count(client: TestClient, name: str, **labels: str) -> float:
+    """Return the sum of the samples with some labels; 0 before the first."""
+    return sum(values(client, name, labels))
 
 
 def test_request_is_counted_by_route_method_and_status(client: TestClient) -> None:
     name = "tandem_request_duration_seconds_count"
     labels = {"method": "GET", "endpoint": "/v1/jobs/{job_id}", "status": "404"}
-    before = value(client, name, **labels)
+    before = count(client, name, **labels)
     client.get("/v1/jobs/none")
     client.get("/v1/jobs/nothing")
     assert value(client, name, **labels) == before + 2
@@ -65,9 +77,13 @@ def test_decisions_outside_the_training_range_are_counted_from_zero_on() -> None
         assert registry.get_sample_value(name, labels) == 0.0
 
 
-def test_live_world_is_read(client: TestClient) -> None:
+def test_live_world_is_read(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
+    handle = services_of(client).worlds["main"].handle
+    now = handle.snapshot()
+    slowed = replace(now, safety=replace(now.safety, override=0.375))
+    monkeypatch.setattr(handle, "snapshot", lambda: slowed)
     world = {"world": "main", "cell": "pick-and-place"}
-    assert 0.0 <= value(client, "tandem_live_override_ratio", **world) <= 1.0
+    assert value(client, "tandem_live_override_ratio", **world) == 0.375
     ticks = value(client, "tandem_live_tick_lateness_seconds_count", world="main")
     assert ticks > 0
     assert value(client, "tandem_ready") == 1.0
@@ -154,7 +170,7 @@ def test_space_of_the_data_folder_and_size_of_the_database_are_stated(
 def test_messages_on_a_socket_are_counted_with_their_wait(client: TestClient) -> None:
     name = "tandem_request_duration_seconds_count"
     labels = {"method": "MESSAGE", "endpoint": "/v1/motion/stream"}
-    before = value(client, name, **labels, status="422")
+    before = count(client, name, **labels, status="422")
     waits = value(client, "tandem_socket_wait_seconds_count")
     with client.websocket_connect(SOCKET) as socket:
         socket.send_json({"cell": "nothing"})
