@@ -238,7 +238,7 @@ def test_person_of_unknown_position_is_answered_and_stops_the_robot(
         ({"keypoints": POINTS, "q": WHOLE["q"]}, "people[0].qd", "is required"),
         ({"x": 0, "y": 1, "vx": 0, "vy": 0, "r": 0}, "people[0].r", "must be at least 0.01"),
         ({"x": 900, "y": 1, "vx": 0, "vy": 0, "r": 1}, "people[0].x", "must be at most"),
-        ({"tracker": "none", "person": 0}, "people[0].tracker", "no open tracker"),
+        ({"tracker": "none", "person": 0}, "people[0].tracker", "not an open tracker"),
         ({**WHOLE, "body": {"stature": 0}}, "people[0].body.stature", "must be at least"),
         ({**WHOLE, "body": {}, "size": [1] * 12}, "people[0].size", "left out"),
         ({**WHOLE, "size": [0] * 12}, "people[0].size[1]", "must lie in"),

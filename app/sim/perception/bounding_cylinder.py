@@ -34,7 +34,7 @@ GROWTH = 1.6
 """Speed at which the radius grows while nothing is seen and the hold time is over [m/s];
 walking speed of ISO 13855."""
 ABOVE_ROBOT = 5.0
-"""Height of the top of a person about whom nothing is known [m]."""
+"""Height of the top of an unknown person [m]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -26,7 +26,7 @@ def test_standing_robot_asks_for_what_a_person_covers_in_the_reaction_time() -> 
 
 def test_every_capsule_asks_for_what_the_safety_layer_tells_of_it() -> None:
     layer, rest, rng = SafetyLayer(ARM, SETTINGS), np.zeros(6), np.random.default_rng(3)
-    of_capsule, told = np.array(LINK_NAMES)[ARM.link], set[str]()
+    of_capsule, asked = np.array(LINK_NAMES)[ARM.link], set[str]()
     for q, qd in states(60):
         place = [*rng.uniform((-1.2, -1.0), (1.2, 1.6)), 0.1, rng.uniform(0.1, 1.8)]
         people = Shapes(columns=no_people().columns, cylinders=np.array([place]))
@@ -34,8 +34,8 @@ def test_every_capsule_asks_for_what_the_safety_layer_tells_of_it() -> None:
         _, terms = layer.terms(decision, qd, people)
         same = required_distances(ARM, SETTINGS, qd)[of_capsule == terms.link]
         np.testing.assert_allclose(same, terms.required, rtol=0.0, atol=1e-12)
-        told.add(terms.link)
-    assert len(told) >= 5
+        asked.add(terms.link)
+    assert len(asked) >= 5
 
 
 def reserves(q: np.ndarray, qd: np.ndarray, places: np.ndarray) -> np.ndarray:
