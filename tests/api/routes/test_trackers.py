@@ -158,7 +158,7 @@ def test_followed_people_can_be_named_in_a_decision(
     [
         ({"person": 3}, "people[0].person", "must be less than 2"),
         ({"t": 1e11}, "people[0].t", "must be at most"),
-        ({"tracker": "gone"}, "people[0].tracker", "no open tracker"),
+        ({"tracker": "gone"}, "people[0].tracker", "not an open tracker"),
     ],
 )
 def test_person_that_is_not_tracked_is_refused(
