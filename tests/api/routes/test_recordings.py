@@ -179,7 +179,7 @@ IN_RADIANS = csv_text(working(100), degrees=False).replace("radians", "degrees")
         (CLIP, "a.c3d", "file_name", "must end with .bvh, .mot, .sto, .csv"),
         (CLIP, "a", "file_name", "must end with"),
         (CLIP, "a.csv", "line 1", "lacks the columns pelvis_x"),
-        (UNDECLARED, "a.csv", "angles", "must be declared in the first line"),
+        (UNDECLARED, "a.csv", "angles", "must be declared in a comment"),
         (CLIP[: len(CLIP) // 2], "a.bvh", "line ", "must hold"),
         (CLIP[:400], "a.bvh", "line ", "has no line MOTION"),
         (TWICE, "a.bvh", "frames, last line ", "must be the 300 that the head"),

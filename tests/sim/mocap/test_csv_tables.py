@@ -33,7 +33,7 @@ def test_columns_may_stand_in_any_order_and_carry_the_pelvis_height() -> None:
 @pytest.mark.parametrize(
     ("old", "new", "text"),
     [
-        ("# angles = degrees\n", "", "angles must be declared in the first line"),
+        ("# angles = degrees\n", "", "angles must be declared in a comment"),
         ("= degrees", "= gradians", "angles = 'gradians' must be declared"),
         ("= degrees", "= radians", "looks like degrees"),
         ("elbow_r", "elbow", "line 2 lacks the columns elbow_r"),
