@@ -71,6 +71,18 @@ def test_a_hand_over_the_cube_breaks_the_pick_off_and_it_stays_a_candidate(
     assert [one.id for one in after.candidates] == ["cube2"]
 
 
+def test_a_descent_that_is_left_for_another_cube_counts_as_broken_off(
+    world: LivePickWorld, cell: Cell
+) -> None:
+    world.apply(commands.SetCandidates(ids=("cube2", "cube4")))
+    first = until(world, "picking").chosen
+    x, y, z = cell.station(first).position
+    world.apply(commands.MovePerson(pelvis=(x, 1.15, -1.57), right=(x, y + 0.18, z + 0.1)))
+    after = until(world, "moving")
+    assert after.chosen != first
+    assert (after.counters.switches, after.counters.broken_off) == (1, 1)
+
+
 def test_contacts_are_counted_apart_while_the_robot_is_at_rest(world: LivePickWorld) -> None:
     world.apply(commands.SetCandidates(ids=()))
     x, y, z = world.snapshot().tcp
