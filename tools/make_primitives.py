@@ -28,6 +28,7 @@ from app.sim.core.arrays import Vec
 from app.sim.human import model as human
 from app.sim.human.anthropometry import percentile_body
 from app.sim.primitives import promp
+from app.sim.primitives.kernels.primitives import N_BASIS
 from app.sim.primitives.keyframes import STYLES
 from app.sim.primitives.library_file import (
     FILE,
@@ -75,7 +76,7 @@ def make_primitive(
         motions.append(motion)
         paths.append(q)
     durations = np.array([one.duration_s for one in motions])
-    phi = promp.basis(PHASES, promp.N_BASIS, promp.usual_width(promp.N_BASIS))
+    phi = promp.basis(PHASES, N_BASIS, promp.usual_width(N_BASIS))
     weights = np.array([promp.weights_of(q, phi) for q in paths])
     left = np.array(paths) - phi @ np.swapaxes(weights, 1, 2)
     return TaskPrimitive(
@@ -148,7 +149,7 @@ def main() -> None:
         **({"elbow_spread": elbow_spread} if elbow_spread else {}),
         "styles": [style.name for style in STYLES],
         "percentiles": {name: list(PERCENTILES) for name in ("stature", "arms", "shoulders")},
-        "basis": {"n": promp.N_BASIS, "ridge": promp.RIDGE},
+        "basis": {"n": N_BASIS, "ridge": promp.RIDGE},
     }
     write_primitives(FILE, made, about)
     logger.info("%d primitives, %.1f MB", len(made), FILE.stat().st_size / 1e6)

@@ -97,10 +97,10 @@ def require_named(body: AnySpec, new: NewJob, services: Services) -> None:
 
 def _shipped_of(body: AnySpec, new: NewJob) -> set[str]:
     """Return the aliases of the shipped checkpoints that a job needs."""
-    needed = {new.spec.get("checkpoint")}
+    needed: set[str | None] = {new.spec.get("checkpoint")}
     if isinstance(body, ReportSpec) and body.measure:
         needed = {checkpoint for _, checkpoint in evaluations().values()}
-    return needed.intersection(pretrained.ALIASES)
+    return {alias for alias in needed if alias in pretrained.ALIASES}
 
 
 def queued(

@@ -11,6 +11,7 @@ from app.sim.cells.cell import Cell
 from app.sim.core.arrays import Vec
 from app.sim.human import model as human
 from app.sim.primitives import promp
+from app.sim.primitives.kernels.primitives import N_BASIS
 from app.sim.primitives.keyframes import height_over_table
 from app.sim.primitives.primitive_library import MotionLibrary
 
@@ -88,7 +89,7 @@ def random_segment(
     keyframes = [int(one + rng.integers(some)) for one, some in ranges]
     sample = int(first + rng.integers(count))
     weights = segment_weights(library, primitive, sample, library.keyframes.postures[keyframes])
-    phi = promp.basis(PHASES, promp.N_BASIS, promp.usual_width(promp.N_BASIS))
+    phi = promp.basis(PHASES, N_BASIS, promp.usual_width(N_BASIS))
     q = phi @ weights.T
     size = library.bodies[person]
     rows = [human.joint_points(row, size) for row in np.clip(q, human.Q_MIN, human.Q_MAX)]
@@ -115,6 +116,6 @@ def segment_weights(library: MotionLibrary, primitive: int, sample: int, ends: V
         ends: Joint positions at both ends [m, rad], shape (2, 18).
     """
     drawn = library.samples[sample]
-    phi = promp.basis(np.array([0.0, 1.0]), promp.N_BASIS, promp.usual_width(promp.N_BASIS))
+    phi = promp.basis(np.array([0.0, 1.0]), N_BASIS, promp.usual_width(N_BASIS))
     missing = (ends - phi @ drawn.T).ravel()
     return np.asarray(drawn + (library.gain[primitive] @ missing).reshape(drawn.shape))

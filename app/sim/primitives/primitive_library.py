@@ -30,6 +30,7 @@ from app.sim.core.arrays import Vec
 from app.sim.human import model as human
 from app.sim.human.anthropometry import BodySize, percentile_body
 from app.sim.primitives import promp
+from app.sim.primitives.kernels.primitives import N_BASIS
 from app.sim.primitives.keyframes import Index, PostureLibrary, draw_keyframe, draw_postures
 from app.sim.primitives.library_file import (
     HOME,
@@ -171,7 +172,7 @@ def draw_samples(found: TaskPrimitive, n: int, rng: np.random.Generator) -> Vec:
     Draws beyond the limits are rejected. Those missing after ROUNDS, of no shipped primitive,
     are demonstrations.
     """
-    phi = promp.basis(GRID, promp.N_BASIS, promp.usual_width(promp.N_BASIS))
+    phi = promp.basis(GRID, N_BASIS, promp.usual_width(N_BASIS))
     kept: list[Vec] = []
     for _ in range(ROUNDS):
         drawn = promp.draw_like(found.weights, n, rng)

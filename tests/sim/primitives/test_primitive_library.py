@@ -8,6 +8,7 @@ from app.sim.cells.cell import Cell, load_cell
 from app.sim.human import model as human
 from app.sim.human.anthropometry import BodySize
 from app.sim.primitives import primitive_library, promp
+from app.sim.primitives.kernels.primitives import N_BASIS
 from app.sim.primitives.library_file import load_primitives, primitive_for, segments_of
 from app.sim.primitives.primitive_library import (
     BODIES,
@@ -105,8 +106,8 @@ def test_gains_are_tame(library: MotionLibrary) -> None:
 def test_gain_leaves_the_sample_free_where_it_already_meets_the_nodes(
     library: MotionLibrary,
 ) -> None:
-    phi = promp.basis(np.array([0.0, 1.0]), promp.N_BASIS, promp.usual_width(promp.N_BASIS))
-    rows = np.kron(np.eye(18), phi[:, None, :]).reshape(2, 18, 18 * promp.N_BASIS)
+    phi = promp.basis(np.array([0.0, 1.0]), N_BASIS, promp.usual_width(N_BASIS))
+    rows = np.kron(np.eye(18), phi[:, None, :]).reshape(2, 18, 18 * N_BASIS)
     for gain in library.gain[::9]:
         np.testing.assert_allclose(rows.reshape(36, -1) @ gain, np.eye(36), atol=1e-6)
 
@@ -150,9 +151,7 @@ def test_keyframes_are_inside_the_limits(library: MotionLibrary) -> None:
 
 
 def test_samples_keep_the_joint_limits(library: MotionLibrary) -> None:
-    phi = promp.basis(
-        np.linspace(0.0, 1.0, 61), promp.N_BASIS, promp.usual_width(promp.N_BASIS)
-    )
+    phi = promp.basis(np.linspace(0.0, 1.0, 61), N_BASIS, promp.usual_width(N_BASIS))
     q = phi @ np.swapaxes(library.samples, 1, 2)
     assert np.maximum(human.Q_MIN - q, q - human.Q_MAX).max() < 1e-3
 
