@@ -92,7 +92,7 @@ tables: $(VENV)/dev.stamp ## write the tables, figures and report of the documen
 	@$(PY) -m tools.docs.reach.ssm_plots
 	@$(PY) -m tools.docs.sorting.plots
 	@$(PY) -m tools.docs.recipe_plots
-	@$(PY) -m app report
+	@$(PY) -m app report --quick
 
 world: $(VENV)/dev.stamp ## measure, draw and write docs/world.md
 	@$(PY) -m tools.docs.world.page

@@ -77,5 +77,5 @@ def set_up(style: Style, **fields: object) -> None:
     handler = logging.StreamHandler(sys.stderr)
     handler.setFormatter(LineFormatter(style, **fields))
     logging.basicConfig(level=logging.INFO, handlers=[handler], force=True)
-    for chatty in ("alembic", "websockets", "uvicorn"):
+    for chatty in ("alembic", "websockets", "uvicorn", "httpx"):
         logging.getLogger(chatty).setLevel(logging.WARNING)

@@ -20,6 +20,7 @@ preflight       Checks before the server loads anything else: its port and its d
 recordings      The command group ``recordings``: import, list, show and remove recorded human
                 motion
 report          The command ``report``: tables and figures of the thesis beside the results
+report_job      The report whose evaluations a running server measures again
 serve           The commands ``serve`` and ``setup``
 socket_limits   Limits of WebSocket connections: time for a client that does not read
 train           The command ``train``: train a policy in this process, without a server

@@ -1,6 +1,5 @@
 """Requests of a worker to the service; problems become the errors of the store."""
 
-import logging
 import time
 from collections.abc import Mapping
 from typing import Any
@@ -11,8 +10,6 @@ import httpx
 from app.errors import ServiceError
 from app.storage_errors import ServerUnreachable, StaleAttempt, StorageFull
 from app.store.records import Claim
-
-logging.getLogger("httpx").setLevel(logging.WARNING)  # it logs every request
 
 TIMEOUT_S = 120.0
 """Time limit of an answer; the largest file is committed within seconds [s]."""

@@ -58,13 +58,13 @@ def test_without_results_everything_is_not_measured_and_commands_are_named(tmp_p
 
 def test_the_command_writes_the_page_and_says_what_is_missing(tmp_path: Path, capsys):
     out = tmp_path / "sub" / "report.md"
-    assert main(["report", "--output", str(out), "--json"]) == 0
+    assert main(["report", "--quick", "--output", str(out), "--json"]) == 0
     assert out.read_text(encoding="utf-8") == PAGE.read_text(encoding="utf-8")
     assert json.loads(capsys.readouterr().out)["page"] == str(out)
 
 
 def test_a_folder_that_is_not_there_is_refused(tmp_path: Path, capsys):
-    assert main(["report", "--results", str(tmp_path / "none")]) == 2
+    assert main(["report", "--quick", "--results", str(tmp_path / "none")]) == 2
     assert "must be a folder of result files" in capsys.readouterr().err
 
 
@@ -72,13 +72,31 @@ def test_a_folder_that_is_not_there_is_refused(tmp_path: Path, capsys):
 def test_a_file_that_holds_no_result_is_named(tmp_path: Path, content: str, capsys):
     path = tmp_path / "pick-single.json"
     path.write_bytes(content.encode(errors="surrogateescape"))
-    assert main(["report", "--results", str(tmp_path), "--output", str(tmp_path / "a")]) == 2
+    assert (
+        main(["report", "--quick", "--results", str(tmp_path), "--output", str(tmp_path / "a")])
+        == 2
+    )
     said = capsys.readouterr().err
     assert f"results = '{path}' is not a result file" in said and "Traceback" not in said
 
 
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (["--quick", "--episodes", "5"], "--episodes = 5 must be left out with --quick"),
+        (["--results", "{folder}"], "--results = '{folder}' needs --quick"),
+    ],
+)
+def test_options_that_the_report_does_not_take_are_refused(
+    options: list[str], said: str, tmp_path: Path, capsys
+):
+    words = [one.format(folder=tmp_path) for one in options]
+    assert main(["report", *words, "--output", str(tmp_path / "a")]) == 2
+    assert said.format(folder=tmp_path) in capsys.readouterr().err
+
+
 def test_a_page_that_cannot_be_written_is_refused(tmp_path: Path, capsys):
-    assert main(["report", "--output", str(tmp_path)]) == 2
+    assert main(["report", "--quick", "--output", str(tmp_path)]) == 2
     assert f"--output = '{tmp_path}' cannot be written: Is a dir" in capsys.readouterr().err
 
 
