@@ -119,7 +119,7 @@ def test_training_form_offers_cells_once_there_is_a_choice(
 
 def test_job_in_a_cell_that_cannot_be_trained_in_is_refused(client: TestClient) -> None:
     for name, rule in (
-        ("kitchen", "no known"),
+        ("kitchen", "is not a known"),
         ("sorting-e0", "cannot be trained in"),
         (3, ""),
     ):
