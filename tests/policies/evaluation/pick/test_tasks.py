@@ -159,9 +159,8 @@ def test_people_at_rest_do_not_move_and_timeouts_have_their_causes():
     kinds = ("library", "off-task", "reaches", "stops", "works")
     names = [name for kind in kinds for name in (kind, f"{kind}, planner")]
     assert [row["name"] for row in result["results"]] == names
-    assert [one["hand_moving_share"] > 0.1 for one in result["settings"].values()] == [
-        kind in ("stops", "works") for kind in kinds
-    ]
+    moves = ["hand_moving_share" in one for one in result["settings"].values()]
+    assert moves == [kind in ("stops", "works") for kind in kinds]
     for row in result["results"]:
         assert row["timeout_blocked"]["mean"] <= row["timeout"]["mean"]
         assert row["timeout_alone"]["mean"] <= row["timeout"]["mean"]
