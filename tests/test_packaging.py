@@ -16,6 +16,7 @@ ROOT = Path(__file__).resolve().parent.parent
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 ROOTS = ("app", "jobs", "web")
 EXTRAS = {
+    "app/cli/report_job.py": "client",
     "app/client/transport.py": "client",
     "app/policies/inference/onnx_export.py": "onnx",
     "jobs/remote/connection.py": "ray",
