@@ -5,6 +5,7 @@ Numbers come from ``docs/results/*.json``; baselines of the thesis are constants
 
 from pathlib import Path
 
+from app.policies.evaluation.reach.ssm import DIRECTED
 from tools.docs.results import Json, read_if_measured
 
 FILES = (
@@ -16,8 +17,6 @@ FILES = (
     "sorting-grid-e1",
     "safety-ssm",
 )
-DIRECTED = "-directed"
-"""Suffix of the rows of ``reach-ssm`` under the layer with measured velocities."""
 THESIS = {
     "pick-single": "75 % (arrival)",
     "pick-choice": "about 90 % (arrival)",

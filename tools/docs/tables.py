@@ -3,10 +3,11 @@
     python -m tools.docs.tables
 
 A page contains the table of ``docs/results/NAME.json`` between ``<!-- begin NAME -->`` and
-``<!-- end NAME -->``. The JSON file is the output of ``python -m app evaluate NAME --json``, of
-``python -m app bench NAME --json``, or of the script named in its ``command``. Sections of
-results without rows are written by other scripts. A section without a result file is left
-unchanged and reported by a test. A second test compares pages and results.
+``<!-- end NAME -->``; ``NAME-directed`` is the table of its rows whose names end so. The JSON
+file is the output of ``python -m app evaluate NAME --json``, of ``python -m app bench NAME
+--json``, or of the script named in its ``command``. Sections of results without rows are
+written by other scripts. A section without a result file is left unchanged and reported by a
+test. A second test compares pages and results.
 """
 
 import re
@@ -14,6 +15,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from app.policies.evaluation.reach.ssm import DIRECTED
 from app.policies.report.commands import command_of
 from tools.arguments import parser_of
 from tools.docs import headline, pick_seeds, pick_tables
@@ -50,11 +52,11 @@ def render(text: str, results: Path) -> str:
         if match[2] in MULTI_RESULT_TABLES:
             lines = MULTI_RESULT_TABLES[match[2]](results)
             return match[0] if lines is None else f"{match[1]}{_table(lines)}\n{match[3]}"
-        path = results / f"{match[2].removesuffix(reach_tables.DIRECTED)}.json"
+        path = results / f"{match[2].removesuffix(DIRECTED)}.json"
         found = read_if_measured(path)
         if found is None or "results" not in found:
             return match[0]
-        found = reach_tables.part_of(found, directed=match[2].endswith(reach_tables.DIRECTED))
+        found = reach_tables.part_of(found, directed=match[2].endswith(DIRECTED))
         others = reach_tables.siblings(path) if reach_tables.is_reach(found) else []
         return f"{match[1]}{table(found, others)}\n{match[3]}"
 

@@ -2,7 +2,7 @@ from pathlib import Path
 
 import pytest
 
-from tools.docs.reach.tables import DIRECTED
+from app.policies.evaluation.reach.ssm import DIRECTED
 from tools.docs.results import ROOT
 from tools.docs.tables import (
     BLOCK,

@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from app.policies.evaluation.reach.ssm import DIRECTED
 from tools.docs.results import Json, read_result
 
 RATES = {
@@ -91,8 +92,6 @@ COLUMNS: Mapping[str, Mapping[str, str]] = {
     },
 }
 """Measures of each evaluation and their column headers."""
-DIRECTED = "-directed"
-"""Suffix of a table and of its rows in which the safety layer uses measured velocities."""
 INSTEAD = {"arrived": "success"}
 """Measure to show where a row lacks the first one."""
 TURNED = frozenset({"reach-smoothness"})
