@@ -29,7 +29,6 @@ from app.policies.inference.rollout import (
     ssm_constraint_of,
 )
 from app.policies.inference.target_interpolation import Interpolation, interpolates
-from app.sim.cell_validation.reachability import LONGEST_REACH, SHOULDER
 from app.sim.cells.cell import Cell, require_cell
 from app.sim.collision.checker import Shapes
 from app.sim.core.arrays import Vec
@@ -62,13 +61,13 @@ from app.sim.robot.kernels import actions
 from app.sim.robot.kernels.joints import JointState
 from app.sim.robot.measured_state import MeasuredState, StateLimits, returning
 from app.sim.robot.trajectory_segment import TrajectorySegment
+from app.sim.robot.ur10 import reach_of
 from app.sim.safety.decision import SafetyDecision, SeparationTerms
 from app.sim.safety.layer import SafetyLayer, SafetySettings
 from app.sim.scene.scene import FAR_AWAY, arm_of, people_of
 
 _FAR = np.full(3, 10.0)
 _WHOLE = np.ones(1)
-_SHOULDER = tuple(map(float, SHOULDER))
 Monitored = tuple[SafetyDecision | None, int | None, SeparationTerms | None]
 """Decision of the safety layer, index of the decisive person, and terms of S_p."""
 
@@ -98,8 +97,8 @@ class MotionDecider:
         self._improvements: dict[QueryState, RolloutImprovement] = {}
         self._layer = SafetyLayer(self.arm, SafetySettings())
         self._busy = threading.Lock()
-        self._longest = LONGEST_REACH + max(self.arm.lengths.tool - 0.12, 0.0)
-        """Reach of the arm [m]."""
+        self._shoulder, self._longest = reach_of(self.arm.lengths)
+        """Centre [m], shape (3,), and length [m] of the arm's reach."""
 
     @property
     def checkpoint(self) -> str:
@@ -163,7 +162,7 @@ class MotionDecider:
             terms_of=terms_of,
             clearance=(clearance[0], clearance[1], clearance[2]),
             distance=distance,
-            beyond_reach=max(0.0, math.dist(point, _SHOULDER) - self._longest),
+            beyond_reach=max(0.0, math.dist(point, self._shoulder) - self._longest),
             state_outside=robot.outside,
             outside=outside,
             checkpoint=self.checkpoint,

@@ -17,14 +17,10 @@ from app.sim.collision.fcl_reference import make_capsule, obstacle_box, place_ca
 from app.sim.core.arrays import Vec
 from app.sim.robot.capsules import load_robot_capsules, self_pairs
 from app.sim.robot.inverse_kinematics import configuration_at
-from app.sim.robot.ur10 import Robot
+from app.sim.robot.ur10 import LINK_NAMES, Robot, reach_of
 
-SHOULDER_LINK = 1
+SHOULDER_LINK = LINK_NAMES.index("shoulder_link")
 """Links up to this one (base, shoulder) stand on the table and never leave it."""
-LONGEST_REACH = 1.45
-"""No point of the robot is farther from its base than this, with a tool of 0.12 m [m]."""
-SHOULDER = np.array([0.0, 0.0, 0.1273])
-"""Centre of the reach [m]."""
 N_STARTS = 16
 """Random starts of a search."""
 
@@ -77,7 +73,7 @@ class Reach:
         self._boxes = {one.id: obstacle_box(one) for one in cell.obstacles}
         self._q_min, self._q_max = np.array(mount.q_min), np.array(mount.q_max)
         self._home = np.array(mount.home_q)
-        self._longest = LONGEST_REACH + max(mount.tool_length - 0.12, 0.0)
+        self._shoulder, self._longest = reach_of(self._robot.lengths())
 
     def contacts(self, q: Vec) -> Iterator[ContactPair]:
         """Yield the contacts of the robot at joint positions ``q`` [rad], shape (6,)."""
@@ -117,7 +113,7 @@ class Reach:
 
     def any_configuration(self, point: Vec) -> ReachResult:
         """Find any configuration with the tcp at ``point`` [m], shape (3,)."""
-        if np.linalg.norm(point - SHOULDER) > self._longest:
+        if np.linalg.norm(point - self._shoulder) > self._longest:
             return ReachResult(q=None, reason="it is farther than the arm is long")
         down = self.tool_down(point)
         if down.q is not None:

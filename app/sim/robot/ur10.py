@@ -4,6 +4,7 @@ The model is example-robot-data's ``ur10_robot.urdf`` with a tool along ``tool0`
 tcp is its tip. Create one :class:`Robot` per thread: Pinocchio's data objects are not shared.
 """
 
+import math
 from pathlib import Path
 
 import numpy as np
@@ -43,6 +44,18 @@ def package_dir() -> Path:
 def urdf_path() -> Path:
     """Return the UR10's URDF."""
     return package_dir() / "example-robot-data/robots/ur_description/urdf/ur10_robot.urdf"
+
+
+def reach_of(lengths: kinematics.LinkLengths) -> tuple[Vec, float]:
+    """Return centre [m], shape (3,), and radius [m] of the sphere that the tcp can reach.
+
+    The tcp lies on it where the elbow is straight and the line from wrist 2 to the tcp points
+    away from the shoulder; joint limits and collisions are not considered.
+    """
+    lateral = lengths.shoulder_offset + lengths.elbow_offset + lengths.wrist_1_offset
+    arm = math.hypot(lengths.upper_arm + lengths.forearm, lateral)
+    hand = math.hypot(lengths.wrist_2_length, lengths.flange + lengths.tool)
+    return np.array([0.0, 0.0, lengths.base_height]), arm + hand
 
 
 class Robot:

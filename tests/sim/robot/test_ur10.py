@@ -6,7 +6,7 @@ import pytest
 
 from app.sim.cells.cell import load_cell
 from app.sim.robot.kernels import kinematics
-from app.sim.robot.ur10 import LINK_NAMES, Robot, urdf_path
+from app.sim.robot.ur10 import LINK_NAMES, Robot, reach_of, urdf_path
 
 
 @pytest.fixture(scope="module")
@@ -59,6 +59,17 @@ def test_tool0_at_zero_is_where_the_urdf_says(robot: Robot) -> None:
     np.testing.assert_allclose(
         robot.tcp_pose(np.zeros(6))[:3, 3], tip[:3, 3] + 0.12 * tip[:3, 2], atol=1e-9
     )
+
+
+@pytest.mark.parametrize("tool", [0.0, 0.12, 0.4])
+def test_reach_is_the_largest_distance_of_the_tcp_from_the_shoulder(tool: float) -> None:
+    robot = Robot(tool)
+    center, radius = reach_of(robot.lengths())
+    wrists = np.linspace(-np.pi, np.pi, 60)
+    stretched = [np.array([0.0, 0.0, 0.0, a, b, 0.0]) for a in wrists for b in wrists]
+    found = [robot.tcp_pose(q)[:3, 3] for q in [*postures(500), *stretched]]
+    distances = np.linalg.norm(np.array(found) - center, axis=1)
+    assert radius - 1e-3 < distances.max() <= radius + 1e-9
 
 
 def test_link_names_are_frames_of_the_urdf() -> None:
