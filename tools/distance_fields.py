@@ -14,8 +14,8 @@ import numpy as np
 from scipy.ndimage import gaussian_filter, map_coordinates
 from skimage.measure import marching_cubes
 
+from app.sim.core.arrays import Vec
 from web.viewer.people.mannequin import Surface
-from web.viewer.poses import Vec
 
 Field = Callable[[Vec], Vec]
 """Maps points (..., 3) [m] to distances [m]; negative inside."""

@@ -8,11 +8,11 @@ Requires the development extras (scipy, scikit-image).
 
 import numpy as np
 
+from app.sim.core.arrays import Vec
 from tools.arguments import parser_of
 from tools.distance_fields import Cone, Grid, mirrored, smooth_min
 from web.viewer.people import skeleton
 from web.viewer.people.mannequin import Surface, save
-from web.viewer.poses import Vec
 
 Point = tuple[float, float, float]
 

@@ -8,15 +8,15 @@ export const GOALS = [
 ];
 const IDLE = "rgb(196 202 210)";
 
-/** Colours of the people's vests, by id; the same as VESTS in web/viewer/people/mannequin.py. */
+/** Colours of the people's vests, by id; the same as VESTS in app/sim/cells/colours.py. */
 export const VESTS = ["rgb(255 116 32)", "rgb(196 214 48)", "rgb(72 164 232)", "rgb(232 104 168)"];
 
-/** Colours of sorted blocks, and of what is written on them; as BLOCKS in web/viewer/scene/sorting_bodies.py. */
+/** Colours of sorted blocks, and of what is written on them; as BLOCKS in app/sim/cells/colours.py. */
 export const BLOCKS = { red: "rgb(205 58 62)", green: "rgb(112 184 92)", blue: "rgb(52 104 196)" };
 const DARK_INK = "rgb(15 21 26)";
 export const BLOCK_INK = { red: "white", green: DARK_INK, blue: "white" };
 
-/** Chance that a grasp fails -> colour of its clutter slot; as FAILURES in web/viewer/scene/sorting_bodies.py. */
+/** Chance that a grasp fails -> colour of its clutter slot; as FAILURES in app/sim/cells/colours.py. */
 const FAILURES = [
   [0.0, [240, 237, 229]],
   [0.2, [243, 217, 164]],
@@ -41,7 +41,7 @@ export function overrideColour(override) {
   return along(OVERRIDES, override);
 }
 
-/** Colour of a cell where grasps fail with this chance, and of what is written on it. */
+/** Colour of a slot where grasps fail with this chance, and of what is written on it. */
 export function failureColours(chance) {
   const ink = chance < LIGHT_ON_FAILURE ? DARK_INK : "white";
   return { background: along(FAILURES, chance), ink };

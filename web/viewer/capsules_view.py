@@ -7,7 +7,8 @@ import trimesh
 import viser
 from trimesh.geometry import align_vectors
 
-from web.viewer.poses import Vec, orientation
+from app.sim.core.arrays import Vec
+from web.viewer.poses import orientation
 
 STIFF_M = 1e-3
 """Largest change of a capsule's length that is not shown [m]."""

@@ -7,10 +7,9 @@ Tandem represents poses by homogeneous matrices. viser expects quaternions as w,
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-Vec = NDArray[np.float64]
+from app.sim.core.arrays import Vec
 
 
 def orientation(rotation: Vec) -> Vec:

@@ -12,7 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from app.sim.envs.solids import Floats, Rgb, Solid, dot, single
+from app.sim.cells.colours import Rgb
+from app.sim.envs.solids import Floats, Solid, dot, single
 
 Image = NDArray[np.uint8]
 """Rows from the top, columns from the left, red, green, blue."""

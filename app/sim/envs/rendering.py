@@ -6,11 +6,32 @@ from functools import lru_cache
 import numpy as np
 
 from app.sim.cells.cell import Cell
+from app.sim.cells.colours import (
+    ALUMINIUM,
+    BLOCKS,
+    FAILURES,
+    GLOVE,
+    JACKET,
+    JOINT,
+    OBSTACLE,
+    ROBOT_PLATE,
+    SKIN,
+    TABLE_EDGE,
+    TABLE_FRAME,
+    TABLE_TOP,
+    TARGET,
+    TOOL,
+    TRAY,
+    TROUSERS,
+    VESTS,
+    Rgb,
+    blend,
+)
 from app.sim.cells.parts import Station, TableGeometry
 from app.sim.cells.support import support_height
 from app.sim.core.arrays import Vec, as_kernel_array
 from app.sim.envs.raycast import Image, Point, Raycaster
-from app.sim.envs.solids import Box, Capsule, Cylinder, Rgb, Solid
+from app.sim.envs.solids import Box, Capsule, Cylinder, Solid
 from app.sim.geometry.capsules import RADIUS, ends_of
 from app.sim.human import model as human
 from app.sim.human.kernels import kinematics as body
@@ -25,30 +46,9 @@ from app.sim.sorting.state import NULL, SortingShape, SortingState
 WIDTH, HEIGHT = 480, 360
 """Size of the images [px]."""
 
-TOP: Rgb = (236, 233, 226)
-EDGE: Rgb = (172, 142, 108)
-FRAME: Rgb = (178, 184, 191)
-PLATE: Rgb = (96, 103, 112)
-OBSTACLE: Rgb = (150, 158, 168)
-ALUMINIUM: Rgb = (205, 209, 214)
-JOINT: Rgb = (88, 152, 196)
-TOOL: Rgb = (255, 138, 52)
 STATION: Rgb = (150, 164, 182)
-TARGET: Rgb = (11, 127, 119)
-TRAY: Rgb = (206, 210, 214)
-CYLINDERS: tuple[Rgb, ...] = ((255, 116, 32), (196, 214, 48), (72, 164, 232), (232, 104, 168))
-"""Colours of cylinders and of workers' vests, in order."""
-BLOCKS: dict[str, Rgb] = {"red": (205, 58, 62), "green": (112, 184, 92), "blue": (52, 104, 196)}
-UNNAMED: tuple[Rgb, ...] = ((205, 58, 62), (112, 184, 92), (52, 104, 196), *CYLINDERS[:2])
+UNNAMED: tuple[Rgb, ...] = (*BLOCKS.values(), *VESTS[:2])
 """Colours of towers without a named colour."""
-FAILURES: tuple[Rgb, Rgb] = ((240, 237, 229), (176, 108, 48))
-"""Colours of clutter slots with failure rates 0 and MOST_FAILURE."""
-MOST_FAILURE = 0.7
-
-SKIN: Rgb = (214, 164, 134)
-TROUSERS: Rgb = (44, 53, 70)
-SLEEVE: Rgb = (58, 70, 92)
-GLOVE: Rgb = (247, 189, 74)
 _JOINTS = ("shoulder", "upper_arm_low", "forearm_low", "wrist_1", "wrist_2")
 _VEST = (body.C_ABDOMEN, body.C_CHEST)
 _PARTS = {
@@ -86,7 +86,7 @@ def picture(cell: Cell, robot_q: Vec, people: Sequence[Solid], task: Sequence[So
 def _static_solids(cell: Cell) -> tuple[Solid, ...]:
     """Return table, robot plate, obstacles and the objects at pick stations."""
     solids: list[Solid] = [*_table_solids(cell.table)]
-    solids.append(Box(center=(0, 0, 0.004), half_size=(0.15, 0.15, 0.004), colour=PLATE))
+    solids.append(Box(center=(0, 0, 0.004), half_size=(0.15, 0.15, 0.004), colour=ROBOT_PLATE))
     for box in cell.obstacles:
         half = box.half_size
         solids.append(Box(center=box.center, half_size=half, yaw=box.yaw, colour=OBSTACLE))
@@ -104,11 +104,11 @@ def _table_solids(table: TableGeometry) -> list[Solid]:
     half = (0.5 * (table.x_max - table.x_min), 0.5 * (table.y_max - table.y_min))
     middle, thick = (x, y, -0.5 * table.thickness), 0.5 * table.thickness
     solids: list[Solid] = [
-        Box(center=middle, half_size=(*half, thick), colour=TOP),
+        Box(center=middle, half_size=(*half, thick), colour=TABLE_TOP),
         Box(
             center=middle,
             half_size=(half[0] + 0.003, half[1] + 0.003, 0.7 * thick),
-            colour=EDGE,
+            colour=TABLE_EDGE,
         ),
     ]
     length = 0.5 * (table.height - table.thickness)
@@ -116,7 +116,9 @@ def _table_solids(table: TableGeometry) -> list[Solid]:
         for sy in (-1.0, 1.0):
             at = (x + sx * (half[0] - 0.11), y + sy * (half[1] - 0.11))
             foot = (*at, -table.thickness - length)
-            solids.append(Box(center=foot, half_size=(0.035, 0.035, length), colour=FRAME))
+            solids.append(
+                Box(center=foot, half_size=(0.035, 0.035, length), colour=TABLE_FRAME)
+            )
     return solids
 
 
@@ -144,7 +146,7 @@ def people_solids(cell: Cell, state: PeopleState, row: int) -> list[Solid]:
             base=(x, y, floor),
             height=person.height,
             radius=r,
-            colour=CYLINDERS[(len(state.q[row]) + k) % len(CYLINDERS)],
+            colour=VESTS[(len(state.q[row]) + k) % len(VESTS)],
         )
         for k, (person, (x, y, r)) in enumerate(
             zip(cell.cylinders, state.cylinders[row].tolist(), strict=True)
@@ -163,7 +165,7 @@ def worker_solids(cell: Cell, q: Vec, sizes: Vec | None = None) -> list[Solid]:
     geometry = people_geometry_of(people_of(cell), q, np.zeros((0, 3)), sizes)
     n = len(q) * body.N_CAPSULES
     colours = [
-        CYLINDERS[w % len(CYLINDERS)] if part in _VEST else _PARTS.get(part, SLEEVE)
+        VESTS[w % len(VESTS)] if part in _VEST else _PARTS.get(part, JACKET)
         for w in range(len(q))
         for part in range(body.N_CAPSULES)
     ]
@@ -201,13 +203,12 @@ def block_solids(cell: Cell, shape: SortingShape, state: SortingState) -> list[S
     solids: list[Solid] = []
     for k, station in enumerate(cell.stations_of("clutter")):
         foot = _foot(cell, station)
-        share = min(float(state.fail[k]) / MOST_FAILURE, 1.0)
-        solids.append(_tile(foot, _between(*FAILURES, share)))
+        solids.append(_tile(foot, blend(FAILURES, float(state.fail[k]))))
         if state.clutter[k] != NULL:
             solids.append(block(state.clutter[k], foot, 0))
     for c, station in enumerate(cell.stations_of("cluster")):
         foot = _foot(cell, station)
-        solids.append(_tile(foot, _between(TRAY, colours[c], 0.35)))
+        solids.append(_tile(foot, blend(((0.0, TRAY), (1.0, colours[c])), 0.35)))
         for k, (code, wanted) in enumerate(zip(state.towers[c], state.goal[c], strict=True)):
             if code != NULL:
                 solids.append(block(code, foot, k))
@@ -229,9 +230,3 @@ def _foot(cell: Cell, station: Station) -> Point:
     """Return the point of table or obstacle below a station [m]."""
     x, y, _ = station.position
     return x, y, support_height(cell, station.position)
-
-
-def _between(low: Rgb, high: Rgb, share: float) -> Rgb:
-    """Return a mixture of two colours."""
-    r, g, b = (round(a + share * (z - a)) for a, z in zip(low, high, strict=True))
-    return r, g, b

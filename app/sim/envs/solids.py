@@ -15,8 +15,8 @@ from itertools import product
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-Rgb = tuple[int, int, int]
-"""A colour, sRGB, 0 to 255."""
+from app.sim.cells.colours import Rgb
+
 Floats = NDArray[np.float32]
 
 

@@ -12,15 +12,12 @@ from numpy.typing import NDArray
 
 from app.errors import InvalidInput
 from app.sim.cells.cell import Cell, load_cell
+from app.sim.cells.colours import FAILURES, GLOVE, TABLE_TOP, TOOL, VESTS, blend
 from app.sim.cells.parts import Obstacle
 from app.sim.envs import IDS
 from app.sim.envs.rendering import (
-    CYLINDERS,
-    GLOVE,
     HEIGHT,
     STATION,
-    TOOL,
-    TOP,
     WIDTH,
     _static_solids,
     block_solids,
@@ -57,7 +54,7 @@ def test_every_environment_gives_images(env_id: str) -> None:
     env = rendered(env_id)
     frame = image(env)
     assert frame.shape == SHAPE and frame.dtype == np.uint8
-    assert share_of(frame, TOP) > 0.1 and share_of(frame, TOOL) > 2e-4
+    assert share_of(frame, TABLE_TOP) > 0.1 and share_of(frame, TOOL) > 2e-4
     assert np.array_equal(frame, image(env))  # rendering changes nothing
 
 
@@ -78,7 +75,7 @@ def test_people_are_seen_where_there_are_some() -> None:
         for people in ((), ("worker",), ("walker",))
     )
     assert share_of(worker, GLOVE) > 3 * share_of(alone, GLOVE) + 1e-4
-    assert share_of(walker, CYLINDERS[0]) > share_of(alone, CYLINDERS[0]) + 0.01
+    assert share_of(walker, VESTS[0]) > share_of(alone, VESTS[0]) + 0.01
 
 
 def teal(frame: Image) -> float:
@@ -150,6 +147,15 @@ def test_blocks_stand_on_what_is_below_their_slot() -> None:
         if isinstance(a, Box) and isinstance(b, Box) and a.center != b.center
     ]
     assert moved == pytest.approx([0.1] * (1 + (state.clutter[0] != NULL)))
+
+
+def test_clutter_slots_have_the_colours_of_the_scene() -> None:
+    cell = load_cell("sorting-e0")
+    task = batch_in(cell, 1, seed=0)
+    task.reset()
+    colours = {solid.colour for solid in block_solids(cell, task.shape, task.state_of(0))}
+    rates = [station.failure_probability for station in cell.stations_of("clutter")]
+    assert {blend(FAILURES, rate) for rate in rates if rate is not None} <= colours
 
 
 @pytest.mark.parametrize("env_id", ["tandem/Pick-v0", "tandem/Reach-v0", "tandem/SortingE0-v0"])

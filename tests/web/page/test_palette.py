@@ -6,10 +6,9 @@ from pathlib import Path
 
 import pytest
 
+from app.sim.cells.colours import BLOCKS, FAILURES, VESTS
 from tests.web.page.test_contrast import contrast, tokens
-from web.viewer.people.mannequin import VESTS
 from web.viewer.scene.reach_scene import OVERRIDES
-from web.viewer.scene.sorting_bodies import BLOCKS, FAILURES
 from web.viewer.scene.stations_view import GOALS
 
 PALETTE = Path(__file__).parents[3] / "web" / "page" / "palette.js"

@@ -8,8 +8,8 @@ import math
 
 import numpy as np
 
+from app.sim.core.arrays import Vec
 from web.viewer.people.skeleton import SIDES, rest_feet
-from web.viewer.poses import Vec
 
 STRIDE = 0.11
 """Distance of a foot from its rest position beyond which it takes a step [m]."""

@@ -12,9 +12,10 @@ import viser
 
 from app.live.commands import MovePerson
 from app.live.snapshot import PersonSnapshot
+from app.sim.core.arrays import Vec
 from app.sim.human import model as human
 from app.sim.perception.keypoints import FARTHEST_M
-from web.viewer.poses import Vec, upright, yaw_of
+from web.viewer.poses import upright, yaw_of
 
 HANDS = {"right": "hand_r", "left": "hand_l"}
 SETTLE_S = 0.6

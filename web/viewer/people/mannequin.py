@@ -14,10 +14,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from app.sim.cells.colours import GLOVE, JACKET, SKIN, TROUSERS, VESTS, Rgb
+from app.sim.core.arrays import Vec
 from web.viewer.people import skeleton
-from web.viewer.poses import Vec
 
-Rgb = tuple[int, int, int]
 Faces = NDArray[np.uint32]
 
 _FILE = "data/mannequin.npz"
@@ -51,20 +51,18 @@ class Part:
 
 
 _COLORS: Mapping[str, Rgb] = {
-    "jacket": (58, 70, 92),
-    "vest": (255, 116, 32),
+    "jacket": JACKET,
+    "vest": VESTS[0],
     "stripes": (238, 240, 228),
-    "trousers": (44, 53, 70),
-    "head": (214, 164, 134),
+    "trousers": TROUSERS,
+    "head": SKIN,
     "helmet": (250, 250, 246),
     "glasses": (36, 44, 54),
-    "hand_l": (247, 189, 74),
-    "hand_r": (247, 189, 74),
+    "hand_l": GLOVE,
+    "hand_r": GLOVE,
     "shoe_l": (33, 34, 38),
     "shoe_r": (33, 34, 38),
 }
-VESTS: tuple[Rgb, ...] = ((255, 116, 32), (196, 214, 48), (72, 164, 232), (232, 104, 168))
-"""Colours of vests by person id; the same as VESTS in ``web/page/palette.js``."""
 _BONES = {
     "head": "head",
     "helmet": "head",

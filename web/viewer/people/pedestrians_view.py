@@ -8,9 +8,9 @@ import viser
 
 from app.live.snapshot import PersonSnapshot, WorldSnapshot
 from app.sim.cells.cell import Cell
-from web.viewer.people.mannequin import VESTS, Rgb
-from web.viewer.scene.solid_meshes import disc, torus
-from web.viewer.scene.stations_view import HIT
+from app.sim.cells.colours import VESTS, Rgb
+from web.viewer.capsules_view import HIT
+from web.viewer.solid_meshes import disc, torus
 
 OPACITY, HIT_OPACITY = 0.16, 0.4
 FLOOR_OPACITY = 0.3

@@ -12,12 +12,13 @@ import viser
 
 from app.live.snapshot import PersonSnapshot
 from app.sim.cells.cell import Cell
+from app.sim.core.arrays import Vec
 from app.sim.human import model as human
 from app.sim.human.kernels.kinematics import GIRTH, PELVIS_Z
 from web.viewer.capsules_view import CapsulesView
 from web.viewer.people import mannequin, skeleton
 from web.viewer.people.gait import Gait
-from web.viewer.poses import Vec, orientation
+from web.viewer.poses import orientation
 
 SAME_M = 1e-4
 """Difference below which two lengths are equal [m]."""

@@ -16,10 +16,11 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from app.sim.core.arrays import Vec
 from app.sim.human import model as human
 from app.sim.human.anthropometry import MEDIAN
 from app.sim.human.kernels import kinematics as lengths
-from web.viewer.poses import Vec, interpolate_rotation
+from web.viewer.poses import interpolate_rotation
 
 Bones = dict[str, Vec]
 """T_world_bone by name, each of shape (4, 4)."""

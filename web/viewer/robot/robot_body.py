@@ -10,8 +10,9 @@ import fast_simplification
 import numpy as np
 import trimesh
 
+from app.sim.cells import colours
 from app.sim.robot.ur10 import LINK_NAMES, package_dir
-from web.viewer.scene.solid_meshes import block, creased, material, painted, rod
+from web.viewer.solid_meshes import block, creased, material, painted, rod
 
 _FILES = dict(
     zip(
@@ -21,11 +22,11 @@ _FILES = dict(
     )
 )
 
-ALUMINIUM = material((205, 209, 214), metallic=0.15, roughness=0.42)
-CAP = material((88, 152, 196), metallic=0.05, roughness=0.35)
+ALUMINIUM = material(colours.ALUMINIUM, metallic=0.15, roughness=0.42)
+CAP = material(colours.JOINT, metallic=0.05, roughness=0.35)
 RUBBER = material((58, 62, 70), roughness=0.55)
 STEEL = material((150, 155, 162), metallic=0.3, roughness=0.35)
-ACCENT = material((255, 138, 52), roughness=0.5)
+ACCENT = material(colours.TOOL, roughness=0.5)
 
 _PAINT = {57: ALUMINIUM, 100: CAP, 118: RUBBER, 95: RUBBER, 167: STEEL, 20: RUBBER}
 """Material by the red channel of the colour in the file, which identifies the part."""

@@ -4,12 +4,13 @@ import numpy as np
 import viser
 
 from app.sim.cells.cell import Cell
+from app.sim.core.arrays import Vec
 from app.sim.robot.capsules import load_robot_capsules
 from app.sim.robot.ur10 import LINK_NAMES, Robot
 from web.viewer.capsules_view import CapsulesView
-from web.viewer.poses import Vec, orientation
+from web.viewer.poses import orientation
 from web.viewer.robot.robot_body import gripper_body, gripper_finger, link_meshes, magnet_body
-from web.viewer.scene.solid_meshes import torus
+from web.viewer.solid_meshes import torus
 
 LAMP = (38, 196, 182)
 """Colour of the ring that is shown while the magnet is on."""

@@ -3,8 +3,8 @@
 import numpy as np
 import viser
 
-from web.viewer.poses import Vec
-from web.viewer.scene.stations_view import MARK
+from app.sim.cells.colours import TARGET
+from app.sim.core.arrays import Vec
 
 N_STROKES = 14
 
@@ -19,7 +19,7 @@ class Arc:
     def __init__(self, server: viser.ViserServer, name: str, lift: float) -> None:
         self._lift = lift
         self._lines = server.scene.add_line_segments(
-            name, np.zeros((N_STROKES, 2, 3)), MARK, thickness=0.006, visible=False
+            name, np.zeros((N_STROKES, 2, 3)), TARGET, thickness=0.006, visible=False
         )
         self._key: tuple[object, ...] = ()
 

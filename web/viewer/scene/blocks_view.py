@@ -7,8 +7,9 @@ import viser
 
 from app.live.sorting.commands import ToggleGoal
 from app.live.sorting.snapshot import BlockSnapshot
-from web.viewer.poses import Vec
-from web.viewer.scene.sorting_bodies import BLOCKS, block_body
+from app.sim.cells.colours import BLOCKS
+from app.sim.core.arrays import Vec
+from web.viewer.scene.sorting_bodies import block_body
 
 MIN_SHIFT_M = 2e-4
 """Shortest displacement that is sent to browsers [m]."""

@@ -5,7 +5,7 @@ import viser
 
 from app.live.status_messages import percent_text
 from app.sim.cells.cell import Cell
-from web.viewer.poses import Vec
+from app.sim.core.arrays import Vec
 from web.viewer.scene.sorting_bodies import failure_color, tile, tray
 
 GAP = 0.012

@@ -12,11 +12,10 @@ import viser
 from app.live.reach.commands import MoveGoal, goal_box
 from app.live.reach.snapshot import ReachSnapshot
 from app.sim.cells.cell import Cell
+from app.sim.cells.colours import TARGET, Rgb
 from web.viewer.people.gizmos import clipped, move, release_time
-from web.viewer.people.mannequin import Rgb
 
 POINT_M = 0.028
-GOAL: Rgb = (11, 127, 119)
 REACHED: Rgb = (38, 166, 104)
 
 
@@ -39,12 +38,12 @@ class GoalGizmo:
         )
         self._frame = scene.add_frame("/goal/place", show_axes=False)
         self._point = scene.add_icosphere(
-            "/goal/place/point", POINT_M, GOAL, subdivisions=3, cast_shadow=False
+            "/goal/place/point", POINT_M, TARGET, subdivisions=3, cast_shadow=False
         )
         self._around = scene.add_icosphere(
             "/goal/place/tolerance",
             1.0,
-            GOAL,
+            TARGET,
             subdivisions=4,
             opacity=0.2,
             cast_shadow=False,
@@ -59,7 +58,7 @@ class GoalGizmo:
 
     def draw(self, view: ReachSnapshot, *, reached: bool) -> None:
         """Show the goal, and move the handle to it unless a visitor holds the handle."""
-        color = REACHED if reached else GOAL
+        color = REACHED if reached else TARGET
         self._frame.position = view.goal
         self._around.scale = view.tolerance
         self._point.color = self._around.color = color

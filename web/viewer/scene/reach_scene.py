@@ -16,18 +16,16 @@ from app.live.safety.snapshot import SafetySnapshot
 from app.live.snapshot import WorldSnapshot
 from app.live.status_messages import percent_text
 from app.sim.cells.cell import Cell
+from app.sim.cells.colours import TARGET, ColourScale, Rgb, blend
+from app.sim.core.arrays import Vec
 from app.sim.reach.batch import goal_region_of
 from app.sim.safety.separation_zone import N_DIRECTIONS
-from web.viewer.people.mannequin import Rgb
 from web.viewer.people.pedestrians_view import PedestriansView
-from web.viewer.poses import Vec
 from web.viewer.scene.arc import Arc
-from web.viewer.scene.color_scale import ColorScale, blend
 from web.viewer.scene.goal_gizmo import GoalGizmo
-from web.viewer.scene.solid_meshes import fan
-from web.viewer.scene.stations_view import MARK
+from web.viewer.solid_meshes import fan
 
-OVERRIDES: ColorScale = (
+OVERRIDES: ColourScale = (
     (0.0, (214, 52, 46)),
     (0.5, (240, 176, 52)),
     (1.0, (38, 166, 104)),
@@ -155,7 +153,7 @@ class _Trail:
     def __init__(self, server: viser.ViserServer) -> None:
         self._points: deque[tuple[Vec, Rgb]] = deque(maxlen=N_TRAIL + 1)
         self._lines = server.scene.add_line_segments(
-            "/trail/lines", np.zeros((N_TRAIL, 2, 3)), MARK, thickness=0.012, visible=False
+            "/trail/lines", np.zeros((N_TRAIL, 2, 3)), TARGET, thickness=0.012, visible=False
         )
         self._sent = 0
         self._n = 0

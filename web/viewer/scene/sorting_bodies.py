@@ -1,29 +1,13 @@
-"""Meshes and colours of blocks, towers and clutter slots.
-
-Colours are the same as in ``web/page/palette.js``. Failure probabilities have one hue from
-light to dark, readable without colour vision and different from the colours of the blocks.
-"""
+"""Meshes and colours of blocks, towers and clutter slots."""
 
 from functools import lru_cache
 
 import trimesh
 
-from web.viewer.people.mannequin import Rgb
-from web.viewer.poses import Vec
-from web.viewer.scene.color_scale import ColorScale, blend
-from web.viewer.scene.solid_meshes import material, painted, rod, slab
+from app.sim.cells.colours import FAILURES, TRAY, Rgb, blend
+from app.sim.core.arrays import Vec
+from web.viewer.solid_meshes import material, painted, rod, slab
 
-BLOCKS: dict[str, Rgb] = {"red": (205, 58, 62), "green": (112, 184, 92), "blue": (52, 104, 196)}
-"""Colour of blocks and towers by name."""
-FAILURES: ColorScale = (
-    (0.0, (240, 237, 229)),
-    (0.2, (243, 217, 164)),
-    (0.4, (226, 166, 92)),
-    (0.7, (176, 108, 48)),
-    (1.0, (112, 62, 24)),
-)
-"""Colour of a clutter slot by its failure probability."""
-TRAY = material((206, 210, 214), roughness=0.6)
 RIM = material((160, 167, 175), metallic=0.3, roughness=0.45)
 PLATE_SIDE = 0.16
 """Side of a tower's base plate [m]."""
@@ -96,7 +80,7 @@ def tray(points: Vec, height: float, margin: float) -> bytes:
     low, high = points.min(axis=0) - margin, points.max(axis=0) + margin
     size, center = high - low, 0.5 * (low + high)
     body = slab((*size, height), (*center, 0.5 * height), 0.02, 0.002)
-    return painted([(body, TRAY)])
+    return painted([(body, material(TRAY, roughness=0.6))])
 
 
 def tile(width: float, depth: float) -> trimesh.Trimesh:

@@ -12,13 +12,13 @@ from app.live.snapshot import WorldSnapshot
 from app.live.sorting.commands import ToggleGoal
 from app.live.sorting.snapshot import SortingSnapshot
 from app.sim.cells.cell import Cell
-from web.viewer.poses import Vec
+from app.sim.cells.colours import TARGET
+from app.sim.core.arrays import Vec
 from web.viewer.scene.arc import Arc
 from web.viewer.scene.blocks_view import BlocksView
 from web.viewer.scene.clutter_view import ClutterView, tray_height
-from web.viewer.scene.solid_meshes import torus
-from web.viewer.scene.stations_view import MARK
 from web.viewer.scene.towers_view import TowersView
+from web.viewer.solid_meshes import torus
 
 ARC_LIFT = 0.22
 """Height of the arc over the straight line [m]."""
@@ -86,5 +86,5 @@ def _place(view: SortingSnapshot, cell: Cell, floor: float) -> Vec:
 def _add_ring(server: viser.ViserServer, name: str) -> viser.MeshHandle:
     ring = torus(RING_M, 0.004 if name == "pick" else 0.0028)
     return server.scene.add_mesh_simple(
-        f"/marks/{name}", *ring, color=MARK, cast_shadow=False, visible=False
+        f"/marks/{name}", *ring, color=TARGET, cast_shadow=False, visible=False
     )

@@ -15,10 +15,10 @@ from app.live.commands import ToggleCandidate
 from app.live.snapshot import CandidateSnapshot, WorldSnapshot
 from app.live.status_messages import value_text
 from app.sim.cells.cell import Cell
+from app.sim.cells.colours import TARGET, Rgb
 from app.sim.cells.parts import Station
 from app.sim.cells.support import support_height
-from web.viewer.people.mannequin import Rgb
-from web.viewer.scene.solid_meshes import block, disc, slab, torus
+from web.viewer.solid_meshes import block, disc, slab, torus
 
 CUBE_SIDE, DOCK_SIDE = 0.07, 0.15
 GOALS: tuple[Rgb, ...] = (
@@ -37,8 +37,6 @@ GOALS: tuple[Rgb, ...] = (
 IDLE: Rgb = (196, 202, 210)
 PERIOD_S = 0.25
 """Time between two updates of the values in labels [s]."""
-MARK: Rgb = (11, 127, 119)
-HIT: Rgb = (214, 52, 46)
 
 
 class StationsView:
@@ -92,14 +90,14 @@ class StationsView:
         self._scene.add_mesh_simple(
             "/chosen/ring",
             *torus(0.085, 0.0055),
-            color=MARK,
+            color=TARGET,
             position=(0, 0, 0.006),
             cast_shadow=False,
         )
         self._scene.add_mesh_simple(
             "/chosen/glow",
             *disc(0.083),
-            color=MARK,
+            color=TARGET,
             opacity=0.22,
             position=(0.0, 0.0, 0.003),
             cast_shadow=False,

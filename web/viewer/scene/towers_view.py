@@ -5,8 +5,9 @@ import viser
 
 from app.live.sorting.snapshot import GoalBlockSnapshot
 from app.sim.cells.cell import Cell
+from app.sim.cells.colours import BLOCKS
 from web.viewer.scene.clutter_view import tray_height
-from web.viewer.scene.sorting_bodies import BLOCKS, ghost_body, tower_plate
+from web.viewer.scene.sorting_bodies import ghost_body, tower_plate
 
 Kind = tuple[str, tuple[float, ...], tuple[float, ...]]
 """Colour, half sizes [m] and centre [m] of a missing goal block."""

@@ -6,16 +6,16 @@ import viser
 
 from app.live.reach.commands import is_reaching
 from app.sim.cells.cell import Cell
+from app.sim.cells.colours import OBSTACLE, ROBOT_PLATE, TABLE_EDGE, TABLE_FRAME, TABLE_TOP
 from web.viewer.poses import upright
-from web.viewer.scene.solid_meshes import block, material, painted, rod, slab
+from web.viewer.solid_meshes import block, material, painted, rod, slab
 
-TOP = material((236, 233, 226), roughness=0.55)
-EDGE = material((172, 142, 108), roughness=0.6)
-FRAME = material((178, 184, 191), metallic=0.35, roughness=0.45)
+TOP = material(TABLE_TOP, roughness=0.55)
+EDGE = material(TABLE_EDGE, roughness=0.6)
+FRAME = material(TABLE_FRAME, metallic=0.35, roughness=0.45)
 FOOT = material((52, 55, 61), roughness=0.6)
-PLATE = material((96, 103, 112), metallic=0.5, roughness=0.4)
+PLATE = material(ROBOT_PLATE, metallic=0.5, roughness=0.4)
 
-OBSTACLE = (150, 158, 168)
 GRID, GRID_BOLD = (160, 170, 182), (134, 145, 158)
 
 

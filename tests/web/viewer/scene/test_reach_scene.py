@@ -12,13 +12,12 @@ from app.live.reach.commands import MoveGoal, goal_box
 from app.live.reach.world import LiveReachWorld
 from app.live.snapshot import WorldSnapshot
 from app.sim.cells.cell import Cell, load_cell
+from app.sim.cells.colours import VESTS, blend
 from tests.web.conftest import node
 from tests.web.viewer_client import ViewerClient
-from web.viewer.people.mannequin import VESTS
+from web.viewer.capsules_view import HIT
 from web.viewer.scene.cell_scene import CellScene
-from web.viewer.scene.color_scale import blend
 from web.viewer.scene.reach_scene import N_GAUGE, OFF, OVERRIDES, override_color
-from web.viewer.scene.stations_view import HIT
 
 CELL = load_cell("shared-workspace")
 WAIT_S = 10.0

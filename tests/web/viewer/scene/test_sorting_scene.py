@@ -12,12 +12,13 @@ from app.live.snapshot import WorldSnapshot
 from app.live.sorting.commands import ToggleGoal
 from app.live.sorting.snapshot import HELD, SortingSnapshot
 from app.sim.cells.cell import Cell, load_cell
+from app.sim.cells.colours import BLOCKS, FAILURES
 from tests.support.waiting import wait_until
 from tests.web.conftest import node
 from tests.web.sorting_views import a_view, block, centre
 from tests.web.viewer_client import ViewerClient
 from web.viewer.scene.cell_scene import CellScene
-from web.viewer.scene.sorting_bodies import BLOCKS, FAILURES, failure_color
+from web.viewer.scene.sorting_bodies import failure_color
 
 
 @pytest.fixture(scope="module")

@@ -6,7 +6,7 @@ import numpy as np
 import trimesh
 from trimesh.visual.material import PBRMaterial
 
-from web.viewer.poses import Vec
+from app.sim.core.arrays import Vec
 
 
 def material(

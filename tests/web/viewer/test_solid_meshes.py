@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from web.viewer.scene.solid_meshes import block, disc, rod, slab, torus
+from web.viewer.solid_meshes import block, disc, rod, slab, torus
 
 WITHOUT_EXTRAS = """
 import sys
