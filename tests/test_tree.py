@@ -63,12 +63,14 @@ def content(package: PurePath) -> set[str]:
     return found | {one[0][:-3] for one in parts if len(one) == 1} - {"__init__"}
 
 
-@pytest.mark.parametrize(
-    "package", [path for path in PACKAGES if mapped(path)], ids=lambda path: str(path.parent)
-)
+WITHOUT_MAP = {
+    "app/client/operations",  # written by `make client`; its imports list the modules
+    CHAIN,  # each module names the one before it
+}
+
+
+@pytest.mark.parametrize("package", PACKAGES, ids=lambda path: str(path.parent))
 def test_the_map_of_a_package_is_complete(package: PurePath) -> None:
-    assert mapped(package) ^ content(package) == set()
-
-
-def test_most_packages_have_a_map() -> None:
-    assert len([path for path in PACKAGES if mapped(path)]) > 40
+    inside = content(package)
+    if mapped(package) or (len(inside) >= 3 and str(package.parent) not in WITHOUT_MAP):
+        assert mapped(package) ^ inside == set()
