@@ -207,14 +207,14 @@ def test_order_of_equal_moves_is_followed_and_named(order: Order, text: str) -> 
     assert until(world, solved).sorting.counters.moves == 1
 
 
-def test_duplicate_in_a_riskier_cell_is_left_and_the_message_says_so() -> None:
+def test_duplicate_in_a_riskier_slot_is_left_and_the_message_says_so() -> None:
     world = empty_world()
     ids = lay(world, {"cell2": "red-large", "cell9": "red-large"}, {"red": ("large",)})
     going = until(world, phase("approach"))
     assert going.sorting.duplicates == (ids["cell9"],)
     assert going.message == (
-        "Moving to the large red block in cell 9, to be placed on the red tower: 1 move to go. "
-        "Its duplicate in cell 2 fails more often (40 %)."
+        "Moving to the large red block in slot 9, to be placed on the red tower: 1 move to go. "
+        "Its duplicate in slot 2 fails more often (40 %)."
     )
 
 

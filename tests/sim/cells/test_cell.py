@@ -86,6 +86,15 @@ def test_sorting_cell_has_the_source_s_numbers(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", SORTING)
+def test_labels_of_a_sorting_cell_name_slots_and_towers(name: str) -> None:
+    cell = load_cell(name)
+    slots = [station.label for station in cell.stations_of("clutter")]
+    assert slots == [f"Slot {k}" for k in range(len(slots))]
+    for tower in cell.stations_of("cluster"):
+        assert tower.label == f"{tower.colour} tower".capitalize()
+
+
+@pytest.mark.parametrize("name", SORTING)
 def test_picks_fail_most_at_the_robot_s_base(name: str) -> None:
     clutter = load_cell(name).stations_of("clutter")
     distance = np.array([math.hypot(*station.position[:2]) for station in clutter])

@@ -8,7 +8,7 @@ const NARROWEST = 0.46;
 export const kindOf = ({ colour, size }) => `${colour}-${size}`;
 export const nameOf = ({ colour, size }) => `${size} ${colour} block`;
 
-/** "Cell 3", "red tower", "the gripper". */
+/** "Slot 3", "red tower", "the gripper". */
 export function placeName(cell, id) {
   if (id === "held") return "the gripper";
   const station = cell?.stations.find((one) => one.id === id);

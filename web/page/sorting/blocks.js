@@ -6,35 +6,35 @@ import { capital, count, percent } from "../format.js";
 import { failureColours, failureGradient } from "../palette.js";
 
 export function Blocks({ sorting, cell, send, picked, onPick }) {
-  const cells = cell.stations.filter((one) => one.kind === "clutter");
+  const slots = cell.stations.filter((one) => one.kind === "clutter");
   const held = sorting.blocks.find((one) => one.held);
   const block = sorting.blocks.find((one) => one.id === picked);
-  const at = cells.find((one) => one.id === picked && !inCell(sorting, one.id));
+  const at = slots.find((one) => one.id === picked && !blockIn(sorting, one.id));
   return html`<section class="card" aria-labelledby="blocks-title">
     <header class="card-head">
       <h2 id="blocks-title" tabindex="-1">Blocks</h2>
-      <span class="faint">${sorting.blocks.length} of at most ${cells.length}</span>
+      <span class="faint">${sorting.blocks.length} of at most ${slots.length}</span>
     </header>
-    <${Plan} cells=${cells} sorting=${sorting} picked=${picked} onPick=${onPick} />
+    <${Plan} slots=${slots} sorting=${sorting} picked=${picked} onPick=${onPick} />
     <${Legend} failure=${sorting.failure} />
     ${block
-      ? html`<${Picked} key=${block.id} block=${block} cells=${cells} cell=${cell}
+      ? html`<${Picked} key=${block.id} block=${block} slots=${slots} cell=${cell}
           sorting=${sorting} send=${send} onPick=${onPick} />`
-      : html`<${Shelf} sorting=${sorting} at=${at} cells=${cells} send=${send} />`}
+      : html`<${Shelf} sorting=${sorting} at=${at} slots=${slots} send=${send} />`}
     ${held && html`<p class="faint held" data-role="held">The ${nameOf(held)} is held by the gripper.</p>`}
   </section>`;
 }
 
-const inCell = (sorting, id) => sorting.blocks.find((one) => one.place === id && !one.held);
+const blockIn = (sorting, id) => sorting.blocks.find((one) => one.place === id && !one.held);
 
 /** The clutter from above, the robot's side below. */
-function Plan({ cells, sorting, picked, onPick }) {
-  const columns = places(cells, 0);
-  const rows = places(cells, 1).reverse();
+function Plan({ slots, sorting, picked, onPick }) {
+  const columns = places(slots, 0);
+  const rows = places(slots, 1).reverse();
   return html`<div class="plan" role="group" aria-label="Clutter slots from above"
     style=${{ "--columns": columns.length }}>
-    ${cells.map((one, index) => {
-      const block = inCell(sorting, one.id);
+    ${slots.map((one, index) => {
+      const block = blockIn(sorting, one.id);
       const { background, ink } = failureColours(sorting.failure[index]);
       const chance = percent(sorting.failure[index], 0);
       const id = block?.id ?? one.id;
@@ -59,12 +59,12 @@ function Legend({ failure }) {
 }
 
 /** What can be done with the block that was picked. */
-function Picked({ block, cells, cell, sorting, send, onPick }) {
-  const free = cells.filter((one) => !inCell(sorting, one.id));
+function Picked({ block, slots, cell, sorting, send, onPick }) {
+  const free = slots.filter((one) => !blockIn(sorting, one.id));
   const towers = cell.stations.filter((one) => one.kind === "cluster" && one.id !== block.place);
   const places = [...free, ...towers];
   const name = nameOf(block);
-  const inClutter = cells.some((one) => one.id === block.place);
+  const inClutter = slots.some((one) => one.id === block.place);
   const leave = () => { // the focus returns to the button that picked the block
     const picker = document.querySelector(`[data-block="${block.id}"]`);
     (picker ?? document.getElementById("blocks-title")).focus();
@@ -101,9 +101,9 @@ function Picked({ block, cells, cell, sorting, send, onPick }) {
 }
 
 /** One of every kind, to be put into the picked free slot, or into any. */
-function Shelf({ sorting, at, cells, send }) {
-  const full = sorting.blocks.length >= cells.length;
-  const reason = `There is room for ${count(cells.length, "block")} at most`;
+function Shelf({ sorting, at, slots, send }) {
+  const full = sorting.blocks.length >= slots.length;
+  const reason = `There is room for ${count(slots.length, "block")} at most`;
   return html`<div class="shelf" role="group" aria-labelledby="shelf-title">
     <span id="shelf-title">${full ? `${reason}.` : `Add to ${at ? at.label : "any free slot"}`}</span>
     <div class="shelf-kinds">
@@ -120,6 +120,6 @@ function Shelf({ sorting, at, cells, send }) {
 
 const place = (station, axis) => Math.round(station.position[axis] * 1000);
 
-function places(cells, axis) {
-  return [...new Set(cells.map((one) => place(one, axis)))].sort((a, b) => a - b);
+function places(slots, axis) {
+  return [...new Set(slots.map((one) => place(one, axis)))].sort((a, b) => a - b);
 }
