@@ -56,7 +56,7 @@ from jobs.cell_catalog import CellCatalog
 from jobs.checkpoints import shipped
 from jobs.composed.reports import Reports
 from jobs.composed.sweeps import Sweeps
-from jobs.executor import LocalProcess
+from jobs.executor import LocalExecutor
 from jobs.import_process import ImportProcess
 from jobs.recording_catalog import RecordingCatalog
 from jobs.remote.uploads import WorkerUploads
@@ -241,7 +241,7 @@ class Service:
                 names.mark_damaged(damage)
 
 
-def executor_of(settings: Settings, database_url: str) -> LocalProcess:
+def executor_of(settings: Settings, database_url: str) -> LocalExecutor:
     """Return the executor of jobs: a Ray cluster, or processes of this machine.
 
     Args:
@@ -254,7 +254,7 @@ def executor_of(settings: Settings, database_url: str) -> LocalProcess:
     """
     data = settings.data
     if settings.ray is None:
-        return LocalProcess(database_url, data)
+        return LocalExecutor(database_url, data)
     if importlib.util.find_spec("ray") is None:
         raise MissingPackage("ray", "TANDEM_RAY", "install the extra 'ray'")
     unknown = settings.host in ("0.0.0.0", "::") or settings.port == 0
@@ -264,7 +264,7 @@ def executor_of(settings: Settings, database_url: str) -> LocalProcess:
     given = {"TANDEM_RAY": settings.ray, "TANDEM_WORKER_URL": settings.worker_address}
     if settings.secret is not None:
         given["TANDEM_TOKEN"] = settings.secret
-    return LocalProcess(database_url, data, "jobs.remote.ray_driver", given)
+    return LocalExecutor(database_url, data, "jobs.remote.ray_driver", given)
 
 
 def assemble(

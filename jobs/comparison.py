@@ -60,7 +60,7 @@ class JobComparison:
     quantity: str | None
     """The compared one; None without points."""
     steps: tuple[int, ...]
-    """Environment steps of all curves, increasing; thinned evenly beyond ``MAX_POINTS``."""
+    """Environment steps of all curves, increasing; of many, every n-th."""
     groups: tuple[Group, ...]
     """The groups, trainings only."""
 

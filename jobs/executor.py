@@ -55,7 +55,7 @@ class LocalHandle:
     """Length of the log before this attempt [bytes]."""
 
 
-class LocalProcess:
+class LocalExecutor:
     """Runs every attempt in its own process on this machine.
 
     Args:

@@ -87,7 +87,7 @@ def usable(memory: MemoryFiles, stored: ResumeState) -> bool:
 
 def evaluate(inputs: JobInputs, worker: JobWorker) -> dict[str, Any]:
     """Evaluate the job's checkpoint by its protocol; a step is a row of the result."""
-    worker.end_at_once()
+    worker.end_at_sigterm()
     spec = parse_spec(worker.job.spec)
     assert isinstance(spec, EvaluateSpec)
     tested = None

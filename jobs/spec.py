@@ -146,7 +146,7 @@ class Range(StrictModel):
         Field(None, description="2 to 16 values instead of `low` and `high`")
     )
 
-    def ends(self, field: str) -> dict[str, float | str]:
+    def values(self, field: str) -> dict[str, float | str]:
         """Return the values to check, by the name of their member.
 
         Raises:
@@ -240,7 +240,7 @@ class SweepSpec(_Spec):
             field = f"ranges.{path}"
             if path not in known:
                 raise InvalidInput(field, path, "is not a field of the preset", known)
-            for name, value in drawn.ends(field).items():
+            for name, value in drawn.values(field).items():
                 try:
                     presets.resolve(self.preset, self.with_fields({path: value}))
                 except InvalidInput as error:

@@ -36,7 +36,7 @@ from app.store.database.schema import check_schema
 from app.store.engine import Store
 from app.store.records import Claim
 from jobs.composed.composer import Composer
-from jobs.executor import NO_CPU, Exit, LocalHandle, LocalProcess
+from jobs.executor import NO_CPU, Exit, LocalExecutor, LocalHandle
 from jobs.resume_files import remove_unneeded
 from jobs.retention import Retention
 from jobs.timeouts import Timeouts
@@ -93,7 +93,7 @@ class Supervisor:
         data_dir: Path,
         *,
         max_running: int = 1,
-        executor: LocalProcess | None = None,
+        executor: LocalExecutor | None = None,
         timeouts: Timeouts | None = None,
         min_free_bytes: int = MIN_FREE_BYTES,
         retention: Retention | None = None,
@@ -105,7 +105,7 @@ class Supervisor:
         self._database = store
         self._store = store.fenced(self._lease.require)
         self._max_running = max_running
-        self._executor = executor or LocalProcess(store.url, data_dir)
+        self._executor = executor or LocalExecutor(store.url, data_dir)
         self._data_dir = data_dir
         self._tracer = tracer or NoOpTracer()
         self._min_free_bytes = min_free_bytes

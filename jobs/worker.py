@@ -50,7 +50,7 @@ class JobWorker:
         self._stop_seen = False
         self._waiting: str | None = None
         self._early_end: SpentBudget | None = None
-        self._budgeted = self.job
+        self._last_read = self.job
         self._run_before, self._started = self.job.run_s, time.monotonic()
 
     @property
@@ -84,7 +84,7 @@ class JobWorker:
             StorageFull: No room is left, and the runner must stop.
         """
         self.wait_to(lambda: self.access.record_progress(step, values, total_steps))
-        budget = self._budgeted.step_budget
+        budget = self._last_read.step_budget
         if budget is not None and budget <= step != total_steps:
             self._early_end = "step budget"
 
@@ -101,7 +101,7 @@ class JobWorker:
 
     def should_stop(self) -> bool:
         """Whether the runner must write a last checkpoint and return; for every step."""
-        budget = self._budgeted.time_budget_s
+        budget = self._last_read.time_budget_s
         if self._early_end is None and budget is not None and self.run_s >= budget:
             self._early_end = "time budget"
         return self._interrupted_now() or self._early_end is not None
@@ -115,7 +115,7 @@ class JobWorker:
         """Stop the runner; the job resumes with the next attempt."""
         self._interrupted.set()
 
-    def end_at_once(self) -> None:
+    def end_at_sigterm(self) -> None:
         """End this process at SIGTERM, for runners without ``should_stop``."""
         signal.signal(signal.SIGTERM, signal.SIG_DFL)
 
@@ -209,7 +209,7 @@ class JobWorker:
                     logger.exception("no heartbeat for now")
                 silent = True
                 continue
-            self._budgeted, silent = job, False
+            self._last_read, silent = job, False
             if due:
                 next_heartbeat, recorded = time.monotonic() + HEARTBEAT_S, waiting
             if job.cancel_requested:

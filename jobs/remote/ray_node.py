@@ -13,7 +13,7 @@ from app.provenance import describe
 from app.sim.core.kernel_cache import kernel_cache
 from app.store.records import Claim
 from app.temporary_folder import TemporaryFolder
-from jobs.executor import PROJECT_ROOT, LocalProcess
+from jobs.executor import PROJECT_ROOT, LocalExecutor
 
 
 class NodeWorker:
@@ -27,7 +27,7 @@ class NodeWorker:
         data = Path(os.environ.get("TANDEM_DATA", PROJECT_ROOT / "data"))
         os.environ.setdefault("NUMBA_CACHE_DIR", str(kernel_cache(data)))
         self._folder = TemporaryFolder("tandem-worker-")
-        self._executor = LocalProcess(None, self._folder.path, "jobs.remote.run", settings)
+        self._executor = LocalExecutor(None, self._folder.path, "jobs.remote.run", settings)
         self._handle = self._executor.start(claim)
         self._read = 0
 

@@ -16,7 +16,7 @@ from app.errors import ServiceError
 from app.store import jobs
 from app.store.engine import Store
 from app.store.records import NewJob
-from jobs.executor import LocalProcess
+from jobs.executor import LocalExecutor
 from jobs.supervisor import Supervisor
 from jobs.timeouts import Timeouts
 from tests.jobs.supervisor_process import COUNTING
@@ -55,7 +55,7 @@ def main(url: str, data_dir: Path, seed: int) -> None:
 
     signal.signal(signal.SIGTERM, stop)
     store = Store(url)
-    executor = LocalProcess(store.url, data_dir, COUNTING)
+    executor = LocalExecutor(store.url, data_dir, COUNTING)
     timeouts = Timeouts(tick_s=0.05, cancel_s=5.0, retry_s=0.2)
     supervisor = Supervisor(store, data_dir, executor=executor, timeouts=timeouts)
     supervisor.start()

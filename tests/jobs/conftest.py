@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from app.store.engine import Store
-from jobs.executor import LocalProcess
+from jobs.executor import LocalExecutor
 from jobs.supervisor import Supervisor
 from tests.jobs.machinery import supervised
 from tests.jobs.supervisor_process import COUNTING
@@ -16,12 +16,12 @@ __all__ = ["database_url", "migrated", "postgresql", "store"]
 
 
 @pytest.fixture
-def executor(store: Store, tmp_path: Path) -> LocalProcess:
-    return LocalProcess(store.url, tmp_path, COUNTING)
+def executor(store: Store, tmp_path: Path) -> LocalExecutor:
+    return LocalExecutor(store.url, tmp_path, COUNTING)
 
 
 @pytest.fixture
-def supervisor(store: Store, tmp_path: Path, executor: LocalProcess) -> Iterator[Supervisor]:
+def supervisor(store: Store, tmp_path: Path, executor: LocalExecutor) -> Iterator[Supervisor]:
     """A supervisor that runs counting jobs."""
     with supervised(store, tmp_path, executor=executor) as started:
         yield started

@@ -35,7 +35,7 @@ def count(worker: JobWorker) -> dict[str, int]:
     wish = worker.job.overrides
     limit_database(worker, wish.get("max_pages"))
     if wish.get("at_once"):
-        worker.end_at_once()
+        worker.end_at_sigterm()
     resume = worker.resume()
     step, value = (0, 1 + worker.job.seed) if resume is None else load(resume)
     while step < wish["steps"] and not asked_to_stop(worker):

@@ -5,7 +5,7 @@ import threading
 from pathlib import Path
 
 from app.store.engine import Store
-from jobs.executor import LocalProcess
+from jobs.executor import LocalExecutor
 from jobs.supervisor import Supervisor
 from jobs.timeouts import Timeouts
 
@@ -14,7 +14,7 @@ COUNTING = "tests.jobs.counting_worker"
 
 def main(database_url: str, data_dir: Path, lease_s: float) -> None:
     store = Store(database_url)
-    executor = LocalProcess(store.url, data_dir, COUNTING)
+    executor = LocalExecutor(store.url, data_dir, COUNTING)
     timeouts = Timeouts(tick_s=0.05, lease_s=lease_s)
     supervisor = Supervisor(store, data_dir, executor=executor, timeouts=timeouts)
     supervisor.start()

@@ -24,7 +24,7 @@ from app.store.engine import Store
 from app.store.records import Claim
 from jobs import worker as jobs_worker
 from jobs.access import StoreAccess
-from jobs.executor import NO_CPU, Exit, LocalHandle, LocalProcess
+from jobs.executor import NO_CPU, Exit, LocalExecutor, LocalHandle
 from jobs.supervisor import Supervisor
 from jobs.worker import JobWorker
 from tests.jobs.counting_worker import count
@@ -68,7 +68,7 @@ def locked(store: Store) -> Iterator[None]:
 def impatient(store: Store, tmp_path: Path) -> Iterator[Supervisor]:
     """A supervisor and workers that wait 0.2 s for a lock."""
     short = Store(f"{store.url}?timeout=0.2")
-    executor = LocalProcess(short.url, tmp_path, "tests.jobs.counting_worker")
+    executor = LocalExecutor(short.url, tmp_path, "tests.jobs.counting_worker")
     timeouts = replace(PATIENCE, silence_s=1.0, retry_s=0.1)
     with supervised(short, tmp_path, executor=executor, timeouts=timeouts) as supervisor:
         yield supervisor
@@ -96,7 +96,7 @@ def test_job_in_a_full_database_waits_and_goes_on(
 
 
 def test_start_on_a_full_disk_waits_for_room(
-    store: Store, tmp_path: Path, executor: LocalProcess
+    store: Store, tmp_path: Path, executor: LocalExecutor
 ) -> None:
     job_id = queue(store, steps=20)
     store.close()  # as after a clean stop
@@ -147,7 +147,7 @@ def test_job_that_waits_for_room_can_be_stopped(
 
 
 def test_queue_waits_while_the_disk_has_too_little_room(
-    store: Store, tmp_path: Path, executor: LocalProcess
+    store: Store, tmp_path: Path, executor: LocalExecutor
 ) -> None:
     with supervised(store, tmp_path, executor=executor, min_free_bytes=1 << 62) as supervisor:
         job_id = queue(store, steps=20)
@@ -155,7 +155,7 @@ def test_queue_waits_while_the_disk_has_too_little_room(
     assert jobs.get_job(store, job_id).attempt == 0
 
 
-class Exhausted(LocalProcess):
+class Exhausted(LocalExecutor):
     """An executor whose first starts meet a full disk, or a machine without free resources."""
 
     def __init__(self, store: Store, data_dir: Path, error: int) -> None:
@@ -190,7 +190,7 @@ def test_worker_that_cannot_be_started_for_now_is_started_later(
     assert (job.state, job.attempt, job.failures) == ("succeeded", 5, 0)
 
 
-class Crowded(LocalProcess):
+class Crowded(LocalExecutor):
     """An executor on which every job lacks a free CPU of the cluster."""
 
     def __init__(self, store: Store, data_dir: Path) -> None:

@@ -14,7 +14,7 @@ from app.storage_errors import StorageFull
 from app.store import jobs
 from app.store.database.migrate import migrate
 from app.store.engine import Store
-from jobs.executor import LocalProcess
+from jobs.executor import LocalExecutor
 from jobs.supervisor import Supervisor
 from tests.jobs.machinery import (
     PATIENCE,
@@ -60,7 +60,7 @@ def queue_until_full(store: Store) -> list[str]:
 def test_nothing_acknowledged_is_lost_on_a_full_disk(
     server: PostgresqlServer, store: Store, tmp_path: Path
 ) -> None:
-    executor = LocalProcess(store.url, tmp_path, COUNTING)
+    executor = LocalExecutor(store.url, tmp_path, COUNTING)
     supervisor = Supervisor(store, tmp_path, executor=executor, timeouts=PATIENCE)
     supervisor.start()
     first = queue(store, steps=20, padding=50_000)

@@ -15,7 +15,7 @@ from app.store import attempts, checkpoints, events, job_actions, jobs, metrics
 from app.store.database.lease import Lease
 from app.store.database.lock import ServerLock
 from app.store.engine import Store
-from jobs.executor import LocalProcess
+from jobs.executor import LocalExecutor
 from jobs.retention import Retention
 from jobs.supervisor import Supervisor
 from tests.jobs.machinery import (
@@ -67,7 +67,7 @@ def test_killed_worker_goes_on_from_its_checkpoint(store: Store) -> None:
 
 
 def test_worker_that_a_service_manager_terminates_is_no_crash(
-    store: Store, tmp_path: Path, executor: LocalProcess
+    store: Store, tmp_path: Path, executor: LocalExecutor
 ) -> None:
     timeouts = replace(PATIENCE, retry_s=0.1)
     with supervised(store, tmp_path, executor=executor, timeouts=timeouts):
@@ -146,7 +146,7 @@ def test_deaf_worker_is_killed_after_the_grace_time(store: Store) -> None:
 
 @pytest.mark.slow
 def test_worker_without_a_sign_of_life_is_killed_and_the_job_goes_on(
-    store: Store, tmp_path: Path, executor: LocalProcess
+    store: Store, tmp_path: Path, executor: LocalExecutor
 ) -> None:
     timeouts = replace(PATIENCE, silence_s=20.0)
     with supervised(store, tmp_path, executor=executor, timeouts=timeouts):
@@ -159,7 +159,7 @@ def test_worker_without_a_sign_of_life_is_killed_and_the_job_goes_on(
 
 
 def test_stopped_server_queues_its_job_again_and_the_next_one_finishes_it(
-    store: Store, tmp_path: Path, executor: LocalProcess
+    store: Store, tmp_path: Path, executor: LocalExecutor
 ) -> None:
     job_id = queue(store, steps=100, hold_at=[27])
     with supervised(store, tmp_path, executor=executor):
@@ -218,7 +218,7 @@ def test_alias_is_set_although_another_server_has_changed_it(store: Store) -> No
 
 
 def test_jobs_that_end_without_a_worker_are_removed_beyond_those_to_keep(
-    store: Store, tmp_path: Path, executor: LocalProcess
+    store: Store, tmp_path: Path, executor: LocalExecutor
 ) -> None:
     keep = Retention(
         store=store, logs=tmp_path / "logs", keep_jobs=2, keep_states=1, acting=dict
@@ -234,7 +234,7 @@ def test_jobs_that_end_without_a_worker_are_removed_beyond_those_to_keep(
 
 @SQLITE_ONLY
 def test_server_that_takes_its_lease_again_knows_the_aliases_of_the_other(
-    store: Store, tmp_path: Path, executor: LocalProcess
+    store: Store, tmp_path: Path, executor: LocalExecutor
 ) -> None:
     first, second = policy(b"1"), policy(b"2")
     for one in (first, second):
@@ -262,7 +262,7 @@ def test_server_paused_beyond_its_lease_stops_its_worker_and_waits(
         (pid,) = worker_pids(paused.pid)
         paused.send_signal(signal.SIGSTOP)
         wait_until_lease_expires(store)
-        executor = LocalProcess(store.url, tmp_path / "b", COUNTING)
+        executor = LocalExecutor(store.url, tmp_path / "b", COUNTING)
         timeouts = replace(PATIENCE, lease_s=1000.0, shutdown_s=0.0)
         second = Supervisor(store, tmp_path / "b", executor=executor, timeouts=timeouts)
         start_patiently(second)
@@ -279,7 +279,7 @@ def test_server_paused_beyond_its_lease_stops_its_worker_and_waits(
 
 @POSTGRESQL_ONLY
 def test_stopping_server_keeps_its_lease_until_its_workers_have_ended(
-    store: Store, tmp_path: Path, executor: LocalProcess
+    store: Store, tmp_path: Path, executor: LocalExecutor
 ) -> None:
     timeouts = replace(PATIENCE, lease_s=1.0, shutdown_s=4.0)
     job_id = queue(store, steps=100, hold_at=[7], deaf=True)
@@ -334,7 +334,7 @@ def test_row_left_running_without_a_worker_is_started_again(store: Store) -> Non
 
 @SQLITE_ONLY
 def test_worker_that_cannot_be_started_fails_the_job(
-    store: Store, tmp_path: Path, executor: LocalProcess
+    store: Store, tmp_path: Path, executor: LocalExecutor
 ) -> None:
     (tmp_path / "logs").write_text("no folder")
     with supervised(store, tmp_path, executor=executor):

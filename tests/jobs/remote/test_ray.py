@@ -16,7 +16,7 @@ import pytest
 
 from app.store import attempts, jobs, metrics
 from app.store.engine import Store
-from jobs.executor import PROJECT_ROOT, LocalProcess, search_path
+from jobs.executor import PROJECT_ROOT, LocalExecutor, search_path
 from jobs.supervisor import Supervisor
 from tests.jobs.machinery import PATIENCE, supervised, wait_for, wait_until, wait_until_final
 from tests.jobs.remote.serving import TOKEN
@@ -91,7 +91,7 @@ def running_on(
     """Run a supervisor whose jobs run on a cluster."""
     settings = {"TANDEM_RAY": ray_address, "TANDEM_WORKER_URL": address, "TANDEM_TOKEN": TOKEN}
     settings |= variables or {}
-    executor = LocalProcess(store.url, folder, "jobs.remote.ray_driver", settings)
+    executor = LocalExecutor(store.url, folder, "jobs.remote.ray_driver", settings)
     return supervised(store, folder, executor=executor, timeouts=PATIENCE_OF_RAY)
 
 

@@ -8,7 +8,7 @@ import pytest
 
 from app.store import attempts, jobs, metrics
 from app.store.engine import Store
-from jobs.executor import LocalProcess
+from jobs.executor import LocalExecutor
 from jobs.remote.access import ServiceAccess
 from jobs.remote.connection import ServiceConnection
 from jobs.remote.inputs import ServiceInputs
@@ -24,10 +24,10 @@ from tests.support.trainings import Made, killed_midway, made_by, train
 pytestmark = SQLITE_ONLY
 
 
-def elsewhere(folder: Path, address: str) -> LocalProcess:
+def elsewhere(folder: Path, address: str) -> LocalExecutor:
     """Workers as on another machine: a folder of their own, the address and the token."""
     settings = {"TANDEM_WORKER_URL": address, "TANDEM_TOKEN": TOKEN}
-    return LocalProcess(None, folder / "elsewhere", "jobs.remote.run", settings)
+    return LocalExecutor(None, folder / "elsewhere", "jobs.remote.run", settings)
 
 
 def test_training_over_http_killed_once_ends_with_the_checkpoints_of_a_local_one(
