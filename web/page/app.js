@@ -1,4 +1,4 @@
-// Tandem's one page: the live cell, what the critic thinks of it, and training.
+// Tandem's one page: the live cell, the value estimates of its targets, and training.
 import { html, render, useEffect, useMemo, useRef, useState } from "./vendor/htm-preact-standalone.module.js";
 import { Acting, useCheckpoints } from "./training/checkpoints.js";
 import { Controls } from "./live/controls.js";

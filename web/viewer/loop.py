@@ -74,7 +74,7 @@ class LiveCell:
         self._speed = 1
         self._ticks, self._undrawn_s = 0, 0.0
         self._fault_logged_at = -math.inf
-        self._done = 0
+        self._n_commands = 0
         self._refused: deque[RefusedCommand] = deque(maxlen=MAX_REFUSED)
         self._risk = RiskWorker()
         self._stop = threading.Event()
@@ -127,7 +127,7 @@ class LiveCell:
 
     def _tick(self, draw: Callable[[WorldSnapshot], None], dt: float) -> None:
         for command in self.handle.drain():
-            self._done += 1
+            self._n_commands += 1
             try:
                 self._apply(command)
             except ServiceError as error:
@@ -141,7 +141,7 @@ class LiveCell:
         snapshot = replace(
             self._world.snapshot(),
             speed=self._speed,
-            commands=self._done,
+            commands=self._n_commands,
             refused=tuple(self._refused),
         )
         self.handle.publish(snapshot)
@@ -164,7 +164,7 @@ class LiveCell:
 
     def _refuse(self, reason: str) -> None:
         """List the present command as refused in the next snapshots, with the reason."""
-        self._refused.append(RefusedCommand(number=self._done, reason=reason))
+        self._refused.append(RefusedCommand(number=self._n_commands, reason=reason))
 
     def _draw(
         self,

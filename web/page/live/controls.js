@@ -3,7 +3,7 @@ import { html } from "../vendor/htm-preact-standalone.module.js";
 import { count } from "../format.js";
 import { Icon } from "../icons.js";
 import { People } from "./people.js";
-import { Presets } from "./presets.js";
+import { Scenarios } from "./scenarios.js";
 import { SafetyControls } from "./safetycontrols.js";
 import { ReachControls } from "../reach/reachcontrols.js";
 import { useListFocus } from "../listfocus.js";
@@ -41,7 +41,7 @@ export function Controls({ world, cell, cases, send, colourOf, labelOf }) {
     ${world.reach ? html`<${ReachControls} world=${world} send=${send} />`
       : world.sorting
       ? html`<div class="dock-row dock-wrap"><${SafetyControls} world=${world} send=${send} /></div>
-        ${tests.length > 0 && html`<${Presets} label="Benchmark tasks" items=${tests} tag="start-test"
+        ${tests.length > 0 && html`<${Scenarios} label="Benchmark tasks" items=${tests} tag="start-test"
           running=${world.sorting.test} send=${send}
           hint=${`${count(tests.length, "sorting test")} of the thesis: the cell is set up and the robot sorts.`} />`}`
       : html`<div class="dock-row">
@@ -50,7 +50,7 @@ export function Controls({ world, cell, cases, send, colourOf, labelOf }) {
             labelOf=${labelOf} />
         </div>
         <div class="dock-row dock-wrap"><${SafetyControls} world=${world} send=${send} /></div>
-        ${cases.length > 0 && html`<${Presets} label="Scenarios" items=${cases} tag="start-case"
+        ${cases.length > 0 && html`<${Scenarios} label="Scenarios" items=${cases} tag="start-case"
           running=${world.case} send=${send}
           hint=${`${count(cases.length, "case study", "case studies")} of thesis table 5.3: the person reaches in, the robot selects the better goal.`} />`}`}
   </section>`;

@@ -42,7 +42,7 @@ class Gizmos:
         self._person, self._submit = person, submit
         scene, root = server.scene, f"/gizmos/{person}"
         self._frame = scene.add_frame(root, show_axes=False)
-        self._released: dict[str, float] = {}
+        self._free_at: dict[str, float] = {}
         self._pelvis = scene.add_transform_controls(
             f"{root}/pelvis",
             scale=0.34,
@@ -70,7 +70,7 @@ class Gizmos:
     def _listen(self) -> None:
         @self._pelvis.on_update
         async def _(event: viser.TransformControlsEvent) -> None:
-            self._released["pelvis"] = release_time(event.phase)
+            self._free_at["pelvis"] = release_time(event.phase)
             x, y, _ = clipped(self._pelvis.position)
             self._submit(
                 MovePerson(person=self._person, pelvis=(x, y, yaw_of(self._pelvis.wxyz)))
@@ -82,7 +82,7 @@ class Gizmos:
     def _listen_to_hand(self, name: str, gizmo: viser.TransformControlsHandle) -> None:
         @gizmo.on_update
         async def _(event: viser.TransformControlsEvent) -> None:
-            self._released[name] = release_time(event.phase)
+            self._free_at[name] = release_time(event.phase)
             point = clipped(gizmo.position)
             if name == "right":
                 self._submit(MovePerson(person=self._person, right=point))
@@ -90,7 +90,7 @@ class Gizmos:
                 self._submit(MovePerson(person=self._person, left=point))
 
     def _free(self, name: str) -> bool:
-        return time.monotonic() >= self._released.get(name, 0.0)
+        return time.monotonic() >= self._free_at.get(name, 0.0)
 
     def remove(self) -> None:
         """Remove the gizmos from the scene."""
@@ -102,7 +102,7 @@ class Gizmos:
         for gizmo in (self._pelvis, *self._hands.values()):
             gizmo.visible = manual
         if not manual:
-            self._released.clear()
+            self._free_at.clear()
             return
         points = human.joint_points(person.posture, person.size)
         if self._free("pelvis"):

@@ -2,7 +2,7 @@
 import { html, useState } from "../vendor/htm-preact-standalone.module.js";
 
 /** `items` with id, title and text; `tag` is the command that starts one. */
-export function Presets({ label, hint, items, running, tag, send }) {
+export function Scenarios({ label, hint, items, running, tag, send }) {
   const [pointed, setPointed] = useState(null);
   const shown = items.find((one) => one.id === (pointed ?? running));
   const point = (id) => ({
