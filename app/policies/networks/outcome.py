@@ -28,7 +28,7 @@ MEMBERS = 3
 WIDTH = 64
 """Units per hidden layer."""
 OUTCOMES = ("success", "contact", "timeout")
-"""Names of the probabilities, in order; ``contact`` is that of the outcome ``collision``."""
+"""Outcomes, in the order of the probabilities."""
 CLIP = 6.0
 """Bound of a standardised input."""
 N_OUT = len(OUTCOMES) + 1

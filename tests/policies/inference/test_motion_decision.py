@@ -167,9 +167,7 @@ def test_interpolation_refuses_goals_outside_and_direct_flags_them() -> None:
         )
         assert [one.field for one in decision.outside] == ["goal.y"]
         assert decision.inference_mode == "direct"
-        assert decision.beyond_reach == pytest.approx(
-            np.hypot(1.6, 0.3 - 0.1273) - 1.4373, abs=1e-4
-        )
+        assert decision.beyond_reach == pytest.approx(0.1720, abs=1e-4)
     assert decider().decide(query()).beyond_reach == 0.0
 
 
