@@ -84,51 +84,59 @@ def draw(tree: Floats, rng: random.State, leaves: Ints, chances: Floats) -> None
         chances[i] = tree[leaves[i] + tree.shape[0] // 2] / total
 
 
+class Transitions(NamedTuple):
+    """Stored transitions, a ring buffer: a row per step of all environments."""
+
+    rewards: NDArray[np.float32]
+    """Rewards, shape (rows, n_envs)."""
+    dones: NDArray[np.float32]
+    """1 where an episode ended, shape (rows, n_envs)."""
+    timeouts: NDArray[np.float32]
+    """1 where it was truncated, shape (rows, n_envs)."""
+
+
+class Returns(NamedTuple):
+    """n-step returns of n sampled transitions."""
+
+    returns: Floats
+    """Discounted sums of rewards, shape (n,)."""
+    discounts: Floats
+    """Factors of the value after the last step, shape (n,)."""
+    last: Ints
+    """Rows of the last step, shape (n,)."""
+
+
 @kernel(nogil=True)
 def sum_returns(
-    leaves: Ints,
-    n_envs: int,
-    head: int,
-    n_steps: int,
-    gamma: float,
-    rewards: NDArray[np.float32],
-    dones: NDArray[np.float32],
-    timeouts: NDArray[np.float32],
-    returns: Floats,
-    discounts: Floats,
-    last: Ints,
+    stored: Transitions, leaves: Ints, head: int, n_steps: int, gamma: float, out: Returns
 ) -> None:
     """Compute n-step returns of sampled transitions.
 
     Args:
-        leaves: Sampled transitions, ``row * n_envs + environment``.
-        n_envs: Number of environments.
+        stored: Stored transitions.
+        leaves: Sampled transitions, ``row * n_envs + environment``, shape (n,).
         head: Row that is written next; sums end before it.
         n_steps: Maximum number of steps.
         gamma: Discount factor.
-        rewards: Rewards, shape (rows, n_envs).
-        dones: 1 where an episode ended, shape (rows, n_envs).
-        timeouts: 1 where it was truncated, shape (rows, n_envs).
-        returns: Returns, filled.
-        discounts: Factors of the value after the last step, filled.
-        last: Rows of the last step, filled.
+        out: Filled.
     """
+    n_rows, n_envs = stored.rewards.shape
     for i in range(leaves.shape[0]):
         row, env = leaves[i] // n_envs, leaves[i] % n_envs
         total, factor = 0.0, 1.0
         for k in range(n_steps):
-            total += factor * rewards[row, env]
+            total += factor * stored.rewards[row, env]
             factor *= gamma
-            last[i] = row
-            if dones[row, env] > 0.0:
-                if timeouts[row, env] == 0.0:
+            out.last[i] = row
+            if stored.dones[row, env] > 0.0:
+                if stored.timeouts[row, env] == 0.0:
                     factor = 0.0
                 break
-            following = (row + 1) % rewards.shape[0]
+            following = (row + 1) % n_rows
             if following == head or k == n_steps - 1:
                 break
             row = following
-        returns[i], discounts[i] = total, factor
+        out.returns[i], out.discounts[i] = total, factor
 
 
 class PrioritisedReplay(ReplayBuffer):
@@ -190,19 +198,9 @@ class PrioritisedReplay(ReplayBuffer):
         chances, returns, discounts = np.empty((3, batch_size))
         draw(self._tree, self._rng, leaves, chances)
         size = self.buffer_size if self.full else self.pos
-        sum_returns(
-            leaves,
-            self.n_envs,
-            self.pos,
-            self._n_steps,
-            self._gamma,
-            self.rewards,
-            self.dones,
-            self.timeouts,
-            returns,
-            discounts,
-            last,
-        )
+        stored = Transitions(self.rewards, self.dones, self.timeouts)
+        found = Returns(returns, discounts, last)
+        sum_returns(stored, leaves, self.pos, self._n_steps, self._gamma, found)
         rows, envs = leaves // self.n_envs, leaves % self.n_envs
         weights = (size * self.n_envs * chances) ** -beta
         return ReplaySamples(
