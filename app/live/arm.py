@@ -119,7 +119,7 @@ class LiveArm:
         """Test the period from the present state for contact."""
         found = contact(
             self.arm,
-            self._people._replace(columns=body.capsule_columns(len(after.q))),
+            self._people._replace(capsules=body.new_body_capsules(len(after.q))),
             JointPath(self.q, qd, c, d),
             (before.q, after.q),
             (before.cylinders, after.cylinders),
@@ -132,12 +132,12 @@ class LiveArm:
     def shapes(self, people: PeopleInCell) -> Shapes:
         """Return the people as shapes, for the safety layer."""
         here = people.geometry
-        columns = body.capsule_columns(len(here.q))
-        shared = self._people._replace(columns=columns)
+        capsules = body.new_body_capsules(len(here.q))
+        shared = self._people._replace(capsules=capsules)
         geometry = people_geometry_of(shared, here.q, here.cylinders, here.sizes)
         top = np.full((len(here.cylinders), 1), self._people.top_z)
         return Shapes(
-            columns=geometry.columns,
+            capsules=geometry.capsules,
             cylinders=np.hstack([here.cylinders, top]),
             going=here.velocities,
             speed=capsule_speeds_of(shared, geometry, here.q, here.qd),
@@ -146,7 +146,7 @@ class LiveArm:
     def distances(self, people: PeopleInCell) -> dict[int, float]:
         """Return the distance to each person by id [m]."""
         here = people.geometry
-        shared = self._people._replace(columns=body.capsule_columns(len(here.q)))
+        shared = self._people._replace(capsules=body.new_body_capsules(len(here.q)))
         found = [
             *worker_distances(self.arm, shared, self.q, here.q, here.sizes).tolist(),
             *pedestrian_distances(self.arm, shared, self.q, here.cylinders).tolist(),

@@ -25,7 +25,7 @@ import numpy as np
 
 from app.sim.cells.cell import load_cell
 from app.sim.core.arrays import as_kernel_array, as_kernel_index
-from app.sim.geometry.capsules import new_columns
+from app.sim.geometry.capsules import new_capsules
 from app.sim.human.kernels.kinematics import N_CAPSULES
 from app.sim.pick.batch import PickBatch, PickSettings, observation_workspace_of
 from app.sim.pick.kernels import episode as pick
@@ -115,7 +115,7 @@ def with_capsules(arm: Arm, pieces: int) -> Arm:
         link=as_kernel_index(arm.link[source]),
         p0=as_kernel_array(arm.p0[source] + np.array(start)[:, None] * arm.span[source]),
         span=as_kernel_array(span),
-        columns=new_columns(
+        capsules=new_capsules(
             len(source), load_robot_capsules().radius[source], (span**2).sum(1)
         ),
         first=as_kernel_index(np.array([a for a, _ in pairs])),
@@ -128,7 +128,7 @@ def with_robot(pieces: int, seed: int) -> tuple[Subject, Row]:
     batch = beside(("worker",), BATCH, seed)
     arm = with_capsules(batch.arm, pieces)
     world = batch.world._replace(arm=arm)
-    state = batch.state._replace(robot=np.repeat(arm.columns[None], BATCH, axis=0))
+    state = batch.state._replace(robot=np.repeat(arm.capsules[None], BATCH, axis=0))
     work = new_step_workspace(arm, world.people, state.people)
     observation = observation_workspace_of(batch.cell)
     task = batch._task
@@ -136,15 +136,15 @@ def with_robot(pieces: int, seed: int) -> tuple[Subject, Row]:
     rew = np.zeros(BATCH, dtype=np.float32)
     ended, turn = np.zeros(BATCH, dtype=np.int64), acts(BATCH, seed)
     every = np.arange(BATCH)
-    pick.reset_rows(world, task, seed, 0, state, every, work)
+    pick.reset_envs(world, task, seed, 0, state, every, work)
 
     def step() -> None:
         pick.step_batch(world, task, state, work, next(turn), rew, ended)
-        pick.observe_rows(world, task.grasp, state, every, work, observation, PLAIN, obs)
+        pick.observe_envs(world, task.grasp, state, every, work, observation, PLAIN, obs)
         done = np.flatnonzero(ended)
         if len(done):
             state.episode[done] += 1
-            pick.reset_rows(world, task, seed, 0, state, done, work)
+            pick.reset_envs(world, task, seed, 0, state, done, work)
 
     name = f"pick/capsules-{len(arm.link)}"
     return Subject(name=name, batch=BATCH, run=step), capsules_soa(arm, 1, N_CAPSULES)

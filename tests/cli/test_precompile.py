@@ -8,11 +8,11 @@ ROOT = Path(__file__).resolve().parents[2]
 COMPILE_S = 1200.0
 RARE = """
 from app.precompile import PARTS
-from app.sim.reach.kernels.queries import distances_of_rows
+from app.sim.reach.kernels.queries import distances_of_envs
 from app.sim.robot.kernels.arm import cell_clearance, self_clearance
 for part in ("moving", "choosing"):
     PARTS[part]()
-for kernel in (distances_of_rows, cell_clearance, self_clearance):
+for kernel in (distances_of_envs, cell_clearance, self_clearance):
     print(len(kernel.signatures))
 """
 """Prints for kernels that live worlds call rarely how many entries set-up has compiled."""

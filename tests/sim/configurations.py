@@ -64,13 +64,13 @@ def chunk(number: int) -> Iterator[Case]:
     )
     expected = expected - RADII[:, None] - human.CAPSULE_RADII
     pose, geometry = new_robot_pose(arm), new_people_geometry(people, 1, 0)
-    found = np.empty((len(RADII), geometry.columns.shape[1]))
+    found = np.empty((len(RADII), geometry.capsules.shape[1]))
     for k in range(CHUNK):
         place_robot(arm, q[k], pose)
         place_workers(people, human_q[k : k + 1], geometry)
-        clearance = people_clearance(people, pose.columns, geometry)
+        clearance = people_clearance(people, pose.capsules, geometry)
         for i, row in enumerate(found):
-            distances(pose.columns, i, geometry.columns, row)
+            distances(pose.capsules, i, geometry.capsules, row)
         d = found[:, : len(human.CAPSULE_RADII)].copy()
         yield Case(robot_at[k], person_at[k], d, expected[k], clearance)
 

@@ -91,13 +91,13 @@ def _robot(cell: Cell) -> tuple[Vec, Vec]:
     arm = arm_of(cell)
     pose, n = new_robot_pose(arm), len(arm.link)
     place_robot(arm, arm.home, pose)
-    return ends_of(pose.columns, n), pose.columns[RADIUS, :n]
+    return ends_of(pose.capsules, n), pose.capsules[RADIUS, :n]
 
 
 def _worker(cell: Cell) -> tuple[Vec, Vec]:
     q = rest_posture(*cell.human.home)
-    columns = people_geometry_of(people_of(cell), q[None], np.zeros((0, 3))).columns
-    return ends_of(columns, N_CAPSULES), columns[RADIUS, :N_CAPSULES]
+    capsules = people_geometry_of(people_of(cell), q[None], np.zeros((0, 3))).capsules
+    return ends_of(capsules, N_CAPSULES), capsules[RADIUS, :N_CAPSULES]
 
 
 if __name__ == "__main__":

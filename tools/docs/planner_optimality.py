@@ -17,7 +17,7 @@ import numpy as np
 
 from app.sim.sorting.batch import apply
 from app.sim.sorting.kernels.planner import new_work
-from app.sim.sorting.kernels.planner_batch import TaskBatch, plan_rows
+from app.sim.sorting.kernels.planner_batch import TaskBatch, plan_tasks
 from app.sim.sorting.planner import solve
 from app.sim.sorting.state import Move, SortingShape, SortingState
 from tests.sim.sorting.sorting_search import (
@@ -118,9 +118,9 @@ def times(n_cells: int, n_colours: int, on_towers: float, seed: int) -> Json:
     work = new_work(n_cells, n_colours, shape.n_sizes)
     best, fewest = np.zeros(n, dtype=np.int64), np.zeros(n, dtype=np.int64)
     batch = TaskBatch(clutter, towers, heights, asked, goal_heights, fail)
-    plan_rows(batch, work, best, fewest)
+    plan_tasks(batch, work, best, fewest)
     began = time.process_time()
-    plan_rows(batch, work, best, fewest)
+    plan_tasks(batch, work, best, fewest)
     batched = time.process_time() - began
     single = []
     for state in states:

@@ -85,7 +85,7 @@ def _clearances(arm: Arm, shared: People, q: Vec, person: Person, postures: Vec)
         size[None] if body else np.zeros((0, N_SIZE)),
     )
     found = np.empty(len(postures))
-    _measure(shared, robot.columns, geometry, postures, found)
+    _measure(shared, robot.capsules, geometry, postures, found)
     return found
 
 
@@ -97,7 +97,7 @@ def _measure(
     for i in range(postures.shape[0]):
         if geometry.q.shape[0] > 0:
             place_workers(shared, postures[i : i + 1], geometry)
-            capsule_clearances(robot, geometry.columns, geometry.gap)
+            capsule_clearances(robot, geometry.capsules, geometry.clearance)
         else:
             geometry.cylinders[0, 0] = postures[i, 0]
             geometry.cylinders[0, 1] = postures[i, 1]

@@ -23,7 +23,7 @@ from app.sim.cells.cell import Cell
 from app.sim.envs.sorting import SortingTask
 from app.sim.sorting.batch import OUTCOMES, SortingSettings, batch_in
 from app.sim.sorting.kernels.planner import new_work
-from app.sim.sorting.kernels.planner_batch import TaskBatch, mark_rows
+from app.sim.sorting.kernels.planner_batch import TaskBatch, mark_tasks
 from app.sim.sorting.kernels.task import FAILURE_SCALE
 from app.sim.sorting.state import NULL, SortingShape
 
@@ -67,7 +67,7 @@ def expert_of(shape: SortingShape) -> Expert:
         first = np.zeros((n, shape.n_actions), dtype=np.bool_)
         fail = obs[:, k + 2 * c * k :] / FAILURE_SCALE
         tasks = TaskBatch(clutter, towers, heights, goal, wanted, fail)
-        mark_rows(tasks, work, first)
+        mark_tasks(tasks, work, first)
         return first
 
     return label

@@ -43,6 +43,19 @@ REQUIRED = {
     "memory": list,
 }
 """Fields every manifest has, with their JSON types."""
+RENAMED = {
+    "_sight": "_observation_work",
+    "clearances": "clearances_ahead",
+    "columns": "capsules",
+    "columns0": "capsules0",
+    "columns1": "capsules1",
+    "gap": "clearance",
+    "gap_vector": "to_person",
+    "rows": "envs",
+    "seen_columns": "seen_capsules",
+}
+"""Parts of names of environments' arrays in states of earlier versions, and their present
+names; ``rows`` of pedestrians keep their name."""
 
 
 @dataclass(frozen=True)
@@ -55,12 +68,22 @@ class TrainingState(TensorFile):
         return int(self.manifest["step"])
 
     def entries(self) -> State:
-        """Return arrays and values by name.
+        """Return arrays and values by their present names.
 
         Raises:
             InvalidInput: The bytes are no safetensors file.
         """
-        return {**self.arrays(), **self.manifest["values"]}
+        stored = {**self.arrays(), **self.manifest["values"]}
+        return {present_name(name): value for name, value in stored.items()}
+
+
+def present_name(name: str) -> str:
+    """Return the present name of an entry of a state that an earlier version has written."""
+    if not name.startswith("env."):
+        return name
+    start, *rest = name.split(".walkers.", 1)
+    parts = [RENAMED.get(part, part) for part in start.split(".")]
+    return ".walkers.".join([".".join(parts), *rest])
 
 
 def pack(manifest: Mapping[str, Any], entries: State) -> TrainingState:

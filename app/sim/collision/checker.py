@@ -27,7 +27,7 @@ CELL_MARGIN = 0.002
 class Shapes:
     """Shapes of any number of people of any kind at one moment."""
 
-    columns: Vec
+    capsules: Vec
     """Capsules, shape (9, m); see ``geometry/capsules.py``."""
     cylinders: Vec
     """Upright cylinders on the floor: x, y, radius, top [m], shape (n, 4)."""
@@ -48,7 +48,7 @@ def greatest_speeds(going: Vec) -> Vec:
 
 def no_people() -> Shapes:
     """Return an empty cell."""
-    return Shapes(columns=np.zeros((N_ROWS, 0)), cylinders=np.zeros((0, 4)))
+    return Shapes(capsules=np.zeros((N_ROWS, 0)), cylinders=np.zeros((0, 4)))
 
 
 def capsule_shapes(ends: Vec, radius: Vec) -> Shapes:
@@ -58,7 +58,7 @@ def capsule_shapes(ends: Vec, radius: Vec) -> Shapes:
         ends: Ends of the capsules [m], shape (m, 2, 3).
         radius: Their radii [m], shape (m,).
     """
-    return replace(no_people(), columns=capsules_soa(ends, radius, padded_size(len(radius))))
+    return replace(no_people(), capsules=capsules_soa(ends, radius, padded_size(len(radius))))
 
 
 def shapes_of(
@@ -81,7 +81,7 @@ def shapes_of(
         if rows.ndim != 2 or rows.shape[1] != width or not np.isfinite(rows).all():
             raise InvalidInput(name, rows.tolist(), f"must be finite, of shape (n, {width})")
     if len(qs) == 0:
-        return Shapes(columns=np.zeros((N_ROWS, 0)), cylinders=tubes)
+        return Shapes(capsules=np.zeros((N_ROWS, 0)), cylinders=tubes)
     ends = np.concatenate([human.capsules(q, cell.body, cell.floor_z) for q in qs])
     workers = capsule_shapes(ends, np.tile(human.capsule_radii(cell.body), len(qs)))
     return replace(workers, cylinders=tubes)
@@ -104,8 +104,8 @@ class Checker:
     ) -> None:
         self.arm, self.people, self.margin, self.cell_margin = arm, people, margin, cell_margin
         self._obstacles = free.Obstacles(
-            people.columns,
-            np.empty(people.columns.shape[1]),
+            people.capsules,
+            np.empty(people.capsules.shape[1]),
             people.cylinders,
             float(margin),
             float(cell_margin),

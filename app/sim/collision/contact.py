@@ -105,7 +105,7 @@ def contact(
     geometry.pelvis_z[:] = geometry.size[:, PELVIS_Z]
     geometry.q0[:], geometry.cylinders0[:] = human_q[0], cylinders[0]
     clear = np.array(kernel.clearances(arm, people, robot, geometry))
-    columns0 = geometry.columns.copy()
+    capsules0 = geometry.capsules.copy()
     if after is not None:
         geometry.size[:] = after
     q1 = q0 + arm.dt * (qd0 + arm.dt * (c + arm.dt * d))
@@ -113,7 +113,7 @@ def contact(
         path, q1, as_kernel_array(human_q[1]), as_kernel_array(cylinders[1])
     )
     kind, x = kernel.sweep(
-        arm, people, motion, robot.columns.copy(), columns0, clear, robot, geometry
+        arm, people, motion, robot.capsules.copy(), capsules0, clear, robot, geometry
     )
     link, part, worker, walker = _who(arm, people, kind, robot, geometry)
     return Contact(
@@ -141,8 +141,8 @@ def worker_distances(arm: Arm, people: People, q: Vec, human_q: Vec, sizes: Vec)
         return np.zeros(0)
     robot = _robot_at(arm, q)
     geometry = people_geometry_of(people, human_q, NO_CYLINDERS, sizes)
-    capsule_clearances(robot.columns, geometry.columns, geometry.gap)
-    parts = geometry.gap[: n_workers * N_CAPSULES].reshape(n_workers, N_CAPSULES)
+    capsule_clearances(robot.capsules, geometry.capsules, geometry.clearance)
+    parts = geometry.clearance[: n_workers * N_CAPSULES].reshape(n_workers, N_CAPSULES)
     return np.asarray(parts.min(axis=1))
 
 
@@ -154,8 +154,8 @@ def pedestrian_distances(arm: Arm, people: People, q: Vec, cylinders: Vec) -> Ve
         q: Joint positions [rad], shape (6,).
         cylinders: x, y and radius of each [m], shape (C, 3).
     """
-    columns, top = _robot_at(arm, q).columns, people.top_z
-    found = [cylinder_clearance(columns, 0, x, y, r, top)[0] for x, y, r in cylinders]
+    capsules, top = _robot_at(arm, q).capsules, people.top_z
+    found = [cylinder_clearance(capsules, 0, x, y, r, top)[0] for x, y, r in cylinders]
     return np.array(found)
 
 
@@ -174,20 +174,20 @@ def _who(
         _, pair = arm_kernel.self_clearance(arm, robot)
         return names[arm.first[pair]], names[arm.second[pair]], None, None
     if kind == kernel.CELL_CONTACT:
-        _, link, box = arm_kernel.cell_clearance(arm, robot.columns)
+        _, link, box = arm_kernel.cell_clearance(arm, robot.capsules)
         return names[link], "table" if box < 0 else "obstacle", None, None
-    who = people_kernel.nearest_person(people, robot.columns, geometry)
+    who = people_kernel.nearest_person(people, robot.capsules, geometry)
     if who < 0:
         return names[-1], "no-person", None, None
     if who >= len(geometry.q):
         walker = who - len(geometry.q)
         x, y, r = geometry.cylinders[walker]
-        _, link = cylinder_clearance(robot.columns, 0, x, y, r, people.top_z)
+        _, link = cylinder_clearance(robot.capsules, 0, x, y, r, people.top_z)
         return names[link], "walker", None, walker
     best, link, part = np.inf, 0, 0
     for k in range(len(names)):
-        distances(robot.columns, k, geometry.columns, geometry.gap)
-        near = int(np.argmin(geometry.gap))
-        if geometry.gap[near] < best:
-            best, link, part = float(geometry.gap[near]), k, near
+        distances(robot.capsules, k, geometry.capsules, geometry.clearance)
+        near = int(np.argmin(geometry.clearance))
+        if geometry.clearance[near] < best:
+            best, link, part = float(geometry.clearance[near]), k, near
     return names[link], human.CAPSULE_NAMES[part % N_CAPSULES], part // N_CAPSULES, None

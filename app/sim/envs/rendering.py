@@ -127,7 +127,7 @@ def _robot_solids(cell: Cell, q: Vec) -> list[Solid]:
     capsules = load_robot_capsules(mount.tool_length, mount.tool_radius)
     pose = arm_kernel.new_robot_pose(arm)
     arm_kernel.place_robot(arm, as_kernel_array(q), pose)
-    ends = ends_of(pose.columns, len(capsules.name))
+    ends = ends_of(pose.capsules, len(capsules.name))
     colours = [JOINT if name in _JOINTS else ALUMINIUM for name in capsules.name[:-1]]
     return _capsules(ends, capsules.radius, [*colours, TOOL])
 
@@ -169,7 +169,7 @@ def worker_solids(cell: Cell, q: Vec, sizes: Vec | None = None) -> list[Solid]:
         for w in range(len(q))
         for part in range(body.N_CAPSULES)
     ]
-    return _capsules(ends_of(geometry.columns, n), geometry.columns[RADIUS, :n], colours)
+    return _capsules(ends_of(geometry.capsules, n), geometry.capsules[RADIUS, :n], colours)
 
 
 def standing_workers(cell: Cell) -> list[Solid]:

@@ -58,13 +58,13 @@ class SortingTask:
 
     def infos(self) -> Infos:
         """Return ``info``, an entry per task."""
-        rows = self.batch.rows
+        envs = self.batch.envs
         return {
-            "outcome": NAMES[rows.outcome],
-            "episode_number": rows.episode.copy(),
-            "attempts": rows.steps.copy(),
-            "moves": rows.moves.copy(),
-            "failures": rows.failures.copy(),
+            "outcome": NAMES[envs.outcome],
+            "episode_number": envs.episode.copy(),
+            "attempts": envs.steps.copy(),
+            "moves": envs.moves.copy(),
+            "failures": envs.failures.copy(),
             "action_mask": self.batch.masks().astype(np.int8),
         }
 

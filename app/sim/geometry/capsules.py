@@ -34,7 +34,7 @@ def padded_size(n: int) -> int:
     return -(-n // WIDTH) * WIDTH
 
 
-def new_columns(n: int, radius: Vec, length2: Vec | None = None) -> Vec:
+def new_capsules(n: int, radius: Vec, length2: Vec | None = None) -> Vec:
     """Return a set of ``n`` capsules, all at NOWHERE until they are placed.
 
     Args:
@@ -60,16 +60,16 @@ def capsules_soa(ends: Vec, radius: Vec, n: int | None = None) -> Vec:
         n: Number of columns; k where None.
     """
     span = ends[:, 1] - ends[:, 0]
-    out = new_columns(len(radius) if n is None else n, radius, (span**2).sum(1))
+    out = new_capsules(len(radius) if n is None else n, radius, (span**2).sum(1))
     out[X:UX, : len(radius)] = ends[:, 0].T
     out[UX:UU, : len(radius)] = span.T
     return out
 
 
-def ends_of(columns: Vec, n: int) -> Vec:
-    """Return the ends of the first ``n`` columns [m], shape (n, 2, 3)."""
-    start = columns[X:UX, :n].T
-    return np.stack([start, start + columns[UX:UU, :n].T], axis=1)
+def ends_of(capsules: Vec, n: int) -> Vec:
+    """Return the ends of the first ``n`` capsules [m], shape (n, 2, 3)."""
+    start = capsules[X:UX, :n].T
+    return np.stack([start, start + capsules[UX:UU, :n].T], axis=1)
 
 
 @kernel(inline="always")

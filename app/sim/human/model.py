@@ -108,7 +108,7 @@ def capsules(q: Vec, size: Vec, floor_z: float) -> Vec:
         size: The person's size [m], shape (12,) (``BodySize.vector``, ``Cell.body``).
         floor_z: Height of the floor [m] (``Cell.floor_z``).
     """
-    out = body.capsule_columns(1)
+    out = body.new_body_capsules(1)
     body.capsules(*_forward(q, size), as_kernel_array(size), floor_z, 0, out)
     return ends_of(out, body.N_CAPSULES)
 

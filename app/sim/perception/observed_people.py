@@ -22,7 +22,7 @@ from app.sim.collision.checker import Shapes
 from app.sim.core.arrays import Vec, as_kernel_array
 from app.sim.core.kernels.bounds import are_inside
 from app.sim.human import model as human
-from app.sim.human.kernels.kinematics import N_SIZE, PELVIS_Z, capsule_columns
+from app.sim.human.kernels.kinematics import N_SIZE, PELVIS_Z, new_body_capsules
 from app.sim.human.person import Person
 from app.sim.people.kernels import people as people_kernel
 from app.sim.people.kernels.pedestrian import N_PAST
@@ -315,7 +315,7 @@ def nearest_index(arm: Arm, shared: People, q: Vec, people: Sequence[Person]) ->
     geometry = _placed(shared, [people[i] for i in order])
     robot = arm_kernel.new_robot_pose(arm)
     arm_kernel.place_robot(arm, as_kernel_array(q), robot)
-    return order[people_kernel.nearest_person(shared, robot.columns, geometry)]
+    return order[people_kernel.nearest_person(shared, robot.capsules, geometry)]
 
 
 def bodies_first(people: Sequence[Person]) -> list[int]:
@@ -340,7 +340,7 @@ def people_shapes(shared: People, people: Sequence[Person]) -> Shapes:
     ]
     observed = [math.hypot(*one.qd[:2]) + abs(one.growth) for one in cylinders]
     return Shapes(
-        columns=geometry.columns,
+        capsules=geometry.capsules,
         cylinders=np.column_stack([geometry.cylinders, tops]),
         going=np.reshape(going, (-1, 3)),
         cylinder_speed=np.array(observed),
@@ -359,7 +359,7 @@ def _placed(shared: People, people: Sequence[Person]) -> PeopleGeometry:
     cylinders = [person.cylinder for person in people if person.cylinder is not None]
     sizes = [shared.bodies[0] if one.size is None else one.size for one in workers]
     return people_geometry_of(
-        shared._replace(columns=capsule_columns(len(workers))),
+        shared._replace(capsules=new_body_capsules(len(workers))),
         np.reshape([one.q for one in workers], (-1, 18)),
         np.reshape(cylinders, (-1, 3)).astype(np.float64),
         np.reshape(sizes, (-1, N_SIZE)),

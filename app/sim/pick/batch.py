@@ -218,7 +218,7 @@ class PickBatch(EnvBatch):
         InvalidInput: The cell lacks stations for picking or for the number of candidates.
     """
 
-    STATE: ClassVar[tuple[str, ...]] = (*EnvBatch.STATE, "_sight")
+    STATE: ClassVar[tuple[str, ...]] = (*EnvBatch.STATE, "_observation_work")
     _kernel = episode
     world: starts.PickCell
 
@@ -242,12 +242,12 @@ class PickBatch(EnvBatch):
             first_env=first_env,
             view=VIEWS[settings.observation],
         )
-        self._sight = observation_workspace_of(self.cell)
+        self._observation_work = observation_workspace_of(self.cell)
 
     def _observe(self, envs: Indices, out: NDArray[np.float32]) -> None:
         shared = self.world, self.settings.grasp, self.state
-        work = self._work, self._sight
-        self._call(episode.observe_rows, *shared, envs, *work, self._view, out)
+        work = self._work, self._observation_work
+        self._call(episode.observe_envs, *shared, envs, *work, self._view, out)
 
     def set_collision_cost(self, cost: float) -> None:
         """Set the cost of a collision in rewards from now on."""

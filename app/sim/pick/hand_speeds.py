@@ -22,7 +22,7 @@ def hand_speeds(batch: PickBatch, n_scripts: int = 200) -> dict[str, float]:
     rates = []
     for number in range(n_scripts):
         start_stream(batch.seed, 1 << 20, number, rng)
-        record_palms(people, state, rng, batch.arm.columns, tick, geometry, palms)
+        record_palms(people, state, rng, batch.arm.capsules, tick, geometry, palms)
         rates.append(np.linalg.norm(np.diff(palms, axis=0), axis=-1).ravel() / tick)
     speeds = np.concatenate(rates)
     moving = speeds[speeds > 0.05]

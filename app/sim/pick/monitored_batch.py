@@ -17,7 +17,7 @@ from app.sim.pick.batch import PickBatch, PickSettings
 from app.sim.pick.kernels import monitored_step
 from app.sim.safety.layer import SafetySettings
 from app.sim.scenario.kernels.episode import Indices
-from app.sim.scenario.kernels.monitored_motion import begin_rows
+from app.sim.scenario.kernels.monitored_motion import begin_envs
 from app.sim.scenario.monitoring import (
     MonitoredEpisodes,
     MonitoringSettings,
@@ -63,7 +63,7 @@ class MonitoredPickBatch(PickBatch):
     def _start(self, envs: Indices) -> None:
         super()._start(envs)
         world, state, monitor = self.world, self.state, self._monitor
-        self._call(begin_rows, world.arm, world.people, state, envs, monitor, self._work)
+        self._call(begin_envs, world.arm, world.people, state, envs, monitor, self._work)
 
     def _move(self, act: NDArray[np.float32]) -> None:
         shared: tuple[Any, ...] = self.world, self._task, self.state, self._monitor, self._work

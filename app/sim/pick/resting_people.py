@@ -92,7 +92,7 @@ class RestingPeoplePlanner:
             q_grasp: Joint positions at the objects [rad], shape (n, 6).
         """
         least = grasp.start_clearance
-        beside = people.columns.tobytes(), people.cylinders.tobytes(), least
+        beside = people.capsules.tobytes(), people.cylinders.tobytes(), least
         if beside != self._beside:
             self._beside, self._free = beside, {}
         found = np.empty(len(q_over), dtype=np.bool_)

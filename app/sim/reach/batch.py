@@ -258,7 +258,7 @@ class ReachBatch(EnvBatch):
             equal environments ``k`` and on of a batch that starts at 0, bit for bit.
     """
 
-    STATE: ClassVar[tuple[str, ...]] = (*EnvBatch.STATE, "_sight")
+    STATE: ClassVar[tuple[str, ...]] = (*EnvBatch.STATE, "_observation_work")
     _kernel = episode
     world: episode.ReachCell
 
@@ -279,7 +279,7 @@ class ReachBatch(EnvBatch):
             first_env=first_env,
             view=VIEWS[settings.observation],
         )
-        self._sight = new_observation_workspace(
+        self._observation_work = new_observation_workspace(
             self.arm, world.people, people, new_motion_predictor()
         )
 
@@ -344,8 +344,8 @@ class ReachBatch(EnvBatch):
 
     def _write(self, envs: Indices, which: int, goals: Vec, out: NDArray[np.float32]) -> None:
         """Write the observations for some goals, shape (k, n, obs_size)."""
-        state = self.world, self.state, envs, self._sight
-        self._call(queries.observe_rows, *state, self._view, which, goals, out)
+        state = self.world, self.state, envs, self._observation_work
+        self._call(queries.observe_envs, *state, self._view, which, goals, out)
 
     def person_distances(self, envs: Indices) -> Vec:
         """Return the distance of the robot to each person in some environments.
@@ -361,7 +361,7 @@ class ReachBatch(EnvBatch):
         """
         out = np.empty((len(envs), self.n_people))
         checked = self._checked(envs)
-        queries.distances_of_rows(self.world, self.state, checked, self._sight, out)
+        queries.distances_of_envs(self.world, self.state, checked, self._observation_work, out)
         return out
 
     @property
@@ -371,5 +371,5 @@ class ReachBatch(EnvBatch):
 
     def observe(self) -> NDArray[np.float32]:
         """Update all clearances and observations after the state was changed from outside."""
-        queries.measure_rows(self.world, self.state, self._all, self._sight)
+        queries.measure_envs(self.world, self.state, self._all, self._observation_work)
         return self._look(self._all)

@@ -56,7 +56,7 @@ class BlockedReachBatch(ReachBatch):
         state = self.state
         moved, after = state.q[envs].copy(), state.clear[envs].copy()
         state.q[envs] = q
-        self._call(queries.measure_rows, self.world, state, envs, self._sight)
+        self._call(queries.measure_envs, self.world, state, envs, self._observation_work)
         rest = np.column_stack([state.clear[envs, 0], clear[:, 1:]])
         blocked = ((after < rest) & (after <= CONTACT)).any(axis=1)
         free, held = envs[~blocked], envs[blocked]

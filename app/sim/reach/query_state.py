@@ -68,7 +68,7 @@ class QueryState:
         self._tops = np.full((n_cylinders, 1), self.top_z)
         self.distances = np.zeros(n_bodies + n_cylinders)
         """Distance of the robot to each person [m], bodies first, shape (n_people,)."""
-        self._speeds = np.zeros(self._work.geometry.columns.shape[1])
+        self._speeds = np.zeros(self._work.geometry.capsules.shape[1])
         self._call: Callable[..., None] | None = None
         self._buffers: dict[int, tuple[Vec, NDArray[np.float32]]] = {}
         self._load = direct(load_state, self._shared)
@@ -99,7 +99,7 @@ class QueryState:
         geometry = self._work.geometry
         going = self.state.people.walkers.rows[0][:, [VX, VY, GROWTH]]
         return Shapes(
-            columns=geometry.columns.copy(),
+            capsules=geometry.capsules.copy(),
             cylinders=np.concatenate([geometry.cylinders, self._tops], axis=1),
             going=np.where(self._measured[:, None], going, np.nan),
             speed=self._speeds.copy(),
@@ -161,7 +161,7 @@ class QueryState:
             out,
         )
         if self._call is None:
-            self._call = direct(queries.observe_rows, arguments)
+            self._call = direct(queries.observe_envs, arguments)
         self._call(*arguments)
         found: NDArray[np.float32] = out[0]
         return found

@@ -128,7 +128,7 @@ def run_trial(
     state = new_people_state(cell, people, 1)
     geometry = new_people_geometry(people, len(cell.workers), len(cell.cylinders))
     n_late = ceil(settings.true_delay / arm.dt - 1e-9)
-    shape = (people.columns.shape[1], len(cell.cylinders))
+    shape = (people.capsules.shape[1], len(cell.cylinders))
     spaces = new_ssm_workspace(arm, *shape), new_ssm_workspace(arm, *shape)
     work = new_trial_work(arm, people, state, geometry, spaces, n_late)
     rows = np.zeros((n_episodes, N_RESULT))

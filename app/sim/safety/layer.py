@@ -134,43 +134,43 @@ def safety_settings(cell: Cell) -> SafetySettings:
     return SafetySettings(**cell.safety.model_dump())
 
 
-def contact_speeds(settings: SafetySettings, n_columns: int, n_cylinders: int) -> Vec:
+def contact_speeds(settings: SafetySettings, n_capsules: int, n_cylinders: int) -> Vec:
     """Return the admissible contact speed of each part of the people [m/s].
 
     Args:
         settings: Assumptions; without power and force limiting nothing may be touched.
-        n_columns: Number of capsules: twelve per worker; further ones are unused.
+        n_capsules: Number of capsules: twelve per worker; further ones are unused.
 
     Returns:
-        Capsules first, then cylinders, shape (n_columns + n_cylinders,).
+        Capsules first, then cylinders, shape (n_capsules + n_cylinders,).
     """
-    out = np.zeros(n_columns + n_cylinders)
+    out = np.zeros(n_capsules + n_cylinders)
     if settings.pfl:
         one = contact_limits.capsule_contact_speeds(settings.robot_mass, settings.contact_area)
-        out[:n_columns] = np.resize(one, n_columns)
-        out[n_columns:] = contact_limits.cylinder_contact_speed(
+        out[:n_capsules] = np.resize(one, n_capsules)
+        out[n_capsules:] = contact_limits.cylinder_contact_speed(
             settings.robot_mass, settings.contact_area
         )
     return out
 
 
 def separation_rule(
-    settings: SafetySettings, n_columns: int, n_cylinders: int, known: bool
+    settings: SafetySettings, n_capsules: int, n_cylinders: int, known: bool
 ) -> separation_check.SeparationRule:
     """Return the settings for the kernels.
 
     Args:
-        n_columns: Number of capsules; see :func:`contact_speeds`.
+        n_capsules: Number of capsules; see :func:`contact_speeds`.
         known: Whether the velocities of cylinders are known.
     """
-    speed = np.full(n_columns + n_cylinders, settings.human_speed)
+    speed = np.full(n_capsules + n_cylinders, settings.human_speed)
     if known:
-        speed[n_columns:] = settings.speed_change
+        speed[n_capsules:] = settings.speed_change
     return separation_check.SeparationRule(
         speed=speed,
         latency=settings.latency,
         margin=settings.margin,
-        contact_speed=contact_speeds(settings, n_columns, n_cylinders),
+        contact_speed=contact_speeds(settings, n_capsules, n_cylinders),
     )
 
 
@@ -205,7 +205,7 @@ class SafetyLayer:
             InvalidInput: The age is negative.
         """
         require_finite("q, qd, c, d", np.concatenate([q, qd, c, d]))
-        require_finite("people", np.append(people.columns.ravel(), age))
+        require_finite("people", np.append(people.capsules.ravel(), age))
         require_finite("people", people.cylinders.ravel())
         if age < 0.0:
             raise InvalidInput("age", age, "must not be negative")
@@ -214,7 +214,7 @@ class SafetyLayer:
         )
         self._load_people(people)
         shapes = PeopleShapes(
-            as_kernel_array(people.columns), as_kernel_array(people.cylinders)
+            as_kernel_array(people.capsules), as_kernel_array(people.cylinders)
         )
         arm = admitting(self.arm, path.q, path.qd)
         arguments = (arm, self._rule, float(age), shapes, path, self._space)
@@ -225,7 +225,7 @@ class SafetyLayer:
 
     def _load_people(self, people: Shapes) -> None:
         """Allocate work space for the people and load the velocities of cylinders."""
-        shape = (people.columns.shape[1], len(people.cylinders))
+        shape = (people.capsules.shape[1], len(people.cylinders))
         going = people.going if self.settings.use_measured_velocity else None
         known = going is not None
         if (shape, known) != (self._shape, self._known):
@@ -306,7 +306,7 @@ class SafetyLayer:
             people: People of that decision.
             age: Their age beyond the tracker's delay [s].
         """
-        if not self._space.gap.size:
+        if not self._space.clearance.size:
             return None
         column = int(self._space.cause[separation_check.CAUSE_PART])
         time = self.arm.dt + self.settings.latency + age + decision.stop_time
@@ -323,7 +323,7 @@ class SafetyLayer:
         """Return the distance of each part less what it may move in a time [m], (m + n,)."""
         space = self._space
         speed = np.maximum(self._rule.speed, space.observed_speed)
-        reserve: Vec = space.gap[separation_check.NOW] - speed * seconds
+        reserve: Vec = space.clearance[separation_check.NOW] - speed * seconds
         for column in range(self._shape[0], len(reserve)):  # perhaps of known velocity
             separation, _ = self._nearest(column, people)
             v_h = self._human_speed(column, people, separation, seconds)
@@ -332,9 +332,9 @@ class SafetyLayer:
 
     def _person_of(self, column: int) -> tuple[int, int | None]:
         """Return the person of a column, workers first, and its part; None for a cylinder."""
-        n_columns = self._shape[0]
-        if column >= n_columns:
-            return n_columns // body.N_CAPSULES + column - n_columns, None
+        n_capsules = self._shape[0]
+        if column >= n_capsules:
+            return n_capsules // body.N_CAPSULES + column - n_capsules, None
         return column // body.N_CAPSULES, column % body.N_CAPSULES
 
     def _terms_of(
@@ -363,13 +363,14 @@ class SafetyLayer:
     def _nearest(self, column: int, people: Shapes) -> tuple[float, int]:
         """Return the observed distance of a part of the people [m], and the nearest capsule."""
         robot, out = (
-            self._space.columns[separation_check.NOW],
-            np.empty(self.arm.columns.shape[1]),
+            self._space.capsules[separation_check.NOW],
+            np.empty(self.arm.capsules.shape[1]),
         )
-        if column < people.columns.shape[1]:
-            distances(as_kernel_array(people.columns), column, robot, out)
-            return float(self._space.gap[separation_check.NOW, column]), int(least(out)[1])
-        x, y, r, top = people.cylinders[column - people.columns.shape[1]]
+        if column < people.capsules.shape[1]:
+            distances(as_kernel_array(people.capsules), column, robot, out)
+            clearance = self._space.clearance[separation_check.NOW, column]
+            return float(clearance), int(least(out)[1])
+        x, y, r, top = people.cylinders[column - people.capsules.shape[1]]
         separation, nearest = cylinder_clearance(robot, 0, x, y, r, top)
         return float(separation), int(nearest)
 
@@ -387,7 +388,7 @@ class SafetyLayer:
         if k < 0 or not self._known or people.going is None or np.isnan(people.going[k]).any():
             observed = float(self._space.observed_speed[column])
             return max(self.settings.human_speed, observed)
-        robot, (x, y, r, _) = self._space.columns[separation_check.NOW], people.cylinders[k]
+        robot, (x, y, r, _) = self._space.capsules[separation_check.NOW], people.cylinders[k]
         vx, vy, growth = people.going[k]
         grown = r + max(0.0, growth) * seconds
         there = swept_clearance(robot, x, y, vx * seconds, vy * seconds, grown)

@@ -51,9 +51,9 @@ def separation_zone(arm: Arm, settings: SafetySettings, q: Vec, qd: Vec) -> Vec:
     robot = arm_kernel.new_robot_pose(arm)
     arm_kernel.place_robot(arm, as_kernel_array(q), robot)
     n = len(arm.link)
-    start, along = robot.columns[[X, Y], :n].T, robot.columns[[UX, UY], :n].T
+    start, along = robot.capsules[[X, Y], :n].T, robot.capsules[[UX, UY], :n].T
     points = np.concatenate([start, start + along])
-    grown = robot.columns[RADIUS, :n] + required_distances(arm, settings, qd)
+    grown = robot.capsules[RADIUS, :n] + required_distances(arm, settings, qd)
     radii = np.tile(grown, 2)
     angles = 2.0 * np.pi * np.arange(N_DIRECTIONS) / N_DIRECTIONS
     out = np.column_stack([np.cos(angles), np.sin(angles)])

@@ -54,7 +54,7 @@ class EnvBatch(Stateful, ABC):
         "_ended",
     )
     _kernel: ModuleType
-    """Kernels of the scenario: ``reset_rows`` and ``step_batch``."""
+    """Kernels of the scenario: ``reset_envs`` and ``step_batch``."""
     cell: Cell
     """Work cell."""
 
@@ -175,7 +175,7 @@ class EnvBatch(Stateful, ABC):
     def _start(self, envs: Indices) -> None:
         """Start episodes in some environments."""
         first = self.seed, self._first
-        reset = self._kernel.reset_rows
+        reset = self._kernel.reset_envs
         self._call(reset, self.world, self._task, *first, self.state, envs, self._work)
 
     def _move(self, act: NDArray[np.float32]) -> None:

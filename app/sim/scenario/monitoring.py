@@ -113,7 +113,7 @@ def new_monitored_state(
         batch.state.people.q.shape[1],
         batch.state.people.cylinders.shape[1],
     )
-    shape = (people.columns.shape[1], n_cylinders)
+    shape = (people.capsules.shape[1], n_cylinders)
     return MonitoredState(
         safety=separation_rule(safety, *shape, safety.use_measured_velocity),
         active=monitoring.active,

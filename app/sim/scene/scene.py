@@ -21,7 +21,7 @@ from app.sim.cells.people import (
     Worker,
 )
 from app.sim.core.arrays import Vec, as_kernel_array, as_kernel_index
-from app.sim.geometry.capsules import new_columns
+from app.sim.geometry.capsules import new_capsules
 from app.sim.human import model as human
 from app.sim.human.kernels import kinematics as body
 from app.sim.people.human_motion_config import NO_TRACKS, HumanMotionConfig, with_human_motion
@@ -172,7 +172,7 @@ def arm_of(cell: Cell) -> Arm:
         link=as_kernel_index(capsules.link),
         p0=as_kernel_array(capsules.p0),
         span=as_kernel_array(span),
-        columns=new_columns(len(capsules.link), capsules.radius, (span**2).sum(axis=1)),
+        capsules=new_capsules(len(capsules.link), capsules.radius, (span**2).sum(axis=1)),
         first=as_kernel_index(pairs[:, 0]),
         second=as_kernel_index(pairs[:, 1]),
         lever=levers(mount.tool_length, mount.tool_radius),
@@ -203,7 +203,7 @@ def people_of(cell: Cell, work: HumanMotionConfig | None = None) -> People:
         bodies=as_kernel_array(cell.body[None]),
         floor_z=cell.floor_z,
         top_z=cell.floor_z + max(heights, default=STANDING_TOP),
-        columns=body.capsule_columns(workers),
+        capsules=body.new_body_capsules(workers),
         postures=np.zeros((1, 18)),
         hands=np.zeros((1, 2, 3)),
         of_station=np.zeros((1, 1, 2, 2), dtype=np.int64),
@@ -239,7 +239,7 @@ def new_people_state(cell: Cell, shared: People, n_envs: int) -> PeopleState:
         qd=rows(workers, 18),
         body=counts(workers),
         size=np.broadcast_to(shared.bodies[0], (n_envs, workers, body.N_SIZE)).copy(),
-        columns=np.repeat(shared.columns[None], n_envs, axis=0),
+        capsules=np.repeat(shared.capsules[None], n_envs, axis=0),
         clock=rows(workers),
         pace=rows(workers) + shared.pace,
         rest=rows(workers, 2),
@@ -268,8 +268,8 @@ def people_geometry_of(
         cylinders: The walkers' x, y and radius [m], shape (C, 3).
         sizes: The workers' sizes [m], shape (W, body.N_SIZE); None for the cell's person.
     """
-    if len(human_q) * body.N_CAPSULES > shared.columns.shape[1]:  # more than the cell's own
-        shared = shared._replace(columns=body.capsule_columns(len(human_q)))
+    if len(human_q) * body.N_CAPSULES > shared.capsules.shape[1]:  # more than the cell's own
+        shared = shared._replace(capsules=body.new_body_capsules(len(human_q)))
     geometry = people.new_people_geometry(shared, len(human_q), len(cylinders))
     if sizes is not None:
         geometry.size[:] = sizes
@@ -289,11 +289,11 @@ def capsule_speeds_of(
         human_q: Their joint positions [m, rad], shape (W, 18).
         human_qd: Their joint speeds [m/s, rad/s], shape (W, 18).
     """
-    columns, out = placed.columns, np.zeros(placed.columns.shape[1])
+    capsules, out = placed.capsules, np.zeros(placed.capsules.shape[1])
     if len(human_q) == 0:
         return out
-    moved = people.new_people_geometry(shared._replace(columns=columns), len(human_q), 0)
+    moved = people.new_people_geometry(shared._replace(capsules=capsules), len(human_q), 0)
     moved.size[:] = placed.size
     q, qd = as_kernel_array(human_q), as_kernel_array(human_qd)
-    speeds.capsule_speeds(shared, q, qd, columns, moved, out)
+    speeds.capsule_speeds(shared, q, qd, capsules, moved, out)
     return out

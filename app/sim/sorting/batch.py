@@ -33,7 +33,7 @@ from app.sim.sorting.state import (
 from app.state_dict import Stateful
 
 OUTCOMES = ("running", "success", "timeout")
-"""Names of the outcomes in ``rows.outcome``."""
+"""Names of the outcomes in ``envs.outcome``."""
 
 Obs = NDArray[np.uint8]
 _SHARES = (
@@ -111,14 +111,14 @@ def fail_of(cell: Cell) -> Vec:
     return np.array([one.failure_probability or 0.0 for one in cell.stations_of("clutter")])
 
 
-def new_rows(shape: SortingShape, n_envs: int, fail: Vec) -> kernel.SortingRows:
-    """Return rows for ``n_envs`` tasks, not started yet."""
+def new_envs(shape: SortingShape, n_envs: int, fail: Vec) -> kernel.SortingEnvs:
+    """Return the state of ``n_envs`` environments whose episodes have not started."""
     k, c = shape.n_cells, shape.n_colours
 
     def ints(*more: int) -> NDArray[np.int64]:
         return np.zeros((n_envs, *more), dtype=np.int64)
 
-    return kernel.SortingRows(
+    return kernel.SortingEnvs(
         clutter=np.zeros((n_envs, k), dtype=np.int8),
         towers=np.zeros((n_envs, c, k), dtype=np.int8),
         heights=ints(c),
@@ -158,15 +158,15 @@ class SortingBatch(Stateful):
     Args:
         shape: Size of the tasks.
         fail: Failure probabilities of the clutter slots, shape (K,).
-        seed: Seed; episode ``k`` of row ``e`` is fixed by (seed, e, k).
+        seed: Seed; episode ``k`` of environment ``e`` is fixed by (seed, e, k).
         settings: Starts, disturbances, rewards and ends.
-        first_env: Number of the first row in the random streams.
+        first_env: Number of the first environment in the random streams.
 
     Raises:
         InvalidInput: The failure map or the fixed sizes do not fit the shape.
     """
 
-    STATE = ("seed", "rows", "_obs", "_last", "_masks", "_rew", "_ended")
+    STATE = ("seed", "envs", "_obs", "_last", "_masks", "_rew", "_ended")
 
     def __init__(
         self,
@@ -182,8 +182,8 @@ class SortingBatch(Stateful):
             raise InvalidInput("fail", fail.tolist(), rule)
         self.shape, self.n_envs, self.seed = shape, n_envs, seed
         self._first = first_env
-        self.rows = new_rows(shape, n_envs, fail)
-        """Rows of all tasks."""
+        self.envs = new_envs(shape, n_envs, fail)
+        """State of all environments."""
         self.settings = settings or SortingSettings()
         self._obs = np.zeros((n_envs, shape.obs_size), dtype=np.uint8)
         self._last = np.zeros_like(self._obs)
@@ -205,8 +205,8 @@ class SortingBatch(Stateful):
     def settings(self, settings: SortingSettings) -> None:
         _check_sizes(settings, self.shape)
         self._settings = settings
-        self.rows.fixed_objects[:] = settings.n_objects
-        self.rows.fixed_goal[:] = settings.n_goal
+        self.envs.fixed_objects[:] = settings.n_objects
+        self.envs.fixed_goal[:] = settings.n_goal
 
     @property
     def obs(self) -> Obs:
@@ -216,7 +216,7 @@ class SortingBatch(Stateful):
     @property
     def episode(self) -> NDArray[np.int64]:
         """Numbers of the present episodes, (n_envs,); set them to choose the next ones."""
-        return self.rows.episode
+        return self.envs.episode
 
     @property
     def horizon(self) -> int:
@@ -239,43 +239,43 @@ class SortingBatch(Stateful):
         )
 
     def reset(self, seed: int | None = None) -> Obs:
-        """Start episode 0 in every row; return observations, (n_envs, obs_size)."""
+        """Start episode 0 in every environment; return observations, (n_envs, obs_size)."""
         self.seed = self.seed if seed is None else seed
-        self.rows.episode[:] = 0
+        self.envs.episode[:] = 0
         return self.restart()
 
     def restart(self) -> Obs:
-        """Start the episodes numbered by ``rows.episode``; return the observations."""
-        sorting_episode.start_rows(self.rows, self._rules(), self.seed, self._first, self._obs)
+        """Start the episodes numbered by ``envs.episode``; return the observations."""
+        sorting_episode.start_envs(self.envs, self._rules(), self.seed, self._first, self._obs)
         return self._obs
 
-    def start(self, rows: NDArray[np.int64]) -> Obs:
-        """Start the episodes numbered by ``episode`` in some rows.
+    def start(self, envs: NDArray[np.int64]) -> Obs:
+        """Start the episodes numbered by ``episode`` in some environments.
 
         Args:
-            rows: Numbers of the rows, shape (k,).
+            envs: Numbers of the environments, shape (k,).
 
         Returns:
-            Observations of all rows, (n_envs, obs_size).
+            Observations of all environments, (n_envs, obs_size).
 
         Raises:
-            InvalidInput: A row does not exist.
+            InvalidInput: An environment does not exist.
         """
-        checked = env_numbers(rows, self.n_envs)
+        checked = env_numbers(envs, self.n_envs)
         if np.array_equal(checked, np.arange(self.n_envs)):
             return self.restart()
         for e in checked.tolist():
-            one = kernel.SortingRows._make(column[e : e + 1] for column in self.rows)
+            one = kernel.SortingEnvs._make(part[e : e + 1] for part in self.envs)
             first, obs = self._first + e, self._obs[e : e + 1]
-            sorting_episode.start_rows(one, self._rules(), self.seed, first, obs)
+            sorting_episode.start_envs(one, self._rules(), self.seed, first, obs)
         return self._obs
 
     def step(self, act: NDArray[np.int64], *, auto_reset: bool = True) -> StepResult:
-        """Make one attempt in every row.
+        """Make one attempt in every environment.
 
         Args:
             act: Actions as ``SortingShape`` numbers them, shape (n_envs,).
-            auto_reset: Start the next episode where one ended; else its row does not change.
+            auto_reset: Start the next episode where one ended; else the environment stays.
 
         Raises:
             InvalidInput: The actions have another shape, or one is no action.
@@ -285,62 +285,59 @@ class SortingBatch(Stateful):
         if (wanted < 0).any() or (wanted >= self.shape.n_actions).any():
             raise InvalidInput("act", act, f"must lie in [0, {self.shape.n_actions})")
         arguments: tuple[Any, ...] = (
-            self.rows,
+            self.envs,
             self._rules(),
             self.settings.weights,
             self.seed,
             self._first,
             wanted,
             auto_reset,
-            self._obs,
-            self._last,
-            self._rew,
-            self._ended,
+            sorting_episode.StepBuffers(self._obs, self._last, self._rew, self._ended),
         )
         if self._step is None:
-            self._step = direct(sorting_episode.step_rows, arguments)
+            self._step = direct(sorting_episode.step_envs, arguments)
         self._step(*arguments)
         return StepResult(obs=self._obs, last_obs=self._last, rew=self._rew, ended=self._ended)
 
     def masks(self) -> NDArray[np.bool_]:
         """Return whether each move changes the state, shape (n_envs, n_actions); reused."""
-        kernel.masks_of(self.rows, self._masks)
+        kernel.masks_of(self.envs, self._masks)
         return self._masks
 
     def observations(self) -> Obs:
-        """Return the observations as the rows are now, (n_envs, obs_size); overwritten."""
-        kernel.observe_rows(self.rows, self._obs)
+        """Return the observations of the present states, (n_envs, obs_size); overwritten."""
+        kernel.observe_envs(self.envs, self._obs)
         return self._obs
 
     def put(self, e: int, state: SortingState) -> None:
-        """Start an episode of row ``e`` in a given state."""
+        """Start an episode of environment ``e`` in a given state."""
         self.change(e, state)
-        rows = self.rows
-        for counter in (rows.steps, rows.moves, rows.failures, rows.interferences):
+        envs = self.envs
+        for counter in (envs.steps, envs.moves, envs.failures, envs.interferences):
             counter[e] = 0
 
     def change(self, e: int, state: SortingState) -> None:
-        """Set the state of row ``e``, as by a person; counters continue.
+        """Set the state of environment ``e``, as by a person; counters continue.
 
         Raises:
             InvalidInput: The state does not fit.
         """
         check_state(state, self.shape)
-        rows = self.rows
-        rows.clutter[e], rows.towers[e], rows.goal[e] = state.clutter, state.towers, state.goal
-        rows.heights[e] = state.heights
-        rows.goal_heights[e] = (state.goal != NULL).sum(axis=1)
-        rows.fail[e] = state.fail
-        rows.outcome[e] = kernel.RUNNING
+        envs = self.envs
+        envs.clutter[e], envs.towers[e], envs.goal[e] = state.clutter, state.towers, state.goal
+        envs.heights[e] = state.heights
+        envs.goal_heights[e] = (state.goal != NULL).sum(axis=1)
+        envs.fail[e] = state.fail
+        envs.outcome[e] = kernel.RUNNING
 
     def state_of(self, e: int) -> SortingState:
-        """Return a copy of row ``e``."""
-        rows = self.rows
+        """Return a copy of environment ``e``."""
+        envs = self.envs
         return SortingState(
-            clutter=rows.clutter[e].copy(),
-            towers=rows.towers[e].copy(),
-            goal=rows.goal[e].copy(),
-            fail=rows.fail[e].copy(),
+            clutter=envs.clutter[e].copy(),
+            towers=envs.towers[e].copy(),
+            goal=envs.goal[e].copy(),
+            fail=envs.fail[e].copy(),
         )
 
 

@@ -38,12 +38,12 @@ def by_kernels(q: np.ndarray, human_q: np.ndarray) -> Iterator[np.ndarray]:
         place_robot(arm, robot_q, robot)
         geometry = people_geometry_of(people, person_q[None], np.zeros((0, 3)))
         n = len(arm.link)
-        found = np.empty((n, geometry.columns.shape[1]))
+        found = np.empty((n, geometry.capsules.shape[1]))
         for k in range(n):
-            distances(robot.columns, k, geometry.columns, found[k])
-        pair_distances(robot.columns, arm.first, arm.second, robot.pair)
+            distances(robot.capsules, k, geometry.capsules, found[k])
+        pair_distances(robot.capsules, arm.first, arm.second, robot.pair)
         near = found[:, : len(human.CAPSULE_NAMES)].ravel()
-        yield np.concatenate([near, robot.pair, [table_clearance(robot.columns)[0]]])
+        yield np.concatenate([near, robot.pair, [table_clearance(robot.capsules)[0]]])
 
 
 @pytest.mark.parametrize("mode", ["distances", "sensors"])

@@ -12,7 +12,7 @@ from app.sim.cells.cell import Cell
 from app.sim.collision.contact import clearance
 from app.sim.human import model as human
 from app.sim.human.anthropometry import percentile_body
-from app.sim.human.kernels.kinematics import PELVIS_Z, capsule_columns
+from app.sim.human.kernels.kinematics import PELVIS_Z, new_body_capsules
 from app.sim.primitives.primitive_library import motion_library
 from app.sim.scene.scene import NO_CYLINDERS, arm_of, people_of
 from tests.live.pick.pick_scenes import run
@@ -144,7 +144,7 @@ def test_nearest_person_is_named_and_distances_are_those_of_each_alone(
     away = [one.clearance_m for one in snapshot.people]
     assert away[1] < away[0]
     for one in snapshot.people:
-        people = people_of(cell)._replace(columns=capsule_columns(1))
+        people = people_of(cell)._replace(capsules=new_body_capsules(1))
         alone = clearance(
             arm_of(cell), people, snapshot.robot_q, one.q[None], NO_CYLINDERS, one.size[None]
         )

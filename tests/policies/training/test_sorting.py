@@ -140,7 +140,7 @@ def greedy_success(policy: SortingPolicy, n_objects: int, n_goal: int) -> float:
     obs = batch.reset()
     for _ in range(batch.horizon):
         obs = batch.step(policy.values(obs).argmax(axis=1), auto_reset=False).obs
-    return float((batch.rows.outcome == OUTCOMES.index("success")).mean())
+    return float((batch.envs.outcome == OUTCOMES.index("success")).mean())
 
 
 @pytest.mark.slow

@@ -23,8 +23,8 @@ def fcl_distance(q: Vec, human_q: Vec, tube: Vec) -> float:
     """Distance of the robot's capsules to a person's capsules and a cylinder [m], by fcl."""
     pose = arm_kernel.new_robot_pose(ARM)
     arm_kernel.place_robot(ARM, q, pose)
-    robot = ends_of(pose.columns, len(ARM.link))
-    radii = ARM.columns[RADIUS, : len(ARM.link)]
+    robot = ends_of(pose.capsules, len(ARM.link))
+    radii = ARM.capsules[RADIUS, : len(ARM.link)]
     low = CELL.floor_z - 1.0
     centre = np.array([tube[0], tube[1], 0.5 * (tube[3] + low)])
     shape = fcl.Cylinder(tube[2], tube[3] - low)

@@ -94,7 +94,7 @@ def types(values: Any) -> list[Any]:
 def test_kernels_are_not_compiled_once_more_for_a_copy(env_id: str, copied: Copier) -> None:
     batch = gymnasium.make(env_id).unwrapped.batch  # type: ignore[attr-defined]
     other = copied(batch)
-    for name in ("world", "_task", "state", "_work", "_sight"):
+    for name in ("world", "_task", "state", "_work", "_observation_work"):
         assert types(getattr(batch, name)) == types(getattr(other, name))
 
 

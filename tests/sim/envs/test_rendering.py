@@ -108,7 +108,7 @@ def test_blocks_are_seen_where_they_lie() -> None:
     env = rendered("tandem/SortingE0-v0")
     task = env.unwrapped.batch  # type: ignore[attr-defined]
     before = image(env)
-    task.rows.clutter[:], task.rows.goal[:] = 0, 0
+    task.envs.clutter[:], task.envs.goal[:] = 0, 0
     empty = image(env)
     assert (before != empty).any(axis=2).mean() > 1e-3
     red = (205, 58, 62)

@@ -166,15 +166,15 @@ def test_plain_environment_gives_the_same_transitions_and_rewards(
     for _ in range(45):
         plain = [plain_as(batch.state_of(e), float(fails)) for e in range(8)]
         for e, env in enumerate(plain):
-            env.attempts = int(batch.rows.steps[e])
+            env.attempts = int(batch.envs.steps[e])
         acts = rng.integers(shape.n_actions, size=8)
-        failures = batch.rows.failures.copy()
+        failures = batch.envs.failures.copy()
         result = batch.step(acts, auto_reset=False)
         for e, env in enumerate(plain):
             if fails and acts[e] < shape.n_cells * shape.n_colours:
                 if (
                     env.clutter[acts[e] // shape.n_colours]
-                    and batch.rows.failures[e] == failures[e]
+                    and batch.envs.failures[e] == failures[e]
                 ):
                     continue  # the one in a hundred that did not fail
             _, rew, over, late, _ = env.step(acts[e])
@@ -184,7 +184,7 @@ def test_plain_environment_gives_the_same_transitions_and_rewards(
             assert rew == pytest.approx(result.rew[e], abs=1e-6)
             assert int(result.ended[e]) == (1 if over else 2 if late else 0)
             seen.add(round(rew, 2))
-        batch.rows.outcome[:] = OUTCOMES.index("running")
+        batch.envs.outcome[:] = OUTCOMES.index("running")
     assert len(seen) > 5
 
 
@@ -200,7 +200,7 @@ def test_plain_environment_draws_the_same_kind_of_episodes(cell_name: str) -> No
     for _ in range(4000):
         env.reset()
         drawn.append(((env.clutter > 0).sum(), (env.goal > 0).sum()))
-    mine = [(batch.rows.clutter > 0).sum(axis=1), (batch.rows.goal > 0).sum(axis=(1, 2))]
+    mine = [(batch.envs.clutter > 0).sum(axis=1), (batch.envs.goal > 0).sum(axis=(1, 2))]
     difference = np.array(drawn).mean(axis=0) - np.array(mine).mean(axis=1)
     spread = np.array(drawn).std(axis=0) / np.sqrt(2000)
     assert (np.abs(difference) < 4 * spread).all()

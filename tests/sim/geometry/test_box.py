@@ -6,7 +6,7 @@ import pytest
 
 from app.sim.core.jit import FAR
 from app.sim.geometry.box import box_clearance
-from app.sim.geometry.capsules import capsules_soa, new_columns
+from app.sim.geometry.capsules import capsules_soa, new_capsules
 from tests.sim.fcl_capsules import KINDS, check_against_fcl, random_ends
 
 TABLE = np.array([[0.0, 0.4, -0.02, 1.0, 0.5, 0.02, 0.0]])
@@ -55,22 +55,22 @@ def test_segment_inside_a_box_counts_as_its_radius_deep() -> None:
 def test_least_of_many_is_the_least_of_each_and_is_named() -> None:
     radii = np.random.default_rng(3).uniform(0.02, 0.2, 12)
     for seed in range(200):
-        columns = capsules_soa(random_ends(12, seed, "any") + [0.0, 1.2, 0.0], radii)
+        capsules = capsules_soa(random_ends(12, seed, "any") + [0.0, 1.2, 0.0], radii)
         boxes = random_boxes(4, seed)
         each = np.array(
             [
                 [
-                    box_clearance(np.ascontiguousarray(columns[:, [k]]), 0, boxes[[b]])[0]
+                    box_clearance(np.ascontiguousarray(capsules[:, [k]]), 0, boxes[[b]])[0]
                     for b in range(4)
                 ]
                 for k in range(2, 12)
             ]
         )
-        d, k, b = box_clearance(columns, 2, boxes)
+        d, k, b = box_clearance(capsules, 2, boxes)
         assert d == each.min() and each[k - 2, b] == d
 
 
 def test_nothing_is_far() -> None:
-    assert box_clearance(new_columns(8, np.zeros(0)), 1, TABLE) == (FAR, 1, 0)
+    assert box_clearance(new_capsules(8, np.zeros(0)), 1, TABLE) == (FAR, 1, 0)
     capsule = capsules_soa(np.zeros((1, 2, 3)), np.array([0.1]))
     assert box_clearance(capsule, 0, np.zeros((0, 7))) == (FAR, 0, 0)

@@ -139,7 +139,7 @@ def test_placed_capsules_are_those_that_pinocchio_places() -> None:
     for q in np.random.default_rng(43).uniform(-6, 6, (50, 6)):
         arm_kernel.place_robot(arm, q, pose)
         p0, p1 = robot_ends(robot, capsules, q[None])
-        ends = ends_of(pose.columns, len(capsules.name))
+        ends = ends_of(pose.capsules, len(capsules.name))
         np.testing.assert_allclose(ends[:, 0], p0[0], atol=1e-12)
         np.testing.assert_allclose(ends[:, 1], p1[0], atol=1e-12)
         np.testing.assert_allclose(pose.tcp, robot.tcp_pose(q)[:3, 3], atol=1e-9)

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from app.sim.core.jit import FAR
-from app.sim.geometry.capsules import capsules_soa, new_columns
+from app.sim.geometry.capsules import capsules_soa, new_capsules
 from app.sim.geometry.cylinder import cylinder_clearance, swept_clearance
 from tests.sim.fcl_capsules import KINDS, check_against_fcl, random_ends
 
@@ -52,30 +52,30 @@ def test_distance_is_that_to_the_nearest_part_of_the_cylinder(
 
 def test_nearest_column_is_named_and_earlier_ones_are_passed_over() -> None:
     ends = np.array([[[0.5, y, 0.0], [0.5, y, 1.0]] for y in (0.0, 2.0, 1.0)])
-    columns = capsules_soa(ends, np.full(3, 0.1))
-    near, column = cylinder_clearance(columns, 0, 0.0, 0.0, 0.3, 2.0)
-    later, after = cylinder_clearance(columns, 1, 0.0, 0.0, 0.3, 2.0)
+    capsules = capsules_soa(ends, np.full(3, 0.1))
+    near, column = cylinder_clearance(capsules, 0, 0.0, 0.0, 0.3, 2.0)
+    later, after = cylinder_clearance(capsules, 1, 0.0, 0.0, 0.3, 2.0)
     assert (column, after) == (0, 2)
     assert near == pytest.approx(0.1) and later == pytest.approx(np.hypot(0.5, 1.0) - 0.4)
 
 
 def test_columns_that_only_fill_up_are_far() -> None:
-    assert cylinder_clearance(new_columns(8, np.zeros(0)), 2, 0.0, 0.0, 0.5, 1.0) == (FAR, 2)
+    assert cylinder_clearance(new_capsules(8, np.zeros(0)), 2, 0.0, 0.0, 0.5, 1.0) == (FAR, 2)
 
 
 def test_least_of_many_is_the_least_of_each() -> None:
     rng = np.random.default_rng(3)
     radii = rng.uniform(0.02, 0.2, 12)
     for top in np.linspace(0.0, 1.6, 200):
-        columns = capsules_soa(random_ends(12, int(1000 * top), "any"), radii)
+        capsules = capsules_soa(random_ends(12, int(1000 * top), "any"), radii)
         each = [
-            cylinder_clearance(np.ascontiguousarray(columns[:, [k]]), 0, 0.1, 0.2, 0.3, top)[0]
+            cylinder_clearance(np.ascontiguousarray(capsules[:, [k]]), 0, 0.1, 0.2, 0.3, top)[0]
             for k in range(12)
         ]
-        d, k = cylinder_clearance(columns, 0, 0.1, 0.2, 0.3, top)
+        d, k = cylinder_clearance(capsules, 0, 0.1, 0.2, 0.3, top)
         assert d == min(each) and k == np.argmin(each)
         for within in (d - 0.01, d + 0.01):
-            found, _ = cylinder_clearance(columns, 0, 0.1, 0.2, 0.3, top, within)
+            found, _ = cylinder_clearance(capsules, 0, 0.1, 0.2, 0.3, top, within)
             assert found == min(d, within)
 
 

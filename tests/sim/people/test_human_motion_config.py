@@ -126,7 +126,7 @@ def test_a_person_who_crouches_has_lower_capsules(cell: Cell) -> None:
         batch = batch_of(cell, HumanMotionConfig(motion="recorded", recorded=(run,)), 2)
         size = batch.state.people.size[0, 0]
         assert size[PELVIS_Z] == pytest.approx(cell.body[PELVIS_Z] + rise)
-        heights[rise] = batch.state.people.columns[0, 2].copy()
+        heights[rise] = batch.state.people.capsules[0, 2].copy()
         assert human.joint_points(q[0], size)["head"][2] == pytest.approx(
             human.joint_points(q[0], cell.body)["head"][2] + rise
         )

@@ -49,7 +49,7 @@ def people_of(batch: PickBatch, e: int) -> Shapes:
         sized.append((ends, human.capsule_radii(size), speeds))
     ends, radii, speeds = (np.concatenate(part) for part in zip(*sized, strict=True))
     shapes = capsule_shapes(ends, radii)
-    unused = shapes.columns.shape[1] - len(speeds)
+    unused = shapes.capsules.shape[1] - len(speeds)
     return replace(shapes, speed=np.append(speeds, np.zeros(unused)))
 
 
@@ -81,8 +81,8 @@ def test_capsules_of_workers_are_stored_whole(guarded):
     batch.reset()
     for _ in range(5):
         for e in range(8):
-            stored = batch.state.people.columns[e]
-            np.testing.assert_allclose(stored, people_of(batch, e).columns, atol=1e-9)
+            stored = batch.state.people.capsules[e]
+            np.testing.assert_allclose(stored, people_of(batch, e).capsules, atol=1e-9)
         batch.step(straight(batch), auto_reset=False)
 
 

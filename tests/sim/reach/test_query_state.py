@@ -52,7 +52,7 @@ def test_shapes_have_the_speeds_of_capsules() -> None:
         query.load(robot, people_of(batch, e), state.time_left[e])
         placed = people_geometry_of(shared, rows.q[e], np.zeros((0, 3)))
         shapes = query.shapes
-        np.testing.assert_array_equal(shapes.columns, placed.columns)
+        np.testing.assert_array_equal(shapes.capsules, placed.capsules)
         speeds = capsule_speeds_of(shared, placed, rows.q[e], rows.qd[e])
         np.testing.assert_array_equal(shapes.speed, speeds)
         fastest = max(fastest, speeds.max())

@@ -31,7 +31,7 @@ def ball(center):
 
 def both(*shapes):
     return Shapes(
-        columns=np.concatenate([s.columns for s in shapes], axis=1),
+        capsules=np.concatenate([s.capsules for s in shapes], axis=1),
         cylinders=np.concatenate([s.cylinders for s in shapes]),
     )
 

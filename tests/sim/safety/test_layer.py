@@ -33,7 +33,7 @@ def least_full_distance(settings, qd, c, age=0.0):
         full = layer.decide(REST, qd, c, NONE, ahead(middle), age).override == 1.0
         low, high = (low, middle) if full else (middle, high)
     layer.decide(REST, qd, c, NONE, ahead(high), age)
-    return layer._space.gap[0].min()
+    return layer._space.clearance[0].min()
 
 
 def test_a_robot_at_rest_needs_what_a_person_covers_in_the_reaction():
@@ -187,7 +187,7 @@ def test_no_running_person_found_by_search_meets_a_robot_in_motion():
             for part in np.linspace(0.0, 1.0, ticks):
                 pose, speed = decision.at(q, qd, part * ARM.dt)
                 layer.decide(pose, NONE, NONE, NONE, ball(person + part * step))
-                gap = layer._space.gap[0].min()
+                gap = layer._space.clearance[0].min()
                 assert np.isfinite([*pose, *speed, gap]).all()
                 if np.abs(speed).max() > 1e-6:
                     nearest = min(nearest, gap)
@@ -215,7 +215,7 @@ def test_an_assumption_that_is_no_size_is_refused(value):
 def test_people_whose_numbers_are_not_finite_are_refused(value):
     for row in range(9):
         people = ball(np.array([0.5, 0.5, 0.5]))
-        people.columns[row, 0] = value
+        people.capsules[row, 0] = value
         with pytest.raises(SimulationError, match="people"):
             SafetyLayer(ARM, NO_MARGINS).decide(REST, NONE, NONE, NONE, people)
 

@@ -129,7 +129,7 @@ def test_terms_are_for_who_set_it_and_else_for_the_nearest():
         decision = layer.decide(REST, PAN, NONE, NONE, people, 0.1)
         person, terms = layer.terms(decision, PAN, people, 0.1)
         assert (decision.override == 0.0) is stopped and person == 0
-        assert terms.separation == layer._space.gap[0].min()
+        assert terms.separation == layer._space.clearance[0].min()
         assert terms.reaction_time == pytest.approx(0.05 + 0.1 + 0.1)
         assert terms.braking == pytest.approx(0.5 * terms.robot_speed * terms.stop_time)
         if stopped:
@@ -149,7 +149,7 @@ def test_terms_name_the_nearest_part_of_the_person_and_not_the_first_that_is_too
     decision = layer.decide(REST, PAN, NONE, NONE, people)
     assert (decision.override, decision.person) == (0.0, 0)
     _, terms = layer.terms(decision, PAN, people)
-    assert terms.separation == pytest.approx(layer._space.gap[0].min())
+    assert terms.separation == pytest.approx(layer._space.clearance[0].min())
     assert terms.separation < 0.1
 
 
@@ -158,7 +158,7 @@ def test_terms_are_those_of_the_fast_hand_and_not_of_the_nearer_body_at_rest():
     centers = tip + np.linspace(0.65, 0.8, body.N_CAPSULES)[:, None] * offset
     ends = np.repeat(centers[:, None], 2, axis=1)
     people = capsule_shapes(ends, np.full(body.N_CAPSULES, 0.05))
-    speed = np.zeros(people.columns.shape[1])
+    speed = np.zeros(people.capsules.shape[1])
     speed[body.N_CAPSULES - 1] = 4.0
     layer = SafetyLayer(ARM, SafetySettings())
     for protective_distance, override in ((0.3, 0.0), (0.0, 1.0)):

@@ -29,7 +29,7 @@ def test_every_capsule_asks_for_what_the_safety_layer_tells_of_it() -> None:
     of_capsule, asked = np.array(LINK_NAMES)[ARM.link], set[str]()
     for q, qd in states(60):
         place = [*rng.uniform((-1.2, -1.0), (1.2, 1.6)), 0.1, rng.uniform(0.1, 1.8)]
-        people = Shapes(columns=no_people().columns, cylinders=np.array([place]))
+        people = Shapes(capsules=no_people().capsules, cylinders=np.array([place]))
         decision = layer.decide(q, qd, rest, rest, people)
         _, terms = layer.terms(decision, qd, people)
         same = required_distances(ARM, SETTINGS, qd)[of_capsule == terms.link]
@@ -42,12 +42,12 @@ def reserves(q: np.ndarray, qd: np.ndarray, places: np.ndarray) -> np.ndarray:
     """Horizontal distance of each place to each capsule, less what it asks for, (n, m)."""
     robot = arm_kernel.new_robot_pose(ARM)
     arm_kernel.place_robot(ARM, q, robot)
-    columns = robot.columns[:, : len(ARM.link)]
-    start, along = columns[[X, Y]].T, columns[[UX, UY]].T
+    capsules = robot.capsules[:, : len(ARM.link)]
+    start, along = capsules[[X, Y]].T, capsules[[UX, UY]].T
     away = places[:, None] - start
     part = (away * along).sum(axis=2) / np.maximum((along**2).sum(axis=1), 1e-12)
     away -= np.clip(part, 0.0, 1.0)[..., None] * along
-    distance = np.linalg.norm(away, axis=2) - columns[RADIUS]
+    distance = np.linalg.norm(away, axis=2) - capsules[RADIUS]
     return np.asarray(distance - required_distances(ARM, SETTINGS, qd))
 
 

@@ -1,7 +1,7 @@
 """Every state of a small sorting task, and its best values by value iteration.
 
-Transitions and rewards are asked of the compiled batch itself: every state is a row, every
-action is tried in all of them.
+Transitions and rewards are asked of the compiled batch itself: every state is an
+environment, every action is tried in all of them.
 """
 
 from dataclasses import dataclass
@@ -20,7 +20,7 @@ Ints = NDArray[np.int64]
 TIE = 1e-7
 """Values nearer than this are equal."""
 STEP = 4096
-"""Rows of the batch."""
+"""Environments of the batch."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -42,7 +42,7 @@ class Model:
 
 
 class _Table:
-    """A batch whose rows are put into any states."""
+    """A batch whose environments are put into any states."""
 
     def __init__(
         self, task: SortingState, shape: SortingShape, weights: SortingWeights
@@ -52,22 +52,22 @@ class _Table:
         self.batch.reset()
         self._k = shape.n_cells
         self._levels = (shape.n_colours, shape.n_cells)
-        rows = self.batch.rows
-        rows.goal[:], rows.goal_heights[:] = task.goal, (task.goal != 0).sum(axis=1)
+        envs = self.batch.envs
+        envs.goal[:], envs.goal_heights[:] = task.goal, (task.goal != 0).sum(axis=1)
 
     def tried(self, codes: NDArray[np.int8], action: int) -> tuple[NDArray[np.int8], Floats]:
         """Return states and rewards after an action in each of the states."""
-        rows, after = self.batch.rows, np.empty_like(codes)
+        envs, after = self.batch.envs, np.empty_like(codes)
         rew = np.empty(len(codes))
         for begin in range(0, len(codes), STEP):
             part = slice(begin, min(begin + STEP, len(codes)))
             n = part.stop - begin
-            rows.clutter[:n] = codes[part, : self._k]
-            rows.towers[:n] = codes[part, self._k :].reshape(n, *self._levels)
-            rows.heights[:n] = (rows.towers[:n] != 0).sum(axis=2)
-            rows.outcome[:], rows.outcome[:n] = SUCCESS, RUNNING
+            envs.clutter[:n] = codes[part, : self._k]
+            envs.towers[:n] = codes[part, self._k :].reshape(n, *self._levels)
+            envs.heights[:n] = (envs.towers[:n] != 0).sum(axis=2)
+            envs.outcome[:], envs.outcome[:n] = SUCCESS, RUNNING
             result = self.batch.step(np.full(STEP, action), auto_reset=False)
-            after[part] = np.hstack([rows.clutter[:n], rows.towers[:n].reshape(n, -1)])
+            after[part] = np.hstack([envs.clutter[:n], envs.towers[:n].reshape(n, -1)])
             rew[part] = result.rew[:n]
         return after, rew
 

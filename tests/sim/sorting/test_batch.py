@@ -43,7 +43,7 @@ def batch_of(
 
 
 def valid_acts(batch: SortingBatch, rng: np.random.Generator) -> np.ndarray:
-    """A random valid move in every row."""
+    """A random valid move in every environment."""
     return (batch.masks() * rng.random((batch.n_envs, batch.shape.n_actions))).argmax(axis=1)
 
 
@@ -65,7 +65,7 @@ def test_objects_are_conserved_and_towers_have_no_gaps() -> None:
     before, rng = counts(batch), np.random.default_rng(1)
     for _ in range(100):
         batch.step(rng.integers(SHAPE.n_actions, size=64), auto_reset=False)
-        np.testing.assert_array_equal(batch.rows.heights, (batch.rows.towers != 0).sum(axis=2))
+        np.testing.assert_array_equal(batch.envs.heights, (batch.envs.towers != 0).sum(axis=2))
     np.testing.assert_array_equal(counts(batch), before)
     for state in states(batch):
         check_state(state, SHAPE)
@@ -84,7 +84,7 @@ def test_masks_mark_exactly_the_moves_that_change_something() -> None:
             for now, was in zip(states(batch), start, strict=True)
         ]
         np.testing.assert_array_equal(masks[:, action], changed)
-        np.testing.assert_array_equal(batch.rows.moves, changed)
+        np.testing.assert_array_equal(batch.envs.moves, changed)
 
 
 def test_one_state_and_the_rows_agree_on_masks_observations_and_moves() -> None:
@@ -96,14 +96,14 @@ def test_one_state_and_the_rows_agree_on_masks_observations_and_moves() -> None:
         for e, state in enumerate(start):
             np.testing.assert_array_equal(valid_moves(state, SHAPE), batch.masks()[e])
             np.testing.assert_array_equal(observe(state), obs[e])
-            batch.rows.fail[e] = 0.0
+            batch.envs.fail[e] = 0.0
         batch.step(acts, auto_reset=False)
         for e, (state, act) in enumerate(zip(start, acts, strict=True)):
             after = apply(state, SHAPE, SHAPE.move_of(int(act)))
-            np.testing.assert_array_equal(after.clutter, batch.rows.clutter[e])
-            np.testing.assert_array_equal(after.towers, batch.rows.towers[e])
-            batch.rows.fail[e] = state.fail
-        batch.rows.outcome[:] = OUTCOMES.index("running")
+            np.testing.assert_array_equal(after.clutter, batch.envs.clutter[e])
+            np.testing.assert_array_equal(after.towers, batch.envs.towers[e])
+            batch.envs.fail[e] = state.fail
+        batch.envs.outcome[:] = OUTCOMES.index("running")
 
 
 def test_sizes_of_other_settings_count_from_the_next_start_on() -> None:
@@ -111,16 +111,16 @@ def test_sizes_of_other_settings_count_from_the_next_start_on() -> None:
     batch.settings = SortingSettings(n_objects=3, n_goal=2)
     batch.restart()
     assert (counts(batch).sum(axis=1) == 3).all()
-    assert (batch.rows.goal_heights.sum(axis=1) == 2).all()
+    assert (batch.envs.goal_heights.sum(axis=1) == 2).all()
     with pytest.raises(InvalidInput, match="n_objects = 7 must lie in"):
         batch.settings = SortingSettings(n_objects=7)
-    assert batch.settings.n_objects == 3 and (batch.rows.fixed_objects == 3).all()
+    assert batch.settings.n_objects == 3 and (batch.envs.fixed_objects == 3).all()
 
 
-@pytest.mark.parametrize("rows", [[16], [-1], [True] * 16, [0.0]])
-def test_only_rows_that_exist_are_started(rows: list[int]) -> None:
+@pytest.mark.parametrize("envs", [[16], [-1], [True] * 16, [0.0]])
+def test_only_environments_that_exist_are_started(envs: list[int]) -> None:
     with pytest.raises(InvalidInput, match="^envs = .* must be"):
-        batch_of(16).start(np.array(rows))
+        batch_of(16).start(np.array(envs))
 
 
 def test_picks_fail_as_often_as_their_cells_say() -> None:
@@ -129,17 +129,17 @@ def test_picks_fail_as_often_as_their_cells_say() -> None:
     for cell, risk in enumerate(RISKY):
         batch.restart()
         batch.step(np.full(n, cell * SHAPE.n_colours), auto_reset=False)
-        share = batch.rows.failures.mean()
+        share = batch.envs.failures.mean()
         assert abs(share - risk) <= 4 * np.sqrt(risk * (1 - risk) / n)
-        assert (batch.rows.failures + batch.rows.moves == 1).all()
+        assert (batch.envs.failures + batch.envs.moves == 1).all()
 
 
 def test_picks_from_towers_do_not_fail() -> None:
     batch = batch_of(200, SortingSettings(disturbed_share=1.0), np.full(6, 0.99))
-    c = batch.rows.heights.argmax(axis=1)
+    c = batch.envs.heights.argmax(axis=1)
     batch.step(2 * 6 * 3 + c * 3 + (c + 1) % 3, auto_reset=False)
-    assert (batch.rows.moves[batch.rows.heights.sum(axis=1) > 0] == 1).all()
-    assert not batch.rows.failures.any()
+    assert (batch.envs.moves[batch.envs.heights.sum(axis=1) > 0] == 1).all()
+    assert not batch.envs.failures.any()
 
 
 def test_horizon_is_a_time_out_and_a_goal_a_success() -> None:
@@ -149,7 +149,7 @@ def test_horizon_is_a_time_out_and_a_goal_a_success() -> None:
     assert batch.horizon == 12
     assert not np.any(ends[:11])
     assert (ends[11] == OUTCOMES.index("timeout")).all()
-    assert not ends[12].any() and (batch.rows.steps == 12).all()
+    assert not ends[12].any() and (batch.envs.steps == 12).all()
 
 
 def test_reaching_the_goal_with_the_last_attempt_is_a_success() -> None:
@@ -172,14 +172,14 @@ def test_a_row_alone_equals_the_row_of_a_batch_bit_for_bit() -> None:
         wide, narrow = many.step(acts), one.step(acts[3:4])
         np.testing.assert_array_equal(wide.obs[3], narrow.obs[0])
         assert wide.rew[3] == narrow.rew[0] and wide.ended[3] == narrow.ended[0]
-    assert one.rows.episode[0] >= 5
+    assert one.envs.episode[0] >= 5
 
 
 def test_numbers_of_objects_follow_their_triangles() -> None:
     n, k = 20_000, SHAPE.n_cells
     batch = batch_of(n)
-    objects = (batch.rows.clutter > 0).sum(axis=1)
-    goals = (batch.rows.goal > 0).sum(axis=(1, 2))
+    objects = (batch.envs.clutter > 0).sum(axis=1)
+    goals = (batch.envs.goal > 0).sum(axis=(1, 2))
     for most, drawn in ((k, objects), *((m, goals[objects == m]) for m in (3, k))):
         for count in range(1, most + 1):
             wanted = (2 * count - 1) / most**2
@@ -189,8 +189,8 @@ def test_numbers_of_objects_follow_their_triangles() -> None:
 
 def test_pairs_can_be_fixed() -> None:
     batch = batch_of(50, SortingSettings(n_objects=5, n_goal=2))
-    assert ((batch.rows.clutter > 0).sum(axis=1) == 5).all()
-    assert ((batch.rows.goal > 0).sum(axis=(1, 2)) == 2).all()
+    assert ((batch.envs.clutter > 0).sum(axis=1) == 5).all()
+    assert ((batch.envs.goal > 0).sum(axis=(1, 2)) == 2).all()
 
 
 @pytest.mark.parametrize("cell_name", ["sorting-e0", "sorting-e1"])
@@ -200,7 +200,7 @@ def test_goals_ask_for_objects_on_their_colours_tower_the_largest_at_the_bottom(
     cell = load_cell(cell_name)
     batch, shape = batch_in(cell, 200, 8), shape_of(cell)
     batch.reset()
-    np.testing.assert_array_equal(batch.rows.fail[0], fail_of(cell))
+    np.testing.assert_array_equal(batch.envs.fail[0], fail_of(cell))
     for e in range(200):
         state = batch.state_of(e)
         check_state(state, shape)
@@ -246,21 +246,21 @@ def test_whatever_people_do_the_goal_can_still_be_met() -> None:
             check_state(state, SHAPE)
             assert not missing(state, SHAPE).any()
             objects.add(state.n_objects)
-        goals.add(batch.rows.goal[0].tobytes())
+        goals.add(batch.envs.goal[0].tobytes())
     assert len(goals) > 3 and objects >= {2, 3, 4, 5, 6}
 
 
 def test_people_add_remove_move_and_change_the_goal() -> None:
     settings = SortingSettings(human_rate=1.0, n_objects=4, n_goal=2)
     batch = batch_of(1000, settings)
-    start, total = batch.rows.goal.copy(), (batch.rows.clutter > 0).sum(axis=1)
+    start, total = batch.envs.goal.copy(), (batch.envs.clutter > 0).sum(axis=1)
     stuck = np.full(1000, SHAPE.n_actions - 1)
-    clutter = batch.rows.clutter.copy()
+    clutter = batch.envs.clutter.copy()
     batch.step(stuck, auto_reset=False)
-    now = (batch.rows.clutter > 0).sum(axis=1) + batch.rows.heights.sum(axis=1)
-    moved = (now == total) & (clutter != batch.rows.clutter).any(axis=1)
-    asked = (batch.rows.goal != start).any(axis=(1, 2))
-    assert (batch.rows.interferences == 1).all()
+    now = (batch.envs.clutter > 0).sum(axis=1) + batch.envs.heights.sum(axis=1)
+    moved = (now == total) & (clutter != batch.envs.clutter).any(axis=1)
+    asked = (batch.envs.goal != start).any(axis=(1, 2))
+    assert (batch.envs.interferences == 1).all()
     for share in ((now > total).mean(), (now < total).mean(), moved.mean(), asked.mean()):
         assert 0.08 < share < 0.33
 
@@ -268,13 +268,13 @@ def test_people_add_remove_move_and_change_the_goal() -> None:
 def test_a_localisation_failure_moves_another_object_and_says_so() -> None:
     settings = SortingSettings(localisation_rate=1.0, n_objects=5)
     batch = batch_of(500, settings)
-    before = batch.rows.clutter.copy()
+    before = batch.envs.clutter.copy()
     cells = np.array([np.flatnonzero(row)[2] for row in before])
     batch.step(cells * SHAPE.n_colours, auto_reset=False)
-    rows = np.arange(500)
-    np.testing.assert_array_equal(batch.rows.clutter[rows, cells], before[rows, cells])
-    gone = (before != 0) & (batch.rows.clutter == 0)
-    assert (gone.sum(axis=1) == 1).all() and (batch.rows.failures == 1).all()
+    envs = np.arange(500)
+    np.testing.assert_array_equal(batch.envs.clutter[envs, cells], before[envs, cells])
+    gone = (before != 0) & (batch.envs.clutter == 0)
+    assert (gone.sum(axis=1) == 1).all() and (batch.envs.failures == 1).all()
     place = np.array(
         [
             np.flatnonzero(np.flatnonzero(b) == np.flatnonzero(g)[0])[0]
@@ -286,9 +286,9 @@ def test_a_localisation_failure_moves_another_object_and_says_so() -> None:
 
 def test_random_maps_replace_the_cells_own_in_their_share_of_episodes() -> None:
     batch = batch_of(1000, SortingSettings(random_map_share=0.5, failure_max=0.2), RISKY)
-    own = (batch.rows.fail == RISKY).all(axis=1)
+    own = (batch.envs.fail == RISKY).all(axis=1)
     assert 0.43 < own.mean() < 0.57
-    assert batch.rows.fail[~own].max() <= 0.2
+    assert batch.envs.fail[~own].max() <= 0.2
 
 
 def test_a_given_state_starts_again_and_a_changed_one_goes_on() -> None:
@@ -298,7 +298,7 @@ def test_a_given_state_starts_again_and_a_changed_one_goes_on() -> None:
         batch.step(valid_acts(batch, rng), auto_reset=False)
     batch.put(0, given)
     batch.change(1, given)
-    assert batch.rows.steps.tolist() == [0, 3] and batch.rows.moves.tolist() == [0, 3]
+    assert batch.envs.steps.tolist() == [0, 3] and batch.envs.moves.tolist() == [0, 3]
     for e in range(2):
         np.testing.assert_array_equal(observe(batch.state_of(e)), observe(given))
 

@@ -48,7 +48,7 @@ def references() -> Json:
     p0, p1 = robot_ends(robot, capsules, q)
     for row, start, end in zip(q, p0, p1, strict=True):
         place_robot(arm, row, pose)
-        found = ends_of(pose.columns, len(capsules.name))
+        found = ends_of(pose.capsules, len(capsules.name))
         links = max(links, np.abs(found[:, 0] - start).max(), np.abs(found[:, 1] - end).max())
     pairs, overlaps = 0.0, 0
     for case in configurations():

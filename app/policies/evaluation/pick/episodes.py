@@ -252,7 +252,7 @@ class Evaluator:
                 geometry = people_geometry_of(
                     people, observed.q[k], NO_CYLINDERS, observed.size[k]
                 )
-                found[k] = Shapes(columns=geometry.columns, cylinders=np.zeros((0, 4)))
+                found[k] = Shapes(capsules=geometry.capsules, cylinders=np.zeros((0, 4)))
         return found
 
     def _without_blocked(

@@ -147,26 +147,26 @@ class _Run:
         self._begin(self._running())
 
     def _running(self) -> Index:
-        return np.flatnonzero(self._batch.rows.outcome == RUNNING)
+        return np.flatnonzero(self._batch.envs.outcome == RUNNING)
 
     def _begin(self, which: Index) -> None:
         """Begin a part of episodes, at the start or after an interference."""
         fewest, attempts = measure(self._batch, which)
         self._counts["fewest"][which] += fewest
         self._expected[which] += attempts
-        self._since[which], self._moves_before[which] = 0, self._batch.rows.moves[which]
-        self._monitor.begin(which, state_keys(self._batch.rows, which), attempts)
+        self._since[which], self._moves_before[which] = 0, self._batch.envs.moves[which]
+        self._monitor.begin(which, state_keys(self._batch.envs, which), attempts)
 
     def run(self) -> SortingEpisodes:
         """Make attempts until every episode has ended."""
         while len(which := self._running()):
             self._attempt(which)
-        rows = self._batch.rows
+        envs = self._batch.envs
         return SortingEpisodes(
-            success=rows.outcome == SUCCESS,
+            success=envs.outcome == SUCCESS,
             rewards=self._rewards,
-            moves=rows.moves.copy(),
-            attempts=rows.steps.copy(),
+            moves=envs.moves.copy(),
+            attempts=envs.steps.copy(),
             expected=self._expected,
             planner_fallback=self._called,
             repeated=self._repeated,
@@ -174,20 +174,20 @@ class _Run:
         )
 
     def _attempt(self, which: Index) -> None:
-        rows = self._batch.rows
+        envs = self._batch.envs
         act = self._decide(which)
         picked = self._count_picks(which, act)
-        before = rows.moves[which]
+        before = envs.moves[which]
         every = np.zeros(self._batch.n_envs, dtype=np.int64)
         every[which] = act
         self._rewards[which] += self._batch.step(every, auto_reset=False).rew[which]
-        moved = rows.moves[which] > before
+        moved = envs.moves[which] > before
         self._counts["failed"][which] += picked & ~moved
         self._since[which] += 1
         self._disturb(which)
         self._observe(which, moved)
-        late = (self._since[which] >= self._horizon) & (rows.outcome[which] == RUNNING)
-        rows.outcome[which[late]] = TIMEOUT
+        late = (self._since[which] >= self._horizon) & (envs.outcome[which] == RUNNING)
+        envs.outcome[which[late]] = TIMEOUT
 
     def _decide(self, which: Index) -> Index:
         act = np.zeros(len(which), dtype=np.int64)
@@ -200,10 +200,10 @@ class _Run:
 
     def _count_picks(self, which: Index, act: Index) -> Flags:
         """Count picks from the clutter and their risks; return which moves are picks."""
-        rows, shape = self._batch.rows, self._batch.shape
+        envs, shape = self._batch.envs, self._batch.shape
         picked = act < shape.n_cells * shape.n_colours
         from_clutter, cells = which[picked], act[picked] // shape.n_colours
-        clutter, fail = rows.clutter[from_clutter], rows.fail[from_clutter]
+        clutter, fail = envs.clutter[from_clutter], envs.fail[from_clutter]
         mine = np.arange(len(cells))
         duplicates = clutter == clutter[mine, cells][:, None]
         least = np.where(duplicates, fail, np.inf).min(axis=1)
@@ -217,9 +217,9 @@ class _Run:
         """Apply interferences; the rest of the previous part is removed from the minimum."""
         if self._script is None:
             return
-        rows = self._batch.rows
-        moves = rows.moves[which] - self._moves_before[which]
-        due = which[self._script.due(which, moves, rows.outcome[which] == SUCCESS)]
+        envs = self._batch.envs
+        moves = envs.moves[which] - self._moves_before[which]
+        due = which[self._script.due(which, moves, envs.outcome[which] == SUCCESS)]
         if len(due) == 0:
             return
         fewest, attempts = measure(self._batch, due)
@@ -231,11 +231,11 @@ class _Run:
 
     def _observe(self, which: Index, moved: Flags) -> None:
         """Update the progress monitor in running environments without interference."""
-        rows = self._batch.rows
-        same = (rows.outcome[which] == RUNNING) & (self._since[which] > 0)
+        envs = self._batch.envs
+        same = (envs.outcome[which] == RUNNING) & (self._since[which] > 0)
         observed = which[same]
         called, repeated = self._monitor.observe_transitions(
-            observed, state_keys(rows, observed), moved[same]
+            observed, state_keys(envs, observed), moved[same]
         )
         self._called[called] = True
         self._repeated[called[repeated]] = True
@@ -261,7 +261,7 @@ def run_episodes(
         only: Environments to run, shape (n_envs,); the others time out at once.
     """
     if only is not None:
-        batch.rows.outcome[~only] = TIMEOUT
+        batch.envs.outcome[~only] = TIMEOUT
     return _Run(batch, choose, script, fallback).run()
 
 

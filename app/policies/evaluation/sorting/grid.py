@@ -69,7 +69,7 @@ def grid_batches(
     for first in range(0, len(pairs), CHUNK):
         part = pairs[first : first + CHUNK]
         batch = SortingBatch(shape, fail, len(part), seed, settings, first_env=first)
-        batch.rows.fixed_objects[:], batch.rows.fixed_goal[:] = part.T
+        batch.envs.fixed_objects[:], batch.envs.fixed_goal[:] = part.T
         batch.reset()
         yield batch
 

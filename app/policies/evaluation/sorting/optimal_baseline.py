@@ -8,9 +8,9 @@ from app.errors import SimulationError
 from app.policies.evaluation.statistics import Index
 from app.sim.core.arrays import Vec
 from app.sim.sorting.batch import SortingBatch
-from app.sim.sorting.kernels.optimal_costs import measure_rows
+from app.sim.sorting.kernels.optimal_costs import measure_envs
 from app.sim.sorting.kernels.planner import PlannerWork, new_work
-from app.sim.sorting.kernels.planner_batch import TaskBatch, plan_rows
+from app.sim.sorting.kernels.planner_batch import TaskBatch, plan_tasks
 from app.sim.sorting.state import SortingShape
 
 
@@ -30,7 +30,7 @@ def measure(batch: SortingBatch, which: Index) -> tuple[Index, Vec]:
         SimulationError: The objects of an environment cannot form its goal.
     """
     fewest, attempts = np.zeros(len(which), dtype=np.int64), np.zeros(len(which))
-    measure_rows(batch.rows, which, _work(batch.shape), fewest, attempts)
+    measure_envs(batch.envs, which, _work(batch.shape), fewest, attempts)
     if (fewest < 0).any():
         e = int(which[fewest.argmin()])
         raise SimulationError(f"environment {e} of seed {batch.seed}: goal is unreachable")
@@ -44,14 +44,14 @@ def choose_by_planner(batch: SortingBatch, which: Index) -> Index:
         batch: Tasks.
         which: Environments, shape (m,).
     """
-    rows, best = batch.rows, np.zeros(len(which), dtype=np.int64)
+    envs, best = batch.envs, np.zeros(len(which), dtype=np.int64)
     tasks = TaskBatch(
-        clutter=rows.clutter[which],
-        towers=rows.towers[which],
-        heights=rows.heights[which],
-        goal=rows.goal[which],
-        goal_heights=rows.goal_heights[which],
-        fail=rows.fail[which],
+        clutter=envs.clutter[which],
+        towers=envs.towers[which],
+        heights=envs.heights[which],
+        goal=envs.goal[which],
+        goal_heights=envs.goal_heights[which],
+        fail=envs.fail[which],
     )
-    plan_rows(tasks, _work(batch.shape), best, np.zeros_like(best))
+    plan_tasks(tasks, _work(batch.shape), best, np.zeros_like(best))
     return best

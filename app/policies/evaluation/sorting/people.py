@@ -279,7 +279,7 @@ class SortingBesidePeople:
         if state.clear[e, 1:].min() <= 0.0:
             pose = new_robot_pose(batch.arm)
             place_robot(batch.arm, batch.arm.home, pose)
-            state.q[e], state.robot[e] = batch.arm.home, pose.columns
+            state.q[e], state.robot[e] = batch.arm.home, pose.capsules
         self._begin_motion(e)
 
     def _release(self) -> None:

@@ -10,22 +10,22 @@ from numpy.typing import NDArray
 
 from app.policies.evaluation.statistics import Flags, Index
 from app.sim.core.arrays import Vec
-from app.sim.sorting.kernels.task import SortingRows
+from app.sim.sorting.kernels.task import SortingEnvs
 from app.sim.sorting.progress_monitor import ATTEMPT_FACTOR, MAX_SEEN
 
 Keys = NDArray[np.uint64]
 
 
-def state_keys(rows: SortingRows, which: Index) -> Keys:
+def state_keys(envs: SortingEnvs, which: Index) -> Keys:
     """Return a number for each state, equal for equal clutter and towers, shape (n,).
 
     A sum of codes times fixed odd 64-bit numbers, modulo 2^64: two states of a task share a
     key with a probability of about 1e-18.
     """
-    n, k, c = len(which), rows.clutter.shape[1], rows.towers.shape[1]
+    n, k, c = len(which), envs.clutter.shape[1], envs.towers.shape[1]
     draw = np.random.default_rng(0)
     odd = draw.integers(0, 2**63, k * (1 + c), dtype=np.uint64) * np.uint64(2) + np.uint64(1)
-    codes = np.concatenate([rows.clutter[which], rows.towers[which].reshape(n, k * c)], axis=1)
+    codes = np.concatenate([envs.clutter[which], envs.towers[which].reshape(n, k * c)], axis=1)
     return np.asarray((codes.astype(np.uint64) * odd).sum(axis=1, dtype=np.uint64))
 
 

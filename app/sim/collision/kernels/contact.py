@@ -56,8 +56,8 @@ class PeriodMotion(NamedTuple):
 def clearances(arm: Arm, people: People, robot: RobotPose, geometry: PeopleGeometry) -> Clear:
     """Return the distances of a placed robot to people, cell and itself [m]."""
     return (
-        people_clearance(people, robot.columns, geometry),
-        cell_clearance(arm, robot.columns)[0],
+        people_clearance(people, robot.capsules, geometry),
+        cell_clearance(arm, robot.capsules)[0],
         self_clearance(arm, robot)[0],
     )
 
@@ -105,9 +105,9 @@ def sweep(
     for w in range(motion.human_q1.shape[0]):
         geometry.pelvis_z[1, w] = geometry.size[w, PELVIS_Z]
     copy_rows(motion.cylinders1, geometry.cylinders)
-    robot_speed = robot_speed_bound(arm, motion.path, robot0, robot.columns)
+    robot_speed = robot_speed_bound(arm, motion.path, robot0, robot.capsules)
     approach = robot_speed + people_speed_bound(
-        workers0, geometry.columns, geometry.cylinders0, motion.cylinders1, arm.dt
+        workers0, geometry.capsules, geometry.cylinders0, motion.cylinders1, arm.dt
     )
     begin = (clear[0], clear[1], clear[2])
     end = clearances(arm, people, robot, geometry)

@@ -30,9 +30,9 @@ RESOLUTION = 1e-3
 class Obstacles(NamedTuple):
     """People at one moment, distances to keep, and work space."""
 
-    columns: Vec
+    capsules: Vec
     """The people's capsules, shape (9, m)."""
-    gap: Vec
+    clearance: Vec
     """Work space: distance of each capsule to the robot [m], shape (m,)."""
     cylinders: Vec
     """Upright cylinders that stand on the floor: x, y, radius, top [m], shape (n, 4)."""
@@ -52,13 +52,13 @@ class Obstacles(NamedTuple):
 def distance_to_people(obstacles: Obstacles, pose: RobotPose) -> float:
     """Return the distance of the placed robot to people [m]; FAR without any."""
     best = FAR
-    if obstacles.columns.shape[1] > 0:
-        capsule_clearances(pose.columns, obstacles.columns, obstacles.gap)
-        best, _ = least(obstacles.gap)
+    if obstacles.capsules.shape[1] > 0:
+        capsule_clearances(pose.capsules, obstacles.capsules, obstacles.clearance)
+        best, _ = least(obstacles.clearance)
     for k in range(obstacles.cylinders.shape[0]):
         x, y = obstacles.cylinders[k, 0], obstacles.cylinders[k, 1]
         r, top = obstacles.cylinders[k, 2], obstacles.cylinders[k, 3]
-        d, _ = cylinder_clearance(pose.columns, 0, x, y, r, top)
+        d, _ = cylinder_clearance(pose.capsules, 0, x, y, r, top)
         best = min(best, d)
     return best
 
@@ -76,7 +76,7 @@ def clearances_at(
     """
     place_robot(arm, q, pose)
     people = distance_to_people(obstacles, pose)
-    cell, _, _ = cell_clearance(arm, pose.columns)
+    cell, _, _ = cell_clearance(arm, pose.capsules)
     own, _ = self_clearance(arm, pose)
     return people, cell, own
 

@@ -12,7 +12,7 @@ import numpy as np
 from app.sim.core.arrays import Vec
 from app.sim.core.jit import kernel
 from app.sim.core.kernels.trig import sines
-from app.sim.geometry.capsules import INVERSE, RADIUS, UU, new_columns, padded_size
+from app.sim.geometry.capsules import INVERSE, RADIUS, UU, new_capsules, padded_size
 
 N_SIZE = 12
 (
@@ -247,11 +247,11 @@ def capsules(points: Vec, frames: Vec, size: Vec, floor_z: float, first: int, ou
         out[INVERSE, k] = 1.0 / max(out[UU, k], 1e-12)
 
 
-def capsule_columns(n_people: int) -> Vec:
+def new_body_capsules(n_people: int) -> Vec:
     """Return the capsules of people as columns, all nowhere until they are placed.
 
     Args:
         n_people: Number of people; each has twelve columns, then come columns nowhere.
     """
     n = padded_size(n_people * N_CAPSULES)
-    return new_columns(n, np.tile(RADII, n_people))
+    return new_capsules(n, np.tile(RADII, n_people))

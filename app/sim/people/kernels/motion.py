@@ -167,13 +167,13 @@ def draw_script_of(
         first: Initial posture, at home; -1 draws one.
     """
     moves = Moves(state.start[e, w], state.duration[e, w], state.chosen[e, w])
-    of_station, n_cubes, rows = people.of_station[who], people.n_cubes, state.segments
+    of_station, n_cubes, stored = people.of_station[who], people.n_cubes, state.segments
     if people.source == LIBRARY:
-        segments = Segments(rows.primitive[e, w], rows.sample[e, w], rows.stop[e, w])
+        segments = Segments(stored.primitive[e, w], stored.sample[e, w], stored.stop[e, w])
         state.n_moves[e, w] = draw_segments(
             rng, people.primitive_library, of_station, n_cubes, first, moves, segments
         )
-        rows.ready[e, w] = -1
+        stored.ready[e, w] = -1
     else:
         state.n_moves[e, w] = draw_script(rng, of_station, n_cubes, people.hands, first, moves)
     state.move[e, w] = 0

@@ -56,8 +56,8 @@ class People(NamedTuple):
     """Height of the floor [m]."""
     top_z: float
     """Height of the tops of people's cylinders [m]."""
-    columns: Vec
-    """Template of the workers' capsules, shape (9, n); see ``body.capsule_columns``."""
+    capsules: Vec
+    """Template of the workers' capsules, shape (9, n); see ``body.new_body_capsules``."""
     postures: Vec
     """Postures of the scripts [m, rad], shape (n_postures, 18)."""
     hands: Vec
@@ -103,7 +103,7 @@ class PeopleState(NamedTuple):
     """Index of each worker's body, shape (n_envs, W)."""
     size: Vec
     """Sizes of the workers [m], shape (n_envs, W, body.N_SIZE)."""
-    columns: Vec
+    capsules: Vec
     """Capsules of the workers, shape (n_envs, 9, n)."""
     clock: Vec
     """Time in each worker's script or track [s], shape (n_envs, W)."""
@@ -130,7 +130,7 @@ class PeopleState(NamedTuple):
     chosen: NDArray[np.int64]
     """Postures of the scripts, shape (n_envs, W, MAX_MOVES + 1)."""
     walkers: PedestrianState
-    """State of the pedestrians, rows (n_envs, C)."""
+    """State of the pedestrians, of shape (n_envs, C, ...)."""
     cylinders: Vec
     """x, y and radius of the pedestrians [m], shape (n_envs, C, 3)."""
 
@@ -149,13 +149,13 @@ class PeopleGeometry(NamedTuple):
     frames: Vec
     """The workers' orientations, shape (W, N_FRAMES, 3, 3)."""
     trig: Vec
-    """Sines, cosines and more, shape (3, 16)."""
-    columns: Vec
+    """Sines and cosines of the joints, and work space (``human/kernels``), shape (3, 16)."""
+    capsules: Vec
     """The workers' capsules, shape (9, n)."""
-    gap: Vec
-    """Distance of each capsule to the robot [m], shape (n,)."""
+    clearance: Vec
+    """Clearance of the robot to each capsule of the workers [m], shape (n,)."""
     cylinders: Vec
-    """The walkers' x, y and radius [m], shape (C, 3)."""
+    """The pedestrians' x, y and radius [m], shape (C, 3)."""
     q0: Vec
     """The workers' joints at the start of the period [m, rad], shape (W, 18)."""
     cylinders0: Vec
@@ -179,8 +179,8 @@ def new_people_geometry(people: People, n_workers: int, n_pedestrians: int) -> P
         np.empty((n_workers, body.N_POINTS, 3)),
         np.empty((n_workers, body.N_FRAMES, 3, 3)),
         np.empty((3, 16)),
-        people.columns.copy(),
-        np.empty(people.columns.shape[1]),
+        people.capsules.copy(),
+        np.empty(people.capsules.shape[1]),
         np.empty((n_pedestrians, 3)),
         np.empty((n_workers, 18)),
         np.empty((n_pedestrians, 3)),
@@ -198,7 +198,7 @@ def place_workers(people: People, q: Vec, geometry: PeopleGeometry) -> None:
         points, frames, size = geometry.points[w], geometry.frames[w], geometry.size[w]
         body.points_and_frames(q[w], size, geometry.trig, points, frames)
         first = w * body.N_CAPSULES
-        body.capsules(points, frames, size, people.floor_z, first, geometry.columns)
+        body.capsules(points, frames, size, people.floor_z, first, geometry.capsules)
 
 
 @kernel(inline="always")
@@ -207,12 +207,12 @@ def people_clearance(people: People, robot: Vec, geometry: PeopleGeometry) -> fl
 
     Args:
         robot: The robot's capsules as columns, shape (9, n).
-        geometry: Placed; ``gap`` is filled.
+        geometry: Placed; ``clearance`` is filled.
     """
     best = FAR
-    if geometry.columns.shape[1] > 0:
-        capsule_clearances(robot, geometry.columns, geometry.gap)
-        best, _ = least(geometry.gap)
+    if geometry.capsules.shape[1] > 0:
+        capsule_clearances(robot, geometry.capsules, geometry.clearance)
+        best, _ = least(geometry.clearance)
     for k in range(geometry.cylinders.shape[0]):
         x, y, r = geometry.cylinders[k, 0], geometry.cylinders[k, 1], geometry.cylinders[k, 2]
         d, _ = cylinder_clearance(robot, 0, x, y, r, people.top_z)
@@ -222,9 +222,9 @@ def people_clearance(people: People, robot: Vec, geometry: PeopleGeometry) -> fl
 
 @kernel(inline="always")
 def store_clearances(state: PeopleState, e: int, geometry: PeopleGeometry) -> None:
-    """Store the clearance of each worker to the robot from ``geometry.gap``."""
+    """Store the clearance of each worker to the robot from ``geometry.clearance``."""
     for w in range(state.q.shape[1]):
-        part = geometry.gap[w * body.N_CAPSULES : (w + 1) * body.N_CAPSULES]
+        part = geometry.clearance[w * body.N_CAPSULES : (w + 1) * body.N_CAPSULES]
         state.near[e, w], _ = least(part)
 
 
@@ -242,12 +242,12 @@ def person_clearance(people: People, robot: Vec, geometry: PeopleGeometry, who: 
 
     Args:
         robot: The robot's capsules as columns, shape (9, n).
-        geometry: The people, placed; for a worker ``gap`` must be filled.
+        geometry: The people, placed; for a worker ``clearance`` must be filled.
         who: Index of the person: workers first, then pedestrians.
     """
     k = who - geometry.q.shape[0]
     if k < 0:
-        part = geometry.gap[who * body.N_CAPSULES : (who + 1) * body.N_CAPSULES]
+        part = geometry.clearance[who * body.N_CAPSULES : (who + 1) * body.N_CAPSULES]
         return float(least(part)[0])
     x, y, r = geometry.cylinders[k, 0], geometry.cylinders[k, 1], geometry.cylinders[k, 2]
     return float(cylinder_clearance(robot, 0, x, y, r, people.top_z)[0])
@@ -266,7 +266,7 @@ def nearest_person(people: People, robot: Vec, geometry: PeopleGeometry) -> int:
         return int(n_workers + n_pedestrians - 1)
     best, nearest = FAR, 0
     if n_workers > 0:
-        capsule_clearances(robot, geometry.columns, geometry.gap)
+        capsule_clearances(robot, geometry.capsules, geometry.clearance)
     for who in range(n_workers + n_pedestrians):
         d = person_clearance(people, robot, geometry, who)
         if d < best:
@@ -333,7 +333,7 @@ def observe_people_of_envs(
     people: People,
     state: PeopleState,
     robots: Vec,
-    rows: NDArray[np.int64],
+    envs: NDArray[np.int64],
     geometry: PeopleGeometry,
     q: Vec,
     qd: Vec,
@@ -343,13 +343,13 @@ def observe_people_of_envs(
 
     Args:
         robots: The robots' capsules, shape (n_envs, 9, n).
-        rows: Indices of the environments, shape (k,).
+        envs: Indices of the environments, shape (k,).
         geometry: Work space.
         q: Filled with joints [m, rad], shape (k, P, 18).
         qd: Filled with joint speeds [m/s, rad/s], shape (k, P, 18).
         size: Filled with the sizes [m], shape (k, P, body.N_SIZE).
     """
-    for k in range(rows.shape[0]):
-        e = rows[k]
+    for k in range(envs.shape[0]):
+        e = envs[k]
         place_people(people, state, e, geometry)
         observe_people(people, state, e, robots[e], geometry, q[k], qd[k], size[k])

@@ -13,7 +13,7 @@ SPEED_STEP = 1e-5
 
 @kernel()
 def capsule_speeds(
-    people: People, q: Vec, qd: Vec, columns: Vec, geometry: PeopleGeometry, out: Vec
+    people: People, q: Vec, qd: Vec, capsules: Vec, geometry: PeopleGeometry, out: Vec
 ) -> None:
     """Write the speed of the faster end of each of the workers' capsules [m/s].
 
@@ -22,7 +22,7 @@ def capsule_speeds(
     Args:
         q: Joint positions [m, rad], shape (W, 18).
         qd: Joint speeds [m/s, rad/s], shape (W, 18).
-        columns: The capsules at ``q``, shape (9, n).
+        capsules: The capsules at ``q``, shape (9, n).
         geometry: Work space with the workers' sizes; its pose changes.
         out: Filled, shape (n,).
     """
@@ -30,7 +30,7 @@ def capsule_speeds(
         for j in range(18):
             geometry.q[w, j] = q[w, j] + SPEED_STEP * qd[w, j]
     place_workers(people, geometry.q, geometry)
-    displacements(columns, geometry.columns, out)
+    displacements(capsules, geometry.capsules, out)
     for k in range(out.shape[0]):
         out[k] /= SPEED_STEP
 

@@ -118,7 +118,7 @@ def conclude(
 
 
 @kernel(nogil=True)
-def observe_rows(
+def observe_envs(
     world: PickCell,
     grasp: GraspRules,
     state: EpisodeState,
@@ -147,7 +147,7 @@ def observe_rows(
         place_robot(world.arm, state.q[e], work.robot)
         place_people(people, state.people, e, geometry)
         observe_people(
-            people, state.people, e, work.robot.columns, geometry, human_q, human_qd, size
+            people, state.people, e, work.robot.capsules, geometry, human_q, human_qd, size
         )
         if view == PLAIN:
             for j in range(6):
@@ -184,7 +184,7 @@ def observe_rows(
 
 
 @kernel(nogil=True)
-def reset_rows(
+def reset_envs(
     world: PickCell,
     task: PickTask,
     seed: int,

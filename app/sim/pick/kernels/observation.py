@@ -101,9 +101,14 @@ def _place_lanes(arm: Arm, q: Vec, first: int, work: PickObservationWorkspace) -
 
 
 @kernel(inline="always")
-def _measure_gaps(work: PickObservationWorkspace, lanes: int, person: Vec) -> None:
-    """Write the distance of a person, shape (9, 16), to each of the first lanes."""
-    nearest_parts(work.lanes, lanes, person, FIRST_PART, LAST_PART, work.gap, None)
+def _measure_lanes(work: PickObservationWorkspace, lanes: int, person: Vec) -> None:
+    """Write the clearance of a person to each of the first lanes into ``work.clearance``.
+
+    Args:
+        lanes: Number of lanes.
+        person: Capsules of the person, shape (9, 16).
+    """
+    nearest_parts(work.lanes, lanes, person, FIRST_PART, LAST_PART, work.clearance, None)
 
 
 @kernel(inline="always")
@@ -111,7 +116,7 @@ def _lane_clearance(first: int, work: PickObservationWorkspace) -> float:
     """Return the clearance of one configuration's lanes, in units of the scale."""
     best = FARTHEST
     for k in range(first, first + N_COARSE):
-        best = min(best, work.gap[k])
+        best = min(best, work.clearance[k])
     return best / DISTANCE_SCALE
 
 
@@ -183,18 +188,18 @@ def _write_target(goal: Vec, person: PersonWorkspace, tcp: Vec, out: Obs) -> Non
 @kernel(inline="always")
 def _write_nearest(work: PickObservationWorkspace, out: Obs) -> None:
     """Write distance and direction of the nearest human part per link group."""
-    overall, gap, vector, k = FAR, work.gap, work.gap_vector, NEAREST
+    overall, clearance, vector, k = FAR, work.clearance, work.to_person, NEAREST
     for group in range(4):
         lane = STILL + COARSE_FIRST[group]
         for c in range(lane + 1, STILL + COARSE_FIRST[group + 1]):
-            if gap[c] < gap[lane]:
+            if clearance[c] < clearance[lane]:
                 lane = c
         part = int(work.part[lane])
         length = segment_nearest(work.lanes, lane, work.person.now, part, vector)
-        out[k + 4 * group] = _scaled(gap[lane])
+        out[k + 4 * group] = _scaled(clearance[lane])
         for i in range(3):
             out[k + 4 * group + 1 + i] = vector[i] / (length + 1e-9)
-        overall = min(overall, gap[lane])
+        overall = min(overall, clearance[lane])
     out[SCALARS + 2] = _scaled(overall)
     if out.shape[0] == N_WITH_PHASE or out.shape[0] == N_PICK:
         out[NEAR_CLEARANCE] = min(1.0, overall / CLOSE_SCALE)
@@ -243,12 +248,12 @@ def _write_look_ahead(
         if not predicts:
             extrapolate_capsules(person.now, person.later, HORIZONS[i], person.moved)
         moved = work.ahead[0, i] if predicts else person.moved
-        _measure_gaps(work, N_LANES, moved)
+        _measure_lanes(work, N_LANES, moved)
         out[STILL_AHEAD + i] = _lane_clearance(STILL, work)
         _write_clearances(work, STILL_AHEAD, i, out)
         if second > 0:
             moved, k = work.ahead[1, i], SECOND_CLEARANCE + 1
-            _measure_gaps(work, N_LANES, moved)
+            _measure_lanes(work, N_LANES, moved)
             out[k + i] = _lane_clearance(STILL, work)
             _write_clearances(work, k, i, out)
 
@@ -308,10 +313,11 @@ def observe_target(
         out[BASE_START + j] = base[j]
     _place_lanes(arm, state.q_grasp, AT_GOAL, work)
     if again:
-        _measure_gaps(work, GOAL_LANES, person.now)
+        _measure_lanes(work, GOAL_LANES, person.now)
     else:
-        now, gap, part = person.now, work.gap, work.part
-        nearest_parts(work.lanes, N_LANES, now, FIRST_PART, LAST_PART, gap, part)
+        nearest_parts(
+            work.lanes, N_LANES, person.now, FIRST_PART, LAST_PART, work.clearance, work.part
+        )
         _write_nearest(work, out)
     out[AT_GOAL_AHEAD] = _lane_clearance(AT_GOAL, work)
     if n_obs == N_WITH_PHASE or n_obs == N_PICK:
@@ -325,7 +331,7 @@ def observe_target(
         for k in range(SECOND_CLEARANCE, N_PICK):
             out[k] = FARTHEST / DISTANCE_SCALE
     if second > 0:
-        _measure_gaps(work, N_LANES, work.second.now)
+        _measure_lanes(work, N_LANES, work.second.now)
         out[SECOND_CLEARANCE] = _lane_clearance(STILL, work)
         out[SECOND_CLEARANCE + 7] = _lane_clearance(AT_GOAL, work)
     _write_look_ahead(arm, floor_z, state, second, work, out)

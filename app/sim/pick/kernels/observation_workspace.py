@@ -6,7 +6,7 @@ import numpy as np
 
 from app.sim.core.arrays import Vec
 from app.sim.core.jit import kernel
-from app.sim.geometry.capsules import new_columns, padded_size
+from app.sim.geometry.capsules import new_capsules, padded_size
 from app.sim.human.kernels import kinematics as body
 from app.sim.people.kernels.people import MAX_PEOPLE
 from app.sim.prediction.kernels.worker import WorkerPredictor, predict_worker
@@ -24,9 +24,15 @@ COARSE_LINK = np.array([2, 3, 4, 5, 6], dtype=np.int64)
 """Link of each coarse capsule: the robot from the upper arm to the tool, simplified for
 features. Contacts use the capsules of ``robot/data/ur10_capsules.json``."""
 COARSE_P0 = np.array(
-    [[0.0, -0.045, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]]
+    [
+        [0.0, -0.045, 0.0],
+        [0.0, 0.0, 0.0],
+        [0.0, 0.0, 0.0],
+        [0.0, 0.0, 0.0],
+        [0.0, 0.0, 0.0],
+    ]
 )
-"""First end of each segment in the link's frame [m]."""
+"""First end of each segment in the link's frame [m], shape (N_COARSE, 3)."""
 COARSE_SPAN = np.array(
     [
         [0.0, 0.0, 0.612],
@@ -36,20 +42,22 @@ COARSE_SPAN = np.array(
         [0.0, 0.17, 0.0],
     ]
 )
-"""Second end minus first end in that frame [m], for the standard tool."""
+"""Second end minus first end in that frame [m], for the standard tool, shape (N_COARSE, 3)."""
 COARSE_RADIUS = np.array([0.09, 0.075, 0.066, 0.066, 0.045])
-"""Radius of each [m], for the standard tool."""
+"""Radius of each [m], for the standard tool, shape (N_COARSE,)."""
 COARSE_FIRST = (0, 1, 2, 4, 5)
-"""First coarse capsule of each of the four groups of links; last, the number of capsules."""
+"""First coarse capsule of each of four groups of links (upper arm, forearm, wrists 1 and 2,
+wrist 3 with the tool), and the number of capsules."""
 N_COARSE = 5
 AT_GOAL, ALONG_BASE, STILL = 0, N_COARSE, 2 * N_COARSE
 """First lane of three robot configurations that are evaluated together: at the goal, along the
-base motion, now."""
+base motion, now. A lane is one coarse capsule in one configuration."""
 N_LANES = padded_size(3 * N_COARSE)
+"""Number of lanes, padded to whole vectors."""
 GOAL_LANES = 8
 """Number of lanes that covers the first of them in whole vectors."""
 FIRST_PART, LAST_PART = body.C_ABDOMEN, body.C_HAND_L
-"""Human capsules used by the features: those above the table."""
+"""First and last human capsule used by the features: those above the table."""
 
 
 class PickQuery(NamedTuple):
@@ -108,10 +116,10 @@ class PickObservationWorkspace(NamedTuple):
     (N_COARSE, 3)."""
     lanes: Vec
     """Coarse capsules of the robot in three configurations, shape (9, N_LANES)."""
-    gap: Vec
-    """Distance of each lane to the person [m], shape (N_LANES,)."""
+    clearance: Vec
+    """Clearance of the person to the coarse capsule of each lane [m], shape (N_LANES,)."""
     part: Vec
-    """The person's capsule nearest to each lane, shape (N_LANES,)."""
+    """Number of the person's capsule nearest to each lane, shape (N_LANES,)."""
     rot: Vec
     """R_world_link of another configuration, shape (7, 3, 3)."""
     pos: Vec
@@ -119,9 +127,9 @@ class PickObservationWorkspace(NamedTuple):
     q: Vec
     """Its joints [rad], shape (6,)."""
     base: Vec
-    """The base motion, shape (6,)."""
-    gap_vector: Vec
-    """From robot to person [m], shape (3,)."""
+    """The base motion as speeds relative to the joints' limits, in [-1, 1], shape (6,)."""
+    to_person: Vec
+    """Vector from the axis of a coarse capsule to that of a human capsule [m], shape (3,)."""
     human_q: Vec
     """Joint positions of the people [m, rad], shape (MAX_PEOPLE, 18)."""
     human_qd: Vec
@@ -133,11 +141,12 @@ class PickObservationWorkspace(NamedTuple):
     predictor: WorkerPredictor
     """Predicts the motion of the observed people in picks."""
     predicted: Vec
-    """Predicted joint positions of one of them [m, rad], shape (3, 18)."""
+    """Predicted joint positions of one person at ``HORIZONS`` [m, rad], shape (3, 18)."""
     ahead: Vec
-    """Their predicted capsules as columns, shape (2, 3, 9, 16)."""
+    """Predicted capsules of both people at ``HORIZONS``, the first one first, (2, 3, 9, 16)."""
     known: Vec
-    """Joints, joint speeds and body dimensions to which ``ahead`` belongs, (2, 36 + N_SIZE)."""
+    """Joints [m, rad], joint speeds [m/s, rad/s] and body dimensions [m] to which ``ahead``
+    belongs, shape (2, 36 + body.N_SIZE)."""
 
 
 def coarse_capsules(tool_length: float, tool_radius: float) -> tuple[Vec, Vec]:
@@ -181,21 +190,21 @@ def new_pick_observation_workspace(
         second=new_person_workspace(),
         far=far,
         span=span,
-        lanes=new_columns(N_LANES, np.tile(radius, 3), np.tile((span**2).sum(axis=1), 3)),
-        gap=np.zeros(N_LANES),
+        lanes=new_capsules(N_LANES, np.tile(radius, 3), np.tile((span**2).sum(axis=1), 3)),
+        clearance=np.zeros(N_LANES),
         part=np.zeros(N_LANES),
         rot=np.zeros((7, 3, 3)),
         pos=np.zeros((7, 3)),
         q=np.zeros(6),
         base=np.zeros(6),
-        gap_vector=np.zeros(3),
+        to_person=np.zeros(3),
         human_q=np.zeros((MAX_PEOPLE, 18)),
         human_qd=np.zeros((MAX_PEOPLE, 18)),
         human_size=np.zeros((MAX_PEOPLE, body.N_SIZE)),
         point=np.zeros(3),
         predictor=predictor,
         predicted=np.zeros((len(HORIZONS), 18)),
-        ahead=np.tile(body.capsule_columns(1), (2, len(HORIZONS), 1, 1)),
+        ahead=np.tile(body.new_body_capsules(1), (2, len(HORIZONS), 1, 1)),
         known=np.full((2, 36 + body.N_SIZE), np.nan),
     )
 
@@ -204,9 +213,16 @@ def new_pick_observation_workspace(
 def predict_person(
     floor_z: float, q: Vec, qd: Vec, size: Vec, who: int, work: PickObservationWorkspace
 ) -> None:
-    """Place the predicted capsules of a person, unless they are those of the last call.
+    """Place the capsules of a person predicted at ``HORIZONS``, unless the last call did.
 
-    The second person's points are overwritten; the first one's serve all candidates.
+    Args:
+        floor_z: Height of the floor [m].
+        q: The person's joint positions [m, rad], shape (18,).
+        qd: The person's joint speeds [m/s, rad/s], shape (18,).
+        size: The person's body dimensions [m], shape (body.N_SIZE,).
+        who: 0 for the first person, 1 for the second.
+        work: ``ahead[who]`` is written; the points of ``second`` are overwritten, those of
+            ``person`` are needed for all candidates.
     """
     known, same = work.known[who], True
     for j in range(18):

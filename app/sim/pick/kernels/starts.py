@@ -136,6 +136,7 @@ def _start_pick(arm: Arm, grasp: GraspRules, state: EpisodeState, e: int) -> boo
 def _draw_candidates(
     world: PickCell, rules: PickRules, state: EpisodeState, e: int, rng: random.State
 ) -> None:
+    """Draw different stations as candidates of an episode; the first one is its target."""
     n_stations = world.stations.shape[0]
     spread = rules.n_candidates_max - rules.n_candidates_min + 1
     n = rules.n_candidates_min + random.below(rng, spread)

@@ -48,7 +48,7 @@ SIZES = (
     ("goal_gap", 4),
     ("group_gap", 9),
 )
-"""Names and sizes of the groups of features."""
+"""Names and sizes of the groups of features; ``app/sim/envs/reach.py`` describes them."""
 N_APPROACH = sum(size for _, size in SIZES)
 
 
@@ -120,10 +120,10 @@ def approach(x: float, y: float, vx: float, vy: float) -> tuple[float, float]:
     """Return time [s] and distance [m] of the closest approach of two points in the plane.
 
     Args:
-        x: Position of one relative to the other [m].
-        y: See x.
-        vx: Velocity of one relative to the other [m/s].
-        vy: See vx.
+        x: x of the position of one point relative to the other [m].
+        y: y of that position [m].
+        vx: x of the velocity of that point relative to the other [m/s].
+        vy: y of that velocity [m/s].
     """
     square = vx * vx + vy * vy
     t = 0.0
@@ -134,7 +134,16 @@ def approach(x: float, y: float, vx: float, vy: float) -> tuple[float, float]:
 
 @kernel(inline="always")
 def _write_approach(person: Vec, point: Vec, vx: float, vy: float, k: int, out: Obs) -> None:
-    """Write the closest approach of the person to a point with velocity (vx, vy)."""
+    """Write time and distance of the closest approach of the person to a moving point.
+
+    Args:
+        person: The observed person, shape (N_PERSON,).
+        point: The point in the world frame [m], shape (>= 2,).
+        vx: x of its velocity [m/s].
+        vy: y of its velocity [m/s].
+        k: Index of the first of the two features.
+        out: Filled from ``k`` on, in units of APPROACH_HORIZON and SCALE.
+    """
     t, d = approach(person[0] - point[0], person[1] - point[1], person[2] - vx, person[3] - vy)
     out[k], out[k + 1] = t / APPROACH_HORIZON, _scaled(d - person[4])
 
@@ -226,4 +235,4 @@ def write_approach_features(
     _write_approach(person, robot.tcp, 0.0, 0.0, k + 12, out)
     _write_approach(person, robot.pos[3], ex, ey, k + 14, out)
     _write_approach(person, goal, 0.0, 0.0, k + 16, out)
-    _write_groups(robot.columns, person, k + 22, out)
+    _write_groups(robot.capsules, person, k + 22, out)

@@ -92,6 +92,7 @@ def set_goal(
 def _draw_goal(
     world: ReachCell, rules: ReachRules, state: EpisodeState, e: int, rng: random.State
 ) -> None:
+    """Draw the goal of an episode, one of the targets or a point of the goal box."""
     if rules.anywhere:
         state.target[e] = NO_TARGET
         for i in range(3):
@@ -122,7 +123,7 @@ def reset_env(
     for attempt in range(START_TRIES):
         start_people(world.people, state.people, e, rng, work.geometry)
         state.n_redrawn[e] = attempt
-        clear = people_clearance(world.people, work.robot.columns, work.geometry)
+        clear = people_clearance(world.people, work.robot.capsules, work.geometry)
         if clear >= rules.start_clearance:
             break
     measure(arm, world.people, state, e, work)
@@ -185,7 +186,7 @@ def step_env(
 
 
 @kernel(nogil=True)
-def reset_rows(
+def reset_envs(
     world: ReachCell,
     task: ReachTask,
     seed: int,

@@ -85,22 +85,22 @@ BASE_START = LAYOUT["base"].start
 
 
 @kernel()
-def enclosing_radius(columns: Vec, first: int, n: int, x: float, y: float) -> float:
+def enclosing_radius(capsules: Vec, first: int, n: int, x: float, y: float) -> float:
     """Return the radius of the upright cylinder about an axis that contains capsules [m].
 
     Args:
-        columns: Capsules as columns, shape (9, m).
-        first: First column to contain.
-        n: Number of columns.
-        x: Axis [m].
-        y: Axis [m].
+        capsules: Set of capsules (``geometry/capsules.py``), shape (9, m).
+        first: First capsule to contain.
+        n: Number of capsules to contain.
+        x: x coordinate of the axis in the world frame [m].
+        y: y coordinate of the axis in the world frame [m].
     """
     widest = 0.0
     for k in range(first, first + n):
-        dx, dy = columns[X, k] - x, columns[Y, k] - y
+        dx, dy = capsules[X, k] - x, capsules[Y, k] - y
         start = math.hypot(dx, dy)
-        end = math.hypot(dx + columns[UX, k], dy + columns[UY, k])
-        widest = max(widest, max(start, end) + columns[RADIUS, k])
+        end = math.hypot(dx + capsules[UX, k], dy + capsules[UY, k])
+        widest = max(widest, max(start, end) + capsules[RADIUS, k])
     return widest
 
 
@@ -124,7 +124,7 @@ def write_person(
         out[0], out[1] = state.q[e, p, 0], state.q[e, p, 1]
         out[2], out[3] = state.qd[e, p, 0], state.qd[e, p, 1]
         n = body.N_CAPSULES
-        out[4] = enclosing_radius(geometry.columns, p * n, n, out[0], out[1])
+        out[4] = enclosing_radius(geometry.capsules, p * n, n, out[0], out[1])
         out[5] = 0.0
     else:
         rows, k = state.walkers.rows, p - n_workers
@@ -148,7 +148,7 @@ def write_raw_state(query: ReachQuery, person: Vec, out: Obs) -> None:
 def extrapolate_clearances(
     people: People, state: PeopleState, e: int, which: int, work: ReachObservationWorkspace
 ) -> None:
-    """Fill ``work.clearances`` with those of the robot at rest to people at ``HORIZONS``.
+    """Fill ``work.clearances_ahead`` with those of the robot at rest to people at ``HORIZONS``.
 
     Args:
         state: State of the people, who move at constant velocity.
@@ -156,7 +156,7 @@ def extrapolate_clearances(
         which: The one person that counts, or ALL_PEOPLE.
         work: Holds the placed robot.
     """
-    robot, person, found = work.robot.columns, work.body, work.clearances
+    robot, person, found = work.robot.capsules, work.body, work.clearances_ahead
     for i in range(3):
         found[i] = FAR
     n_workers = state.q.shape[1]
@@ -166,8 +166,8 @@ def extrapolate_clearances(
         place_person(people.floor_z, state.q[e, w], state.qd[e, w], state.size[e, w], person)
         for i in range(3):
             extrapolate_capsules(person.now, person.later, HORIZONS[i], person.moved)
-            capsule_clearances(robot, person.moved, work.gap)
-            found[i] = min(found[i], least(work.gap)[0])
+            capsule_clearances(robot, person.moved, work.clearance)
+            found[i] = min(found[i], least(work.clearance)[0])
     rows = state.walkers.rows
     for k in range(rows.shape[1]):
         if which != ALL_PEOPLE and which != n_workers + k:
@@ -205,7 +205,7 @@ def _write_state_features(
         square += offset * offset
         out[17 + i], out[32 + i] = goal[i], tcp[i]
         out[35 + i], out[38 + i] = 2.0 * offset, speed
-        out[48 + i] = _scaled(work.clearances[i])
+        out[48 + i] = _scaled(work.clearances_ahead[i])
     for i in range(2):
         out[41 + i] = person[i] - tcp[i]
         out[43 + i] = person[i] - pos[3, i]

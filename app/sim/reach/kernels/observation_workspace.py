@@ -27,6 +27,7 @@ N_RETREATS = 3
 LOOKS = (1, 3, 6, 9, 12, 17, 24, 32)
 """Times at which the clearances of the options are evaluated, in steps of the prediction."""
 N_LOOKS = len(LOOKS)
+"""Number of these times."""
 N_ASIDE = 1 + N_RETREATS
 """Options that do not lead to the goal: standing still and the retreats."""
 
@@ -50,21 +51,21 @@ class ReachObservationWorkspace(NamedTuple):
     geometry: PeopleGeometry
     """The people, placed as they are now."""
     observed: Vec
-    """The observed person, shape (N_PERSON,)."""
-    clearances: Vec
-    """Clearances extrapolated to ``HORIZONS`` [m], shape (3,)."""
+    """The observed person as a cylinder in the world frame, shape (N_PERSON,)."""
+    clearances_ahead: Vec
+    """Clearances of the robot at rest to people extrapolated to ``HORIZONS`` [m], (3,)."""
     body: PersonWorkspace
     """A worker's capsules, now and extrapolated."""
-    gap: Vec
-    """Distance of each of a worker's capsules to the robot [m], padded to shape (16,)."""
+    clearance: Vec
+    """Clearance of the robot to each capsule of a worker [m], shape (16,), padding included."""
     moved: RobotPose
     """The robot further along a motion."""
     lanes: Vec
-    """The robot in the configurations of the option features."""
+    """The robot in several configurations (``robot/kernels/configuration_lanes.py``), flat."""
     q: Vec
-    """Its joint positions [rad], shape (6,)."""
+    """Joint positions of one of these configurations [rad], and work space, shape (6,)."""
     step: Vec
-    """Joint differences to the goal [rad], shape (6,)."""
+    """Joint step of damped least squares from the tcp to the goal [rad], shape (6,)."""
     base: Vec
     """Action of the base controller in [-1, 1], shape (6,)."""
     predictor: MotionPredictor
@@ -82,7 +83,8 @@ class ReachObservationWorkspace(NamedTuple):
     retreats: Vec
     """Configurations to retreat to [rad], shape (N_RETREATS, 6)."""
     aside: Vec
-    """Features of the options that do not lead to the goal, (N_ASIDE * (N_LOOKS + 1),)."""
+    """Scaled clearances of the options that do not lead to the goal: at each of ``LOOKS``, then
+    the least one, shape (N_ASIDE * (N_LOOKS + 1),)."""
 
 
 def new_observation_workspace(
@@ -96,9 +98,9 @@ def new_observation_workspace(
         robot=new_robot_pose(arm),
         geometry=new_people_geometry(people, state.q.shape[1], state.cylinders.shape[1]),
         observed=np.zeros(N_PERSON),
-        clearances=np.zeros(3),
+        clearances_ahead=np.zeros(3),
         body=body,
-        gap=np.zeros(body.now.shape[1]),
+        clearance=np.zeros(body.now.shape[1]),
         moved=new_robot_pose(arm),
         lanes=new_lanes(),
         q=np.zeros(6),

@@ -68,7 +68,7 @@ def write_people_set(
             out[b + 5 + i] = person[i] - goal[i]
             out[b + 7 + i] = person[2 + i]
         out[b + 9] = person[4]
-        d, _ = cylinder_clearance(robot.columns, 0, person[0], person[1], person[4], top_z)
+        d, _ = cylinder_clearance(robot.capsules, 0, person[0], person[1], person[4], top_z)
         out[b + 10] = min(3.0, d / SCALE)
         for i in range(len(LOOKS)):
             step, c = LOOKS[i] - 1, b + _AHEAD + 3 * i

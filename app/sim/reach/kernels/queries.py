@@ -43,7 +43,7 @@ def place(
     place_robot(world.arm, state.q[e], work.robot)
     place_people(world.people, state.people, e, work.geometry)
     if state.people.q.shape[1] > 0:
-        capsule_clearances(work.robot.columns, work.geometry.columns, work.geometry.gap)
+        capsule_clearances(work.robot.capsules, work.geometry.capsules, work.geometry.clearance)
 
 
 @kernel(inline="always")
@@ -60,9 +60,9 @@ def _observe_people(
     robot, geometry = work.robot, work.geometry
     observed, clearance = which, state.clear[e, 0]
     if which == ALL_PEOPLE:
-        observed = nearest_person(world.people, robot.columns, geometry)
+        observed = nearest_person(world.people, robot.capsules, geometry)
     elif geometry.q.shape[0] + geometry.cylinders.shape[0] > 1:
-        clearance = person_clearance(world.people, robot.columns, geometry, which)
+        clearance = person_clearance(world.people, robot.capsules, geometry, which)
     write_person(state.people, e, observed, geometry, work.observed)
     if view != PLAIN:
         extrapolate_clearances(world.people, state.people, e, which, work)
@@ -74,7 +74,7 @@ def _observe_people(
 
 
 @kernel(nogil=True)
-def observe_rows(
+def observe_envs(
     world: ReachCell,
     state: EpisodeState,
     envs: Indices,
@@ -112,17 +112,17 @@ def observe_rows(
 
 
 @kernel(nogil=True)
-def measure_rows(
+def measure_envs(
     world: ReachCell, state: EpisodeState, envs: Indices, work: ReachObservationWorkspace
 ) -> None:
     """Store the clearance of robot and people in some environments, shape (k,)."""
     for e in envs:
         place(world, state, e, work)
-        state.clear[e, 0] = people_clearance(world.people, work.robot.columns, work.geometry)
+        state.clear[e, 0] = people_clearance(world.people, work.robot.capsules, work.geometry)
 
 
 @kernel(nogil=True)
-def distances_of_rows(
+def distances_of_envs(
     world: ReachCell,
     state: EpisodeState,
     envs: Indices,
@@ -138,4 +138,4 @@ def distances_of_rows(
     for k in range(envs.shape[0]):
         place(world, state, envs[k], work)
         for p in range(out.shape[1]):
-            out[k, p] = person_clearance(world.people, work.robot.columns, work.geometry, p)
+            out[k, p] = person_clearance(world.people, work.robot.capsules, work.geometry, p)

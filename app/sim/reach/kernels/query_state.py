@@ -30,11 +30,11 @@ def load_state(
         speeds: Filled with the speeds of the workers' capsules [m/s], shape (n,).
     """
     place(world, state, 0, work)
-    people, geometry = state.people, work.geometry
-    copy_rows(geometry.columns, people.columns[0])
-    capsule_speeds(world.people, people.q[0], people.qd[0], people.columns[0], geometry, speeds)
+    people, geometry, capsules = state.people, work.geometry, state.people.capsules[0]
+    copy_rows(geometry.capsules, capsules)
+    capsule_speeds(world.people, people.q[0], people.qd[0], capsules, geometry, speeds)
     place_people(world.people, people, 0, geometry)
     clear = clearances(world.arm, world.people, work.robot, work.geometry)
     state.clear[0, 0], state.clear[0, 1], state.clear[0, 2] = clear
     for p in range(distances.shape[0]):
-        distances[p] = person_clearance(world.people, work.robot.columns, work.geometry, p)
+        distances[p] = person_clearance(world.people, work.robot.capsules, work.geometry, p)

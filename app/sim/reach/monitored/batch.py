@@ -22,7 +22,7 @@ from app.sim.robot.kernels import acceleration_bounds
 from app.sim.robot.kernels.joints import JointState
 from app.sim.safety.layer import SafetySettings
 from app.sim.scenario.kernels.episode import Indices
-from app.sim.scenario.kernels.monitored_motion import begin_rows
+from app.sim.scenario.kernels.monitored_motion import begin_envs
 from app.sim.scenario.monitoring import (
     MonitoredEpisodes,
     MonitoringSettings,
@@ -110,7 +110,7 @@ class MonitoredReachBatch(ReachBatch):
     def _start(self, envs: Indices) -> None:
         super()._start(envs)
         world, state, monitor = self.world, self.state, self._monitor
-        self._call(begin_rows, world.arm, world.people, state, envs, monitor, self._work)
+        self._call(begin_envs, world.arm, world.people, state, envs, monitor, self._work)
 
     def _move(self, act: NDArray[np.float32]) -> None:
         self._execute(self._all, Commands(act, np.empty((0, 6))))
@@ -119,7 +119,7 @@ class MonitoredReachBatch(ReachBatch):
         """Step some environments by actions or segments."""
         state = self.world, self._task, self.state, self._monitor, self._work
         results = StepResults(self._rew, self._ended)
-        self._call(step.step_rows, *state, envs, commands, results)
+        self._call(step.step_envs, *state, envs, commands, results)
 
     def step_speeds(self, env: int, wanted: Vec) -> None:
         """Move one environment through one control period toward joint speeds, for planners.
@@ -145,7 +145,7 @@ class MonitoredReachBatch(ReachBatch):
         walkers = self.state.people.cylinders[env]
         top = np.full((len(walkers), 1), self.world.people.top_z)
         return Shapes(
-            columns=as_kernel_array(self.state.people.columns[env]),
+            capsules=as_kernel_array(self.state.people.capsules[env]),
             cylinders=np.hstack([walkers, top]),
             going=self.state.people.walkers.rows[env][:, [VX, VY, GROWTH]],
         )

@@ -47,7 +47,7 @@ class Arm(NamedTuple):
     """Ends in the link's frame [m], shape (n, 3)."""
     span: Vec
     """Other ends less these [m], shape (n, 3)."""
-    columns: Vec
+    capsules: Vec
     """Template of the capsules as columns: lengths and radii, shape (9, n)."""
     first: NDArray[np.int64]
     """First capsule of each pair tested for self-collision, shape (m,)."""
@@ -66,7 +66,7 @@ class RobotPose(NamedTuple):
     """R_world_link, shape (7, 3, 3)."""
     pos: Vec
     """Origins of the links [m], shape (7, 3)."""
-    columns: Vec
+    capsules: Vec
     """The robot's capsules, shape (9, n)."""
     pair: Vec
     """Distances of the pairs tested for self-collision [m], shape (m,)."""
@@ -81,7 +81,7 @@ def new_robot_pose(arm: Arm) -> RobotPose:
     return RobotPose(
         np.empty((7, 3, 3)),
         np.empty((7, 3)),
-        arm.columns.copy(),
+        arm.capsules.copy(),
         np.empty(len(arm.first)),
         np.empty(3),
         np.empty((3, 6)),
@@ -93,7 +93,7 @@ def place_robot(arm: Arm, q: Vec, pose: RobotPose) -> None:
     """Fill ``pose`` for joints ``q`` [rad], shape (6,)."""
     kinematics.link_poses(arm.lengths, q, pose.rot, pose.pos)
     kinematics.tcp_point(arm.lengths, pose.rot, pose.pos, pose.tcp)
-    place_capsules(pose.rot, pose.pos, arm.link, arm.p0, arm.span, 0, pose.columns)
+    place_capsules(pose.rot, pose.pos, arm.link, arm.p0, arm.span, 0, pose.capsules)
 
 
 @kernel(error_model="numpy", fastmath=FAST)
@@ -130,7 +130,7 @@ def place_capsules(
 @kernel(inline="always")
 def self_clearance(arm: Arm, pose: RobotPose) -> tuple[float, int]:
     """Return the least distance of the tested capsule pairs [m] and the index of the pair."""
-    pair_distances(pose.columns, arm.first, arm.second, pose.pair)
+    pair_distances(pose.capsules, arm.first, arm.second, pose.pair)
     return least(pose.pair)
 
 
@@ -232,8 +232,8 @@ def tcp_speed(pose: RobotPose, qd: Vec) -> float:
 
 
 @kernel(inline="always")
-def copy_capsules(columns: Vec, out: Vec) -> None:
-    """Copy the rows that change, ``X`` to ``UZ``, of columns of equal shape."""
+def copy_capsules(capsules: Vec, out: Vec) -> None:
+    """Copy the rows that change, ``X`` to ``UZ``, of capsules of equal shape."""
     for row in range(X, UX + 3):
-        for k in range(columns.shape[1]):
-            out[row, k] = columns[row, k]
+        for k in range(capsules.shape[1]):
+            out[row, k] = capsules[row, k]

@@ -117,7 +117,7 @@ def _approach_capsule(arm: Arm, k: int, frame: Vec, n: int, lanes: Vec) -> None:
         lanes: The configurations.
     """
     px, py, pz = arm.p0[k, 0], arm.p0[k, 1], arm.p0[k, 2]
-    sx, sy, sz, radius = arm.span[k, 0], arm.span[k, 1], arm.span[k, 2], arm.columns[RADIUS, k]
+    sx, sy, sz, radius = arm.span[k, 0], arm.span[k, 1], arm.span[k, 2], arm.capsules[RADIUS, k]
     for m in range(n):
         ax, ay, az = frame[3 * N_LANES + m], frame[4 * N_LANES + m], frame[5 * N_LANES + m]
         bx, by, bz = frame[6 * N_LANES + m], frame[7 * N_LANES + m], frame[8 * N_LANES + m]
@@ -170,5 +170,5 @@ def measure_lanes(
                 q[j] = lanes[JOINTS + j * N_LANES + m]
             place_robot(arm, q, pose)
             x, y, r = lanes[AXIS_X + m], lanes[AXIS_Y + m], lanes[AXIS_R + m]
-            d, _ = cylinder_clearance(pose.columns, 0, x, y, r, top)
+            d, _ = cylinder_clearance(pose.capsules, 0, x, y, r, top)
         lanes[CLEARANCE + m] = min(lanes[CLEARANCE + m], d)

@@ -9,7 +9,7 @@ faster either.
 *Script*: the work cycle, or the walk of docs/method.md 2.1. *Straight*: after a random time, at
 ``v`` straight toward the nearest link. *Zig-zag*: the same, with random swerves. *Tease*:
 toward and away from the nearest link for random times. A running worker keeps the posture and
-flies, which no human can; that only makes the trial harder.
+moves in any direction, even upwards: no human can, so that the trial is harder.
 """
 
 import math
@@ -71,74 +71,75 @@ class TrialWorkspace(NamedTuple):
     """State and work space of episodes."""
 
     state: PeopleState
-    """Scripts and walks, one row."""
+    """Scripts of the workers and walks of the pedestrians, of one environment."""
     geometry: PeopleGeometry
     """A pose of the people."""
-    columns0: Vec
-    """The people's capsules at the start of a period, shape (9, m)."""
-    columns1: Vec
-    """At its end."""
+    capsules0: Vec
+    """The workers' capsules at the start of a period, shape (9, m)."""
+    capsules1: Vec
+    """The workers' capsules at the end of the period, shape (9, m)."""
     cylinders0: Vec
-    """Cylinders at the start of a period, x, y, radius, top [m], shape (n, 4)."""
+    """Pedestrians at the start of a period: x, y, radius, top [m], shape (n, 4)."""
     cylinders1: Vec
-    """At its end."""
-    columns: Vec
-    """Between them."""
+    """Pedestrians at the end of the period, likewise, shape (n, 4)."""
+    capsules: Vec
+    """The workers' capsules at a time within the period, shape (9, m)."""
     cylinders: Vec
-    """Between them."""
-    seen_columns: Vec
-    """Observed capsules, a ring buffer, shape (n_late + 1, 9, m)."""
+    """Pedestrians at a time within the period, shape (n, 4)."""
+    seen_capsules: Vec
+    """Capsules in the observations of the last periods, a ring buffer, (n_late + 1, 9, m)."""
     seen_cylinders: Vec
-    """Observed cylinders, likewise, shape (n_late + 1, n, 4)."""
+    """Pedestrians in these observations, likewise, shape (n_late + 1, n, 4)."""
     ssm: SsmWorkspace
     """Work space of the safety layer."""
     touch: SsmWorkspace
     """Work space of the contact search."""
     offset: Vec
-    """Displacement of workers from their scripts [m], shape (W, 3)."""
+    """Displacement of workers from their scripts in the world frame [m], shape (W, 3)."""
     time: Vec
     """Time in the workers' scripts [s], shape (W,)."""
     q: Vec
-    """Joints [rad], shape (6,)."""
+    """The robot's joint positions [rad], shape (6,)."""
     qd: Vec
-    """Speeds [rad/s], shape (6,)."""
+    """The robot's joint speeds [rad/s], shape (6,)."""
     qdd: Vec
-    """Accelerations [rad/s^2], shape (6,)."""
+    """The robot's joint accelerations [rad/s^2], shape (6,)."""
     c: Vec
     """Commanded second coefficients [rad/s^2], shape (6,)."""
     d: Vec
     """Commanded third coefficients [rad/s^3], shape (6,)."""
     end: JointState
-    """Commanded state after the period."""
+    """Commanded state of the robot after the period."""
     act: Vec
-    """Action, shape (CONTROLLED,)."""
+    """Action of the policy, shape (CONTROLLED,)."""
     aim: Vec
     """Target of the policy: a configuration [rad] or switching times [s], shape (6,)."""
     direction: Vec
     """Direction of a person's motion, at first from person to robot [m], shape (3,)."""
     toward: Vec
-    """Distances of one capsule to the robot's [m], shape (n,)."""
+    """Clearances of one of the workers' capsules to the robot's capsules [m], shape (n,)."""
     plan: Vec
-    """Swerve [rad], its end [s], start of the run [s], its share of the speed, shape (4,)."""
+    """Turn of the direction [rad], time at which it is drawn again [s], start of the run [s],
+    share of the speed while running (0 to 1), shape (4,)."""
     rng: random.State
     """Random stream of the episode, shape (1,)."""
 
 
 @kernel(error_model="numpy", inline="always")
 def _worker_to_robot(w: int, work: TrialWorkspace) -> float:
-    """Write the direction from worker ``w`` to the nearest link; return the distance [m]."""
-    robot, gap, first = work.ssm.columns[NOW], work.touch.gap[NOW], w * body.N_CAPSULES
-    _, j = least(gap[first : first + body.N_CAPSULES])
-    distances(work.columns0, first + j, robot, work.toward)
+    """Write the vector from worker ``w`` to the nearest link [m]; return the clearance [m]."""
+    robot, first = work.ssm.capsules[NOW], w * body.N_CAPSULES
+    _, j = least(work.touch.clearance[NOW, first : first + body.N_CAPSULES])
+    distances(work.capsules0, first + j, robot, work.toward)
     d, i = least(work.toward)
-    segment_nearest(work.columns0, first + j, robot, i, work.direction)
+    segment_nearest(work.capsules0, first + j, robot, i, work.direction)
     return d
 
 
 @kernel(error_model="numpy", inline="always")
 def _cylinder_to_robot(x: float, y: float, work: TrialWorkspace) -> None:
-    """Write the horizontal direction from an axis to the nearest end of a link [m]."""
-    robot, best = work.ssm.columns[NOW], 1e9
+    """Write the horizontal vector from an axis (x, y) [m] to the nearest end of a link [m]."""
+    robot, best = work.ssm.capsules[NOW], 1e9
     for i in range(robot.shape[1]):
         for end in range(2):
             wx = robot[X, i] + end * robot[UX, i] - x
@@ -169,14 +170,14 @@ def _turn_direction(mode: int, t: float, work: TrialWorkspace) -> None:
 
 @kernel(error_model="numpy")
 def place_workers_at(people: People, work: TrialWorkspace, step: float) -> None:
-    """Write the workers' capsules ``step`` seconds on in their scripts into ``columns1``."""
-    state, out = work.state, work.columns1
+    """Write the workers' capsules into ``capsules1``, ``step`` [s] later in their scripts."""
+    state, out = work.state, work.capsules1
     for w in range(work.time.shape[0]):
         when = state.clock[0, w] + people.pace * (work.time[w] + step)
         worker_at(people, state, 0, w, when, people.pace, work.geometry.away)
     copy_rows(state.size[0], work.geometry.size)
     place_workers(people, state.q[0], work.geometry)
-    copy_rows(work.geometry.columns, out)
+    copy_rows(work.geometry.capsules, out)
     for w in range(work.time.shape[0]):
         for k in range(w * body.N_CAPSULES, (w + 1) * body.N_CAPSULES):
             for i in range(3):
@@ -185,7 +186,14 @@ def place_workers_at(people: People, work: TrialWorkspace, step: float) -> None:
 
 @kernel(error_model="numpy")
 def blend(a: Vec, b: Vec, part: float, out: Vec) -> None:
-    """Write capsules interpolated by ``part`` between those of a and those of b."""
+    """Write capsules interpolated between two sets.
+
+    Args:
+        a: Capsules, shape (9, n).
+        b: The same capsules at another time, shape (9, n).
+        part: 0 for those of ``a`` to 1 for those of ``b``.
+        out: Filled, shape (9, n).
+    """
     for row in range(UX + 3):
         for k in range(a.shape[1]):
             out[row, k] = a[row, k] + part * (b[row, k] - a[row, k])
@@ -199,7 +207,13 @@ def blend(a: Vec, b: Vec, part: float, out: Vec) -> None:
 def advance_workers(
     people: People, trial: Trial, mode: int, t: float, dt: float, work: TrialWorkspace
 ) -> None:
-    """Write the workers after the period, at most at the trial's speed."""
+    """Write the workers after the period into ``capsules1``, at most at the trial's speed.
+
+    Args:
+        mode: Behaviour of the people (SCRIPT ...).
+        t: Time since the start of the episode [s].
+        dt: Period [s].
+    """
     most, runs = BELOW * trial.human_speed * dt, mode != SCRIPT and t >= work.plan[2]
     if runs:
         for w in range(work.time.shape[0]):
@@ -210,27 +224,27 @@ def advance_workers(
     step = 0.0 if runs else dt
     for _ in range(4):
         place_workers_at(people, work, step)
-        moved = greatest_displacement(work.columns0, work.columns1)
+        moved = greatest_displacement(work.capsules0, work.capsules1)
         if moved <= most:
             break
         step *= 0.95 * most / moved
     for w in range(work.time.shape[0]):
         work.time[w] += step
-    moved = greatest_displacement(work.columns0, work.columns1)
+    moved = greatest_displacement(work.capsules0, work.capsules1)
     blend(
-        work.columns0,
-        work.columns1,
+        work.capsules0,
+        work.capsules1,
         min(1.0, most / moved) if moved > 0.0 else 1.0,
-        work.columns,
+        work.capsules,
     )
-    copy_rows(work.columns, work.columns1)
+    copy_rows(work.capsules, work.capsules1)
 
 
 @kernel(error_model="numpy", inline="always")
 def advance_cylinders(
     people: People, trial: Trial, mode: int, t: float, dt: float, work: TrialWorkspace
 ) -> None:
-    """Write the walkers after the period, at most at the trial's speed."""
+    """Write the pedestrians into ``cylinders1``, likewise; see :func:`advance_workers`."""
     most, runs = BELOW * trial.human_speed * dt, mode != SCRIPT and t >= work.plan[2]
     for k in range(work.cylinders0.shape[0]):
         old, new, rows = work.cylinders0[k], work.cylinders1[k], work.state.walkers.rows
@@ -255,7 +269,7 @@ def advance_cylinders(
 @kernel(error_model="numpy", inline="always")
 def people_speed(work: TrialWorkspace, dt: float) -> float:
     """Return the greatest speed of any point of the people in the period [m/s]."""
-    fastest = greatest_displacement(work.columns0, work.columns1)
+    fastest = greatest_displacement(work.capsules0, work.capsules1)
     for k in range(work.cylinders0.shape[0]):
         old, new = work.cylinders0[k], work.cylinders1[k]
         moved = math.hypot(new[0] - old[0], new[1] - old[1]) + abs(new[2] - old[2])
@@ -273,17 +287,17 @@ def new_trial_work(
 ) -> TrialWorkspace:
     """Return work space for people of one row of ``state``."""
     n_workers, n_pedestrians = state.q.shape[1], state.cylinders.shape[1]
-    columns, cylinders = people.columns, np.zeros((n_pedestrians, 4))
+    capsules, cylinders = people.capsules, np.zeros((n_pedestrians, 4))
     return TrialWorkspace(
         state=state,
         geometry=geometry,
-        columns0=columns.copy(),
-        columns1=columns.copy(),
+        capsules0=capsules.copy(),
+        capsules1=capsules.copy(),
         cylinders0=cylinders.copy(),
         cylinders1=cylinders.copy(),
-        columns=columns.copy(),
+        capsules=capsules.copy(),
         cylinders=cylinders.copy(),
-        seen_columns=np.repeat(columns[None], n_late + 1, axis=0),
+        seen_capsules=np.repeat(capsules[None], n_late + 1, axis=0),
         seen_cylinders=np.repeat(cylinders[None], n_late + 1, axis=0),
         ssm=spaces[0],
         touch=spaces[1],
@@ -298,7 +312,7 @@ def new_trial_work(
         act=np.zeros(CONTROLLED),
         aim=np.zeros(6),
         direction=np.zeros(3),
-        toward=np.zeros(arm.columns.shape[1]),
+        toward=np.zeros(arm.capsules.shape[1]),
         plan=np.zeros(4),
         rng=np.zeros(1, dtype=np.uint64),
     )

@@ -64,7 +64,12 @@ speed of any of their points [m/s]; speed at which the touched part may be touch
 
 @kernel(error_model="numpy", inline="always")
 def _act(arm: Arm, policy: int, t: float, work: TrialWorkspace) -> None:
-    """Write the action of a policy."""
+    """Write the action of a policy into ``work.act``.
+
+    Args:
+        policy: SMOOTH, CONSTANT, GOALS or BANG_BANG.
+        t: Time since the start of the episode [s].
+    """
     act, aim, rng = work.act, work.aim, work.rng
     if policy == GOALS:
         far = 0.0
@@ -99,12 +104,12 @@ def link_speed(arm: Arm, space: SsmWorkspace, node: int, k: int, qd: Vec) -> flo
         k: The capsule.
         qd: Joint speeds [rad/s], shape (6,).
     """
-    columns, rot, pos = space.columns[node], space.rot, space.pos
+    capsules, rot, pos = space.capsules[node], space.rot, space.pos
     fastest = 0.0
     for end in range(2):
-        px = columns[X, k] + end * columns[UX, k]
-        py = columns[Y, k] + end * columns[UY, k]
-        pz = columns[Z, k] + end * columns[UZ, k]
+        px = capsules[X, k] + end * capsules[UX, k]
+        py = capsules[Y, k] + end * capsules[UY, k]
+        pz = capsules[Z, k] + end * capsules[UZ, k]
         vx, vy, vz = 0.0, 0.0, 0.0
         for j in range(arm.link[k]):
             # Joints 0 and 4 turn about their link's z axis, the others about y.
@@ -124,10 +129,10 @@ def touching_speed(arm: Arm, j: int, work: TrialWorkspace) -> float:
 
     With a cylinder the fastest of all links counts.
     """
-    touch, m = work.touch, work.columns.shape[1]
+    touch, m = work.touch, work.capsules.shape[1]
     fastest = 0.0
     if j < m:
-        distances(work.columns, j, touch.columns[NOW], work.toward)
+        distances(work.capsules, j, touch.capsules[NOW], work.toward)
     for k in range(arm.link.shape[0]):
         if j >= m or work.toward[k] <= 10.0 * TOUCH:
             fastest = max(fastest, link_speed(arm, touch, NOW, k, touch.qd_node))
@@ -145,26 +150,26 @@ def first_contact(arm: Arm, work: TrialWorkspace) -> tuple[float, int]:
     t, j = 0.0, 0
     for _ in range(MAX_ADVANCES):
         part = t / dt
-        blend(work.columns0, work.columns1, part, work.columns)
+        blend(work.capsules0, work.capsules1, part, work.capsules)
         for k in range(work.cylinders.shape[0]):
             for i in range(3):
                 old = work.cylinders0[k, i]
                 work.cylinders[k, i] = old + part * (work.cylinders1[k, i] - old)
         motion_at(path, ssm.deceleration[0], t, touch.q_node, touch.qd_node)
-        people = PeopleShapes(work.columns, work.cylinders)
+        people = PeopleShapes(work.capsules, work.cylinders)
         place_node(arm, people, touch.q_node, NOW, 0.0, touch)
-        gap, j = least(touch.gap[NOW])
-        if gap <= TOUCH:
+        clearance, j = least(touch.clearance[NOW])
+        if clearance <= TOUCH:
             return t, j
         if t >= dt:
             return -1.0, 0
-        t = min(dt, t + gap / approach) if approach > 0.0 else dt
+        t = min(dt, t + clearance / approach) if approach > 0.0 else dt
     return t, j
 
 
 @kernel(error_model="numpy", inline="always")
 def _draw_place(arm: Arm, people: People, work: TrialWorkspace) -> float:
-    """Draw a configuration at rest and places of people; return their distance [m]."""
+    """Draw a configuration at rest and places of people; return the clearance [m]."""
     rng = work.rng
     for j in range(6):
         work.q[j], work.qd[j], work.qdd[j] = arm.home[j], 0.0, 0.0
@@ -177,16 +182,16 @@ def _draw_place(arm: Arm, people: People, work: TrialWorkspace) -> float:
         work.time[w] = 0.0
         work.offset[w, 0], work.offset[w, 1], work.offset[w, 2] = 0.0, 0.0, 0.0
     place_workers_at(people, work, 0.0)
-    copy_rows(work.columns1, work.columns0)
+    copy_rows(work.capsules1, work.capsules0)
     for k in range(work.cylinders0.shape[0]):
         for i in range(3):
             work.cylinders0[k, i] = work.state.cylinders[0, k, i]
         work.cylinders0[k, 3] = people.top_z
     copy_rows(work.cylinders0, work.cylinders1)
     copy_rows(work.cylinders0, work.cylinders)
-    shapes = PeopleShapes(work.columns0, work.cylinders0)
+    shapes = PeopleShapes(work.capsules0, work.cylinders0)
     place_node(arm, shapes, work.q, NOW, 0.0, work.ssm)
-    return least(work.ssm.gap[NOW])[0]
+    return least(work.ssm.clearance[NOW])[0]
 
 
 @kernel(error_model="numpy", inline="always")
@@ -195,8 +200,8 @@ def _start(arm: Arm, people: People, policy: int, seconds: float, work: TrialWor
     for _ in range(START_TRIES):
         if _draw_place(arm, people, work) >= START_CLEARANCE:
             break
-    for i in range(work.seen_columns.shape[0]):
-        copy_rows(work.columns0, work.seen_columns[i])
+    for i in range(work.seen_capsules.shape[0]):
+        copy_rows(work.capsules0, work.seen_capsules[i])
         copy_rows(work.cylinders0, work.seen_cylinders[i])
     for j in range(6):
         work.aim[j] = work.q[j] if policy == GOALS else 0.0
@@ -219,14 +224,14 @@ def _step(
 ) -> bool:
     """Run one period; return whether the episode ends in contact."""
     t, slot = step * arm.dt, step % (trial.n_late + 1)
-    copy_rows(work.columns0, work.seen_columns[slot])
+    copy_rows(work.capsules0, work.seen_capsules[slot])
     copy_rows(work.cylinders0, work.seen_cylinders[slot])
     oldest = (step + 1) % (trial.n_late + 1)
     _act(arm, policy, t, work)
     end, ssm = work.end, work.ssm
     start, segment = JointState(work.q, work.qd, work.qdd), Coefficients(work.c, work.d)
     advance(trial.action, arm.limits, arm.dt, start, work.act, segment, end)
-    seen = PeopleShapes(work.seen_columns[oldest], work.seen_cylinders[oldest])
+    seen = PeopleShapes(work.seen_capsules[oldest], work.seen_cylinders[oldest])
     path = JointPath(work.q, work.qd, work.c, work.d)
     override = decide(arm, trial.rule, 0.0, seen, path, ssm)
     if not trial.monitored:
@@ -237,7 +242,7 @@ def _step(
     out[STEPS] = step + 1.0
     out[STOPPED] += 1.0 if override <= 0.0 else 0.0
     out[SLOWED] += 1.0 if override < 1.0 else 0.0
-    place_node(arm, PeopleShapes(work.columns0, work.cylinders0), work.q, NOW, 0.0, work.touch)
+    place_node(arm, PeopleShapes(work.capsules0, work.cylinders0), work.q, NOW, 0.0, work.touch)
     advance_workers(people, trial, mode, t, arm.dt, work)
     advance_cylinders(people, trial, mode, t, arm.dt, work)
     out[WORST_PEOPLE] = max(out[WORST_PEOPLE], people_speed(work, arm.dt))
@@ -246,7 +251,7 @@ def _step(
         out[CONTACT], out[ALLOWED] = 1.0, trial.rule.contact_speed[part]
         out[SPEED] = touching_speed(arm, part, work)
         return True
-    copy_rows(work.columns1, work.columns0)
+    copy_rows(work.capsules1, work.capsules0)
     copy_rows(work.cylinders1, work.cylinders0)
     for j in range(6):
         work.q[j], work.qd[j], work.qdd[j] = ssm.end.q[j], ssm.end.qd[j], ssm.end.qdd[j]
@@ -267,6 +272,8 @@ def run_episodes(
 
     Args:
         trial: Settings of the trial.
+        seed: Seed of the trial.
+        first: Number of the first episode.
         out: Filled with results, shape (n, N_RESULT).
     """
     for e in range(out.shape[0]):

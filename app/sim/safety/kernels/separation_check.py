@@ -57,7 +57,7 @@ class SeparationRule(NamedTuple):
 class PeopleShapes(NamedTuple):
     """Shapes of the people as observed."""
 
-    columns: Vec
+    capsules: Vec
     """Capsules, shape (9, m)."""
     cylinders: Vec
     """Vertical cylinders: x, y, radius, top [m], shape (n, 4)."""
@@ -89,9 +89,9 @@ class SsmWorkspace(NamedTuple):
     """R_world_link, shape (7, 3, 3)."""
     pos: Vec
     """Origins of the links [m], shape (7, 3)."""
-    columns: Vec
+    capsules: Vec
     """The robot's capsules at each node, shape (N_NODES, 9, n)."""
-    gap: Vec
+    clearance: Vec
     """Clearance of each part of the people to the robot there [m], shape (N_NODES, m + n)."""
     velocity: Vec
     """Known vx, vy and growth of cylinders [m/s], zeros where unknown, shape (n, 3)."""
@@ -126,14 +126,14 @@ class SsmWorkspace(NamedTuple):
     """Cause of the override (CAUSE_PART, CAUSE_SHORTFALL); part -1 if none."""
 
 
-def new_ssm_workspace(arm: Arm, n_columns: int, n_cylinders: int) -> SsmWorkspace:
-    """Return work space for people of ``n_columns`` capsules and ``n_cylinders`` cylinders."""
-    n_parts = n_columns + n_cylinders
+def new_ssm_workspace(arm: Arm, n_capsules: int, n_cylinders: int) -> SsmWorkspace:
+    """Return work space for people of ``n_capsules`` capsules and ``n_cylinders`` cylinders."""
+    n_parts = n_capsules + n_cylinders
     return SsmWorkspace(
         rot=np.empty((7, 3, 3)),
         pos=np.empty((7, 3)),
-        columns=np.repeat(arm.columns[None], N_NODES, axis=0),
-        gap=np.empty((N_NODES, n_parts)),
+        capsules=np.repeat(arm.capsules[None], N_NODES, axis=0),
+        clearance=np.empty((N_NODES, n_parts)),
         velocity=np.zeros((n_cylinders, 3)),
         known_speed=np.zeros(n_parts),
         observed_speed=np.zeros(n_parts),
@@ -165,20 +165,20 @@ def place_node(
         age: Time since the observation [s]; a cylinder with a known velocity counts along its
             whole path since then.
     """
-    robot, gap = space.columns[node], space.gap[node]
+    robot, clearance = space.capsules[node], space.clearance[node]
     kinematics.link_poses(arm.lengths, q, space.rot, space.pos)
     place_capsules(space.rot, space.pos, arm.link, arm.p0, arm.span, 0, robot)
-    m = people.columns.shape[1]
-    capsule_clearances(robot, people.columns, gap[:m])
+    m = people.capsules.shape[1]
+    capsule_clearances(robot, people.capsules, clearance[:m])
     cylinders = people.cylinders
     for k in range(cylinders.shape[0]):
         x, y, r, top = cylinders[k, 0], cylinders[k, 1], cylinders[k, 2], cylinders[k, 3]
         if space.known_speed[m + k] * age > 0.0:
             vx, vy, growth = space.velocity[k, 0], space.velocity[k, 1], space.velocity[k, 2]
             r += max(0.0, growth) * age
-            gap[m + k] = swept_clearance(robot, x, y, vx * age, vy * age, r)
+            clearance[m + k] = swept_clearance(robot, x, y, vx * age, vy * age, r)
         else:
-            gap[m + k], _ = cylinder_clearance(robot, 0, x, y, r, top)
+            clearance[m + k], _ = cylinder_clearance(robot, 0, x, y, r, top)
 
 
 @kernel(error_model="numpy", inline="always")
@@ -205,12 +205,12 @@ def violates_separation(
         rule: Assumptions.
         age: Time since people were observed [s].
     """
-    gap = space.gap[node]
-    for j in range(gap.shape[0]):
+    clearance = space.clearance[node]
+    for j in range(clearance.shape[0]):
         reach = person_reach(rule, j, age, space)
-        if rule.contact_speed[j] <= 0.0 and not gap[j] >= reach:
+        if rule.contact_speed[j] <= 0.0 and not clearance[j] >= reach:
             cause = space.cause
-            cause[CAUSE_PART], cause[CAUSE_SHORTFALL] = j, reach - gap[j]
+            cause[CAUSE_PART], cause[CAUSE_SHORTFALL] = j, reach - clearance[j]
             return True
     return False
 
@@ -245,10 +245,10 @@ def _interval_clear(
     span, age = xb - xa, latency + (segment.start + xb)
     fastest = segment.speed
     if length > 0.0:
-        chord = greatest_displacement(space.columns[a], space.columns[b])
+        chord = greatest_displacement(space.capsules[a], space.capsules[b])
         fastest = min(segment.speed, chord / length + 0.5 * length * segment.curvature)
     w = fastest * length
-    before, after = space.gap[a], space.gap[b]
+    before, after = space.clearance[a], space.clearance[b]
     for j in range(before.shape[0]):
         both = w + space.known_speed[j] * span
         least = 0.5 * (before[j] + after[j] - both)

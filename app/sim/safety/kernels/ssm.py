@@ -105,7 +105,7 @@ def _trivially_separated(
         later: Time until it rests [s].
         space: Work space; node NOW is placed.
     """
-    now = space.gap[NOW]
+    now = space.clearance[NOW]
     for j in range(now.shape[0]):
         reach = person_reach(rule, j, age, space) + space.known_speed[j] * later
         if not now[j] - distance > reach:

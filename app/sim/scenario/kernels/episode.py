@@ -106,7 +106,7 @@ def new_episode_state(arm: Arm, people: PeopleState, n_envs: int) -> EpisodeStat
         q=numbers(6),
         qd=numbers(6),
         qdd=numbers(6),
-        robot=np.repeat(arm.columns[None], n_envs, axis=0),
+        robot=np.repeat(arm.capsules[None], n_envs, axis=0),
         people=people,
         goal=numbers(3),
         target=counts(),
@@ -184,31 +184,31 @@ def move(
     Returns:
         Whether there was a contact, and whether a joint had no admissible coefficient.
     """
-    rows, geometry, robot = state.people, work.geometry, work.robot
-    copy_rows(rows.q[e], geometry.q0)
-    copy_rows(rows.cylinders[e], geometry.cylinders0)
-    for w in range(rows.q.shape[1]):
-        geometry.pelvis_z[0, w] = rows.size[e, w, PELVIS_Z]
+    humans, geometry, robot = state.people, work.geometry, work.robot
+    copy_rows(humans.q[e], geometry.q0)
+    copy_rows(humans.cylinders[e], geometry.cylinders0)
+    for w in range(humans.q.shape[1]):
+        geometry.pelvis_z[0, w] = humans.size[e, w, PELVIS_Z]
     start = JointState(state.q[e], state.qd[e], state.qdd[e])
     segment, end = Coefficients(work.c, work.d), JointState(work.q, work.qd, work.qdd)
     unfeasible = advance(action, arm.limits, arm.dt, start, act, segment, end)
     state.elapsed[e] += arm.dt
     state.time_left[e] -= arm.dt
-    advance_people(people, rows, e, state.robot[e], arm.dt, geometry.away)
-    copy_rows(rows.size[e], geometry.size)
+    advance_people(people, humans, e, state.robot[e], arm.dt, geometry.away)
+    copy_rows(humans.size[e], geometry.size)
     path = JointPath(state.q[e], state.qd[e], work.c, work.d)
-    motion = PeriodMotion(path, work.q, rows.q[e], rows.cylinders[e])
+    motion = PeriodMotion(path, work.q, humans.q[e], humans.cylinders[e])
     capsules0, clear = state.robot[e], state.clear[e]
-    kind, _ = sweep(arm, people, motion, capsules0, rows.columns[e], clear, robot, geometry)
+    kind, _ = sweep(arm, people, motion, capsules0, humans.capsules[e], clear, robot, geometry)
     for j in range(6):
         state.q[e, j], state.qd[e, j], state.qdd[e, j] = work.q[j], work.qd[j], work.qdd[j]
     if kind != NO_CONTACT:
         place_robot(arm, work.q, robot)
-        place_people(people, rows, e, geometry)
+        place_people(people, humans, e, geometry)
     if people.yielding > 0.0:
-        store_clearances(rows, e, geometry)
-    copy_capsules(robot.columns, state.robot[e])
-    copy_rows(geometry.columns, rows.columns[e])
+        store_clearances(humans, e, geometry)
+    copy_capsules(robot.capsules, state.robot[e])
+    copy_rows(geometry.capsules, humans.capsules[e])
     return kind != NO_CONTACT, unfeasible
 
 
@@ -230,8 +230,8 @@ def begin(state: EpisodeState, e: int, time_limit: float, work: StepWorkspace) -
         work: Holds the placed robot and people.
     """
     state.distance[e] = distance_to(state.goal[e], work.robot)
-    copy_capsules(work.robot.columns, state.robot[e])
-    copy_rows(work.geometry.columns, state.people.columns[e])
+    copy_capsules(work.robot.capsules, state.robot[e])
+    copy_rows(work.geometry.capsules, state.people.capsules[e])
     state.time_left[e], state.elapsed[e] = time_limit, 0.0
     state.touched[e], state.outcome[e] = 0, RUNNING
 

@@ -97,7 +97,7 @@ def follow_track(state: EpisodeState, e: int, monitor: MonitoredState, dt: float
 
 
 @kernel(nogil=True, error_model="numpy")
-def begin_rows(
+def begin_envs(
     arm: Arm,
     people: People,
     state: EpisodeState,
@@ -124,7 +124,7 @@ def begin_rows(
 @kernel(inline="always")
 def _people_before(people: People, state: EpisodeState, e: int, trial: TrialWorkspace) -> None:
     """Store the people at the start of a control period."""
-    copy_rows(state.people.columns[e], trial.columns0)
+    copy_rows(state.people.capsules[e], trial.capsules0)
     for k in range(trial.cylinders0.shape[0]):
         for i in range(3):
             trial.cylinders0[k, i] = state.people.cylinders[e, k, i]
@@ -149,8 +149,8 @@ def _people_after(
     else:
         advance_people(people, state.people, e, state.robot[e], arm.dt, work.geometry.away)
     place_people(people, state.people, e, work.geometry)
-    copy_rows(work.geometry.columns, state.people.columns[e])
-    copy_rows(work.geometry.columns, trial.columns1)
+    copy_rows(work.geometry.capsules, state.people.capsules[e])
+    copy_rows(work.geometry.capsules, trial.capsules1)
     for k in range(trial.cylinders1.shape[0]):
         for i in range(3):
             trial.cylinders1[k, i] = state.people.cylinders[e, k, i]
@@ -168,13 +168,13 @@ def _pass_speeds(
 
     Pedestrians with measured velocities are extrapolated, the others count at their speeds.
     """
-    rows, space = state.people, monitor.trial.ssm
-    m = monitor.trial.columns0.shape[1]
-    copy_rows(rows.size[e], geometry.size)
+    humans, space = state.people, monitor.trial.ssm
+    m = monitor.trial.capsules0.shape[1]
+    copy_rows(humans.size[e], geometry.size)
     speeds = space.observed_speed[:m]
-    capsule_speeds(people, rows.q[e], rows.qd[e], monitor.trial.columns0, geometry, speeds)
+    capsule_speeds(people, humans.q[e], humans.qd[e], monitor.trial.capsules0, geometry, speeds)
     for k in range(space.velocity.shape[0]):
-        row, going = rows.walkers.rows[e, k], space.velocity[k]
+        row, going = humans.walkers.rows[e, k], space.velocity[k]
         speed = math.hypot(row[VX], row[VY]) + abs(row[GROWTH])
         if monitor.measured:
             going[0], going[1], going[2] = row[VX], row[VY], row[GROWTH]
@@ -199,7 +199,7 @@ def _execute(
         trial.q[j], trial.qd[j] = state.q[e, j], state.qd[e, j]
     if monitor.active:
         _pass_speeds(people, state, e, monitor, work.geometry)
-        shapes = PeopleShapes(trial.columns0, trial.cylinders0)
+        shapes = PeopleShapes(trial.capsules0, trial.cylinders0)
         path = JointPath(trial.q, trial.qd, work.c, work.d)
         override = decide(arm, monitor.safety, 0.0, shapes, path, space)
     else:
@@ -220,9 +220,9 @@ def _touch(arm: Arm, monitor: MonitoredState, e: int) -> bool:
     """Check for contact with people and account for it; return whether the episode ends."""
     trial, account = monitor.trial, monitor.account[e]
     account[FASTEST] = max(account[FASTEST], people_speed(trial, arm.dt))
-    if trial.cylinders0.shape[0] + trial.columns0.shape[1] == 0:
+    if trial.cylinders0.shape[0] + trial.capsules0.shape[1] == 0:
         return False
-    people = PeopleShapes(trial.columns0, trial.cylinders0)
+    people = PeopleShapes(trial.capsules0, trial.cylinders0)
     place_node(arm, people, trial.q, NOW, 0.0, trial.touch)
     when, part = first_contact(arm, trial)
     if when < 0.0:
@@ -261,7 +261,7 @@ def _arrive(
     place_robot(arm, state.q[e], work.robot)
     tcp = work.robot.tcp
     account[TOOL_PATH] += math.sqrt((tcp[0] - x) ** 2 + (tcp[1] - y) ** 2 + (tcp[2] - z) ** 2)
-    copy_capsules(work.robot.columns, state.robot[e])
+    copy_capsules(work.robot.capsules, state.robot[e])
     measure(arm, people, state, e, work)
     if people.yielding > 0.0:
         store_clearances(state.people, e, work.geometry)

@@ -48,7 +48,7 @@ class PersonWorkspace(NamedTuple):
 
 def new_person_workspace() -> PersonWorkspace:
     """Return work space with no person placed."""
-    capsules = body.capsule_columns(1)
+    capsules = body.new_body_capsules(1)
     return PersonWorkspace(
         trig=np.zeros((3, 16)),
         points=np.zeros((body.N_POINTS, 3)),

@@ -1,18 +1,20 @@
-"""Episodes of the sorting task, all rows at once: starts, attempts, people, ends."""
+"""Episodes of all sorting environments: starts, attempts, interference and ends (compiled)."""
+
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from app.sim.core.jit import kernel
 from app.sim.core.kernels import rng as random
-from app.sim.sorting.kernels.initial_states import start_row
+from app.sim.sorting.kernels.initial_states import start_env
 from app.sim.sorting.kernels.interference import interfere
 from app.sim.sorting.kernels.reward import SortingWeights
 from app.sim.sorting.kernels.task import (
     RUNNING,
     SUCCESS,
     Ints,
-    SortingRows,
+    SortingEnvs,
     SortingRules,
     attempt,
     is_solved,
@@ -21,66 +23,83 @@ from app.sim.sorting.kernels.task import (
 )
 
 
+class StepBuffers(NamedTuple):
+    """Arrays that a step of all environments fills."""
+
+    obs: NDArray[np.uint8]
+    """Observations after the step, or of the next episode's start, shape (n, obs_size)."""
+    last_obs: NDArray[np.uint8]
+    """Final observations of the episodes that ended, shape (n, obs_size)."""
+    rew: NDArray[np.float32]
+    """Rewards, shape (n,)."""
+    ended: Ints
+    """Outcomes of the episodes that ended now, RUNNING elsewhere, shape (n,)."""
+
+
 @kernel(nogil=True)
-def start_rows(
-    rows: SortingRows,
+def start_envs(
+    envs: SortingEnvs,
     rules: SortingRules,
     seed: int,
-    first_row: int,
+    first_env: int,
     obs: NDArray[np.uint8],
 ) -> None:
-    """Start the episodes numbered by ``rows.episode`` and write the observations."""
-    for e in range(rows.clutter.shape[0]):
-        start_row(rows, rules, seed, first_row + e, e)
-        write_obs(rows, e, obs[e])
+    """Start the episodes numbered by ``envs.episode`` and write the observations.
+
+    Args:
+        envs: All environments; changed.
+        rules: Starts of episodes.
+        seed: Seed of the batch.
+        first_env: Number of environment 0 in the random streams.
+        obs: Filled, shape (n, obs_size).
+    """
+    for e in range(envs.clutter.shape[0]):
+        start_env(envs, rules, seed, first_env + e, e)
+        write_obs(envs, e, obs[e])
 
 
 @kernel(nogil=True)
-def step_rows(
-    rows: SortingRows,
+def step_envs(
+    envs: SortingEnvs,
     rules: SortingRules,
     weights: SortingWeights,
     seed: int,
-    first_row: int,
+    first_env: int,
     act: Ints,
     auto_reset: bool,
-    obs: NDArray[np.uint8],
-    last_obs: NDArray[np.uint8],
-    rew: NDArray[np.float32],
-    ended: Ints,
+    out: StepBuffers,
 ) -> None:
-    """Make one attempt in every row.
+    """Make one attempt in every environment.
 
     A person may interfere after it; where that happens to meet the goal the episode ends too.
 
     Args:
-        rows: All environments; changed.
+        envs: All environments; changed.
         rules: Starts, disturbances and ends.
         weights: Reward coefficients.
         seed: Seed of the batch.
-        first_row: Number of row 0 in the random streams.
+        first_env: Number of environment 0 in the random streams.
         act: Actions, shape (n,).
-        auto_reset: Start the next episode at once; otherwise ended rows stay as they are.
-        obs: Filled with the observations after the step (and start), shape (n, obs_size).
-        last_obs: Filled with the final observation of rows that ended, shape (n, obs_size).
-        rew: Filled with rewards, shape (n,).
-        ended: Filled with the outcome of rows that ended now, RUNNING elsewhere, shape (n,).
+        auto_reset: Start the next episode at once; otherwise environments whose episode has
+            ended stay as they are.
+        out: Filled; observations of environments whose episode had ended before are left.
     """
-    for e in range(rows.clutter.shape[0]):
+    obs, rew, ended = out.obs, out.rew, out.ended
+    for e in range(envs.clutter.shape[0]):
         ended[e], rew[e] = RUNNING, 0.0
-        if rows.outcome[e] != RUNNING:
+        if envs.outcome[e] != RUNNING:
             continue
-        rew[e] = attempt(rows, rules, weights, e, act[e]) + step_reward(rows, rules, weights, e)
-        if rows.outcome[e] == RUNNING and rules.human_rate > 0.0:
-            if random.uniform(rows.rng[e]) < rules.human_rate:
-                interfere(rows, rules, e)
-                if is_solved(rows, e):
-                    rows.outcome[e] = SUCCESS
-        ended[e] = rows.outcome[e]
-        write_obs(rows, e, obs[e])
+        rew[e] = attempt(envs, rules, weights, e, act[e]) + step_reward(envs, rules, weights, e)
+        if envs.outcome[e] == RUNNING and rules.human_rate > 0.0:
+            if random.uniform(envs.rng[e]) < rules.human_rate:
+                interfere(envs, rules, e)
+                if is_solved(envs, e):
+                    envs.outcome[e] = SUCCESS
+        ended[e] = envs.outcome[e]
+        write_obs(envs, e, obs[e])
         if ended[e] != RUNNING and auto_reset:
             for i in range(obs.shape[1]):
-                last_obs[e, i] = obs[e, i]
-            rows.episode[e] += 1
-            start_row(rows, rules, seed, first_row + e, e)
-            write_obs(rows, e, obs[e])
+                out.last_obs[e, i] = obs[e, i]
+            envs.episode[e] += 1
+            start_env(envs, rules, seed, first_env + e, e)
+            write_obs(envs, e, obs[e])

@@ -19,7 +19,7 @@ from app.sim.sorting.kernels.task import (
     FAILURE_SCALE,
     RUNNING,
     Ints,
-    SortingRows,
+    SortingEnvs,
     SortingRules,
     is_solved,
     n_slots,
@@ -44,25 +44,25 @@ def _size(rng: random.State, n: int, even: bool) -> int:
 
 
 @kernel()
-def write_goal(rows: SortingRows, rules: SortingRules, e: int, wanted: Ints) -> None:
+def write_goal(envs: SortingEnvs, rules: SortingRules, e: int, wanted: Ints) -> None:
     """Write the goal of objects, on the tower of their colour, the largest at the bottom.
 
     Args:
-        rows: All environments.
-        e: Row.
+        envs: All environments.
+        e: Environment.
         wanted: Number of objects per code, shape (types + 1,).
     """
     n_sizes = rules.n_sizes
-    for c in range(rows.goal.shape[1]):
+    for c in range(envs.goal.shape[1]):
         level = 0
         for i in range(n_sizes):
             code = 1 + c * n_sizes + n_sizes - 1 - i
             for _ in range(wanted[code]):
-                rows.goal[e, c, level] = code
+                envs.goal[e, c, level] = code
                 level += 1
-        rows.goal_heights[e, c] = level
-        for k in range(level, rows.goal.shape[2]):
-            rows.goal[e, c, k] = 0
+        envs.goal_heights[e, c] = level
+        for k in range(level, envs.goal.shape[2]):
+            envs.goal[e, c, k] = 0
 
 
 @kernel()
@@ -72,7 +72,7 @@ def draw_codes(rng: random.State, there: Ints, n: int, wanted: Ints) -> None:
     Args:
         there: Number of existing objects per code, shape (types + 1,).
         n: Number of draws, at most that of existing objects.
-        wanted: Filled with how many of each code were drawn.
+        wanted: Filled with the number of drawn objects per code, shape (types + 1,).
     """
     left = 0
     for code in range(1, there.shape[0]):
@@ -90,36 +90,45 @@ def draw_codes(rng: random.State, there: Ints, n: int, wanted: Ints) -> None:
 
 
 @kernel()
-def _clear(rows: SortingRows, e: int) -> None:
-    for k in range(rows.clutter.shape[1]):
-        rows.clutter[e, k] = 0
-        for c in range(rows.towers.shape[1]):
-            rows.towers[e, c, k] = 0
-    for c in range(rows.towers.shape[1]):
-        rows.heights[e, c] = 0
+def _clear(envs: SortingEnvs, e: int) -> None:
+    """Remove all objects from clutter and towers."""
+    for k in range(envs.clutter.shape[1]):
+        envs.clutter[e, k] = 0
+        for c in range(envs.towers.shape[1]):
+            envs.towers[e, c, k] = 0
+    for c in range(envs.towers.shape[1]):
+        envs.heights[e, c] = 0
 
 
 @kernel()
-def _build(rows: SortingRows, e: int, rng: random.State, n_done: int, rest: Ints) -> None:
-    """Place ``n_done`` objects of the goal on random towers; remove them from ``rest``."""
+def _build(envs: SortingEnvs, e: int, rng: random.State, n_done: int, rest: Ints) -> None:
+    """Build ``n_done`` levels of the goal, on random towers; remove the objects from ``rest``.
+
+    Args:
+        rest: Objects not placed yet, by code, shape (types + 1,); changed.
+    """
     for _ in range(n_done):
         left = 0
-        for c in range(rows.goal.shape[1]):
-            left += rows.goal_heights[e, c] - rows.heights[e, c]
+        for c in range(envs.goal.shape[1]):
+            left += envs.goal_heights[e, c] - envs.heights[e, c]
         index = random.below(rng, left)
-        for c in range(rows.goal.shape[1]):
-            more = rows.goal_heights[e, c] - rows.heights[e, c]
+        for c in range(envs.goal.shape[1]):
+            more = envs.goal_heights[e, c] - envs.heights[e, c]
             if index < more:
-                code = int(rows.goal[e, c, rows.heights[e, c]])
+                code = int(envs.goal[e, c, envs.heights[e, c]])
                 rest[code] -= 1
-                push(rows, e, c, code)
+                push(envs, e, c, code)
                 break
             index -= more
 
 
 @kernel()
-def _scatter(rows: SortingRows, e: int, rng: random.State, n_junk: int, rest: Ints) -> None:
-    """Place ``n_junk`` objects on random towers, all others in the clutter."""
+def _scatter(envs: SortingEnvs, e: int, rng: random.State, n_junk: int, rest: Ints) -> None:
+    """Place ``n_junk`` random objects on random towers, all others in the clutter.
+
+    Args:
+        rest: Objects not placed yet, by code, shape (types + 1,); all zero afterwards.
+    """
     n_rest = 0
     for code in range(1, rest.shape[0]):
         n_rest += rest[code]
@@ -129,43 +138,45 @@ def _scatter(rows: SortingRows, e: int, rng: random.State, n_junk: int, rest: In
             if index < rest[code]:
                 rest[code] -= 1
                 if i < n_junk:
-                    push(rows, e, random.below(rng, rows.towers.shape[1]), code)
+                    push(envs, e, random.below(rng, envs.towers.shape[1]), code)
                 else:
-                    free = n_slots(rows, e, False)
-                    slot = nth_slot(rows, e, random.below(rng, free), False)
-                    rows.clutter[e, slot] = code
+                    free = n_slots(envs, e, False)
+                    slot = nth_slot(envs, e, random.below(rng, free), False)
+                    envs.clutter[e, slot] = code
                 break
             index -= rest[code]
 
 
 @kernel()
-def _draw_map(rows: SortingRows, rules: SortingRules, e: int, rng: random.State) -> None:
+def _draw_map(envs: SortingEnvs, rules: SortingRules, e: int, rng: random.State) -> None:
+    """Draw the failure map of an episode, or take that of the work cell."""
     drawn = random.uniform(rng) < rules.random_map_share
     steps = int(rules.failure_max * FAILURE_SCALE)
-    for k in range(rows.fail.shape[1]):
+    for k in range(envs.fail.shape[1]):
         if drawn:
-            rows.fail[e, k] = random.below(rng, steps + 1) / FAILURE_SCALE
+            envs.fail[e, k] = random.below(rng, steps + 1) / FAILURE_SCALE
         else:
-            rows.fail[e, k] = rows.own_fail[e, k]
+            envs.fail[e, k] = envs.own_fail[e, k]
 
 
 @kernel()
-def start_row(rows: SortingRows, rules: SortingRules, seed: int, row: int, e: int) -> None:
-    """Draw the next episode of row ``e``.
+def start_env(envs: SortingEnvs, rules: SortingRules, seed: int, number: int, e: int) -> None:
+    """Draw the next episode of environment ``e``.
 
     Args:
-        rows: All environments; changed.
+        envs: All environments; changed.
+        rules: Numbers of objects, disturbances and failure maps.
         seed: Seed of the batch.
-        row: Number of the row in the random streams.
-        e: Row.
+        number: Number of the environment in the random streams.
+        e: Environment.
     """
-    rng, there, wanted = rows.rng[e], rows.counts[e, 0], rows.counts[e, 1]
-    random.start_stream(seed, row, rows.episode[e], rng)
-    _draw_map(rows, rules, e, rng)
-    n_objects, n_goal = rows.fixed_objects[e], rows.fixed_goal[e]
+    rng, there, wanted = envs.rng[e], envs.counts[e, 0], envs.counts[e, 1]
+    random.start_stream(seed, number, envs.episode[e], rng)
+    _draw_map(envs, rules, e, rng)
+    n_objects, n_goal = envs.fixed_objects[e], envs.fixed_goal[e]
     even = random.uniform(rng) < rules.even_share
     if n_objects == 0:
-        n_objects = max(_size(rng, rows.clutter.shape[1], even), n_goal)
+        n_objects = max(_size(rng, envs.clutter.shape[1], even), n_goal)
     if n_goal == 0:
         n_goal = _size(rng, n_objects, even)
     for code in range(there.shape[0]):
@@ -173,11 +184,11 @@ def start_row(rows: SortingRows, rules: SortingRules, seed: int, row: int, e: in
     for _ in range(n_objects):
         there[1 + random.below(rng, there.shape[0] - 1)] += 1
     draw_codes(rng, there, n_goal, wanted)
-    write_goal(rows, rules, e, wanted)
+    write_goal(envs, rules, e, wanted)
     kind = random.uniform(rng)
     disturbed = kind >= 1.0 - rules.disturbed_share
     for attempt in range(TRIES + 1):
-        _clear(rows, e)
+        _clear(envs, e)
         for code in range(there.shape[0]):
             wanted[code] = there[code]
         n_done = n_junk = 0
@@ -186,9 +197,9 @@ def start_row(rows: SortingRows, rules: SortingRules, seed: int, row: int, e: in
         elif disturbed and attempt < TRIES:
             n_done = random.below(rng, n_goal)
             n_junk = 1 + random.below(rng, n_objects - n_done)
-        _build(rows, e, rng, n_done, wanted)
-        _scatter(rows, e, rng, n_junk, wanted)
-        if not is_solved(rows, e):
+        _build(envs, e, rng, n_done, wanted)
+        _scatter(envs, e, rng, n_junk, wanted)
+        if not is_solved(envs, e):
             break
-    rows.steps[e] = rows.moves[e] = rows.failures[e] = rows.interferences[e] = 0
-    rows.outcome[e] = RUNNING
+    envs.steps[e] = envs.moves[e] = envs.failures[e] = envs.interferences[e] = 0
+    envs.outcome[e] = RUNNING

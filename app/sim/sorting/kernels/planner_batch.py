@@ -44,7 +44,7 @@ def _task_of(tasks: TaskBatch, e: int) -> tuple[Objects, Task]:
 
 
 @kernel(nogil=True)
-def plan_rows(tasks: TaskBatch, work: PlannerWork, best: Ints, fewest: Ints) -> None:
+def plan_tasks(tasks: TaskBatch, work: PlannerWork, best: Ints, fewest: Ints) -> None:
     """Write the next action of the plan for every task.
 
     Args:
@@ -65,7 +65,7 @@ def plan_rows(tasks: TaskBatch, work: PlannerWork, best: Ints, fewest: Ints) -> 
 
 
 @kernel(nogil=True)
-def mark_rows(tasks: TaskBatch, work: PlannerWork, first: NDArray[np.bool_]) -> None:
+def mark_tasks(tasks: TaskBatch, work: PlannerWork, first: NDArray[np.bool_]) -> None:
     """Mark the first actions of shortest plans, for every task.
 
     Args:

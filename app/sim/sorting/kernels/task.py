@@ -1,10 +1,10 @@
-"""Steps of sorting tasks, one attempt per row and call (docs/method.md 1.2, 1.3, compiled).
+"""Attempts in sorting environments, their rewards and observations (compiled).
 
 Codes, positions and the numbering of actions are those of ``state.py``; episodes are
 drawn by ``initial_states.py`` and the people's interference by ``interference.py``.
 
-Source: thesis eq. (3.13)-(3.19). Deviates: placing into an occupied clutter slot, not covered
-by the thesis, returns the object.
+Source: docs/method.md 1.2, 1.3; thesis eq. (3.13)-(3.19). Deviates: placing into
+an occupied clutter slot, not covered by the thesis, returns the object.
 """
 
 from typing import NamedTuple
@@ -36,7 +36,10 @@ FAILURE_SCALE = 250
 
 
 class SortingRules(NamedTuple):
-    """Starts, disturbances and ends of episodes."""
+    """Starts, disturbances and ends of episodes.
+
+    K_E is the number of objects of an episode, K_G the number of objects in its goal.
+    """
 
     n_sizes: int
     """Number of sizes."""
@@ -60,8 +63,8 @@ class SortingRules(NamedTuple):
     """Greatest failure probability of such a map."""
 
 
-class SortingRows(NamedTuple):
-    """Rows of all tasks; ``n`` of them, ``K`` slots, ``C`` colours."""
+class SortingEnvs(NamedTuple):
+    """State of all environments: n of them, with K clutter slots and C colours."""
 
     clutter: Codes
     """Objects in the clutter, shape (n, K)."""
@@ -76,7 +79,7 @@ class SortingRows(NamedTuple):
     fail: Floats
     """Failure probabilities of the clutter slots, shape (n, K)."""
     own_fail: Floats
-    """Those of the work cell, shape (n, K)."""
+    """Failure probabilities of the clutter slots in the work cell, shape (n, K)."""
     fixed_objects: Ints
     """Objects per episode, K_E; 0 draws it, shape (n,)."""
     fixed_goal: Ints
@@ -100,40 +103,40 @@ class SortingRows(NamedTuple):
 
 
 @kernel()
-def is_solved(rows: SortingRows, e: int) -> bool:
-    """Return whether every tower of row ``e`` equals its goal."""
-    for c in range(rows.towers.shape[1]):
-        if rows.heights[e, c] != rows.goal_heights[e, c]:
+def is_solved(envs: SortingEnvs, e: int) -> bool:
+    """Return whether every tower of environment ``e`` equals its goal."""
+    for c in range(envs.towers.shape[1]):
+        if envs.heights[e, c] != envs.goal_heights[e, c]:
             return False
-        for k in range(rows.heights[e, c]):
-            if rows.towers[e, c, k] != rows.goal[e, c, k]:
+        for k in range(envs.heights[e, c]):
+            if envs.towers[e, c, k] != envs.goal[e, c, k]:
                 return False
     return True
 
 
 @kernel()
-def push(rows: SortingRows, e: int, c: int, code: int) -> None:
+def push(envs: SortingEnvs, e: int, c: int, code: int) -> None:
     """Place an object on tower ``c``."""
-    rows.towers[e, c, rows.heights[e, c]] = code
-    rows.heights[e, c] += 1
+    envs.towers[e, c, envs.heights[e, c]] = code
+    envs.heights[e, c] += 1
 
 
 @kernel()
-def pop(rows: SortingRows, e: int, c: int) -> int:
+def pop(envs: SortingEnvs, e: int, c: int) -> int:
     """Remove the top object of tower ``c``, which is not empty; return its code."""
-    rows.heights[e, c] -= 1
-    level = rows.heights[e, c]
-    code = int(rows.towers[e, c, level])
-    rows.towers[e, c, level] = 0
+    envs.heights[e, c] -= 1
+    level = envs.heights[e, c]
+    code = int(envs.towers[e, c, level])
+    envs.towers[e, c, level] = 0
     return code
 
 
 @kernel()
-def nth_slot(rows: SortingRows, e: int, wanted: int, occupied: bool) -> int:
+def nth_slot(envs: SortingEnvs, e: int, wanted: int, occupied: bool) -> int:
     """Return the ``wanted``-th occupied or free clutter slot, from 0; -1 without one."""
     seen = 0
-    for k in range(rows.clutter.shape[1]):
-        if (rows.clutter[e, k] != 0) == occupied:
+    for k in range(envs.clutter.shape[1]):
+        if (envs.clutter[e, k] != 0) == occupied:
             if seen == wanted:
                 return k
             seen += 1
@@ -141,58 +144,58 @@ def nth_slot(rows: SortingRows, e: int, wanted: int, occupied: bool) -> int:
 
 
 @kernel()
-def n_slots(rows: SortingRows, e: int, occupied: bool) -> int:
+def n_slots(envs: SortingEnvs, e: int, occupied: bool) -> int:
     """Return the number of occupied or free clutter slots."""
     found = 0
-    for k in range(rows.clutter.shape[1]):
-        if (rows.clutter[e, k] != 0) == occupied:
+    for k in range(envs.clutter.shape[1]):
+        if (envs.clutter[e, k] != 0) == occupied:
             found += 1
     return found
 
 
 @kernel()
 def attempt(
-    rows: SortingRows, rules: SortingRules, weights: SortingWeights, e: int, action: int
+    envs: SortingEnvs, rules: SortingRules, weights: SortingWeights, e: int, action: int
 ) -> float:
-    """Execute one attempt in row ``e``; return the reward without distance and success."""
-    n, n_towers = rows.clutter.shape[1], rows.towers.shape[1]
-    rng = rows.rng[e]
+    """Execute an attempt; return its reward without the terms of :func:`step_reward`."""
+    n, n_towers = envs.clutter.shape[1], envs.towers.shape[1]
+    rng = envs.rng[e]
     empty = stuck = failed = back = False
     if action < n * n_towers:
         slot, c = action // n_towers, action % n_towers
-        empty = rows.clutter[e, slot] == 0
+        empty = envs.clutter[e, slot] == 0
         if not empty:
-            failed = random.uniform(rng) < rows.fail[e, slot]
+            failed = random.uniform(rng) < envs.fail[e, slot]
         if not empty and not failed:
             if rules.localisation_rate > 0.0:
-                others = n_slots(rows, e, True) - 1
+                others = n_slots(envs, e, True) - 1
                 if others > 0 and random.uniform(rng) < rules.localisation_rate:
-                    found = nth_slot(rows, e, random.below(rng, others), True)
+                    found = nth_slot(envs, e, random.below(rng, others), True)
                     # The last one stands in for the one that was meant.
-                    slot = nth_slot(rows, e, others, True) if found == slot else found
+                    slot = nth_slot(envs, e, others, True) if found == slot else found
                     failed = True
-            push(rows, e, c, int(rows.clutter[e, slot]))
-            rows.clutter[e, slot] = 0
-            rows.moves[e] += 1
+            push(envs, e, c, int(envs.clutter[e, slot]))
+            envs.clutter[e, slot] = 0
+            envs.moves[e] += 1
     elif action < 2 * n * n_towers:
         c, slot = (action - n * n_towers) // n, (action - n * n_towers) % n
-        empty = rows.heights[e, c] == 0
-        stuck = not empty and rows.clutter[e, slot] != 0
+        empty = envs.heights[e, c] == 0
+        stuck = not empty and envs.clutter[e, slot] != 0
         if not empty and not stuck:
             back = True
-            rows.clutter[e, slot] = pop(rows, e, c)
-            rows.moves[e] += 1
+            envs.clutter[e, slot] = pop(envs, e, c)
+            envs.moves[e] += 1
     else:
         c = (action - 2 * n * n_towers) // n_towers
         d = (action - 2 * n * n_towers) % n_towers
-        empty = rows.heights[e, c] == 0
+        empty = envs.heights[e, c] == 0
         stuck = not empty and c == d
         if not empty and not stuck:
-            push(rows, e, d, pop(rows, e, c))
-            rows.moves[e] += 1
-    rows.steps[e] += 1
+            push(envs, e, d, pop(envs, e, c))
+            envs.moves[e] += 1
+    envs.steps[e] += 1
     if failed:
-        rows.failures[e] += 1
+        envs.failures[e] += 1
     return -(
         move_cost(weights)
         + empty_cost(empty, weights)
@@ -203,54 +206,54 @@ def attempt(
 
 
 @kernel()
-def write_mask(rows: SortingRows, e: int, mask: NDArray[np.bool_]) -> None:
+def write_mask(envs: SortingEnvs, e: int, mask: NDArray[np.bool_]) -> None:
     """Mark the moves that change the state, shape (n_actions,)."""
-    n, n_towers = rows.clutter.shape[1], rows.towers.shape[1]
+    n, n_towers = envs.clutter.shape[1], envs.towers.shape[1]
     for k in range(n):
-        there = rows.clutter[e, k] != 0
+        there = envs.clutter[e, k] != 0
         for c in range(n_towers):
             mask[k * n_towers + c] = there
-            mask[n * n_towers + c * n + k] = not there and rows.heights[e, c] > 0
+            mask[n * n_towers + c * n + k] = not there and envs.heights[e, c] > 0
     for c in range(n_towers):
         for d in range(n_towers):
-            mask[2 * n * n_towers + c * n_towers + d] = c != d and rows.heights[e, c] > 0
+            mask[2 * n * n_towers + c * n_towers + d] = c != d and envs.heights[e, c] > 0
 
 
 @kernel()
-def write_obs(rows: SortingRows, e: int, out: NDArray[np.uint8]) -> None:
-    """Write slots, towers, goal and failure probabilities of row ``e`` as integers."""
-    n, n_towers = rows.clutter.shape[1], rows.towers.shape[1]
+def write_obs(envs: SortingEnvs, e: int, out: NDArray[np.uint8]) -> None:
+    """Write slots, towers, goal and failure probabilities of environment ``e`` as integers."""
+    n, n_towers = envs.clutter.shape[1], envs.towers.shape[1]
     for k in range(n):
-        out[k] = rows.clutter[e, k]
-        out[n + 2 * n_towers * n + k] = int(rows.fail[e, k] * FAILURE_SCALE + 0.5)
+        out[k] = envs.clutter[e, k]
+        out[n + 2 * n_towers * n + k] = int(envs.fail[e, k] * FAILURE_SCALE + 0.5)
         for c in range(n_towers):
-            out[n + c * n + k] = rows.towers[e, c, k]
-            out[n + n_towers * n + c * n + k] = rows.goal[e, c, k]
+            out[n + c * n + k] = envs.towers[e, c, k]
+            out[n + n_towers * n + c * n + k] = envs.goal[e, c, k]
 
 
 @kernel()
 def step_reward(
-    rows: SortingRows, rules: SortingRules, weights: SortingWeights, e: int
+    envs: SortingEnvs, rules: SortingRules, weights: SortingWeights, e: int
 ) -> float:
-    """Set the outcome of row ``e`` after an attempt; return the rest of the reward."""
-    solved = is_solved(rows, e)
+    """Set the outcome of environment ``e`` after an attempt; return the rest of the reward."""
+    solved = is_solved(envs, e)
     if solved:
-        rows.outcome[e] = SUCCESS
-    elif rows.steps[e] >= rules.horizon:
-        rows.outcome[e] = TIMEOUT
-    distance = distance_cost(rows.towers[e], rows.goal[e], rules.n_sizes, weights)
+        envs.outcome[e] = SUCCESS
+    elif envs.steps[e] >= rules.horizon:
+        envs.outcome[e] = TIMEOUT
+    distance = distance_cost(envs.towers[e], envs.goal[e], rules.n_sizes, weights)
     return success_bonus(solved, weights) - distance
 
 
 @kernel(nogil=True)
-def masks_of(rows: SortingRows, masks: NDArray[np.bool_]) -> None:
-    """Write the masks of all rows, shape (n, n_actions)."""
-    for e in range(rows.clutter.shape[0]):
-        write_mask(rows, e, masks[e])
+def masks_of(envs: SortingEnvs, masks: NDArray[np.bool_]) -> None:
+    """Write the masks of all environments, shape (n, n_actions)."""
+    for e in range(envs.clutter.shape[0]):
+        write_mask(envs, e, masks[e])
 
 
 @kernel(nogil=True)
-def observe_rows(rows: SortingRows, obs: NDArray[np.uint8]) -> None:
-    """Write the observations of all rows, shape (n, obs_size)."""
-    for e in range(rows.clutter.shape[0]):
-        write_obs(rows, e, obs[e])
+def observe_envs(envs: SortingEnvs, obs: NDArray[np.uint8]) -> None:
+    """Write the observations of all environments, shape (n, obs_size)."""
+    for e in range(envs.clutter.shape[0]):
+        write_obs(envs, e, obs[e])

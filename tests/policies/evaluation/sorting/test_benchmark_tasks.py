@@ -72,9 +72,9 @@ def test_a_move_too_many_in_any_part_is_not_the_fewest():
 
     def once_to_and_fro(batch, which):
         act = choose_by_planner(batch, which)
-        if len(which) == 1 and batch.rows.moves[0] >= 4 and not wasted["done"]:
+        if len(which) == 1 and batch.envs.moves[0] >= 4 and not wasted["done"]:
             k, c = SHAPE.n_cells, SHAPE.n_colours
-            tower = int(batch.rows.heights[0].argmax())
+            tower = int(batch.envs.heights[0].argmax())
             act[0] = 2 * k * c + tower * c + 1 - tower
             wasted["done"] = True
         return act

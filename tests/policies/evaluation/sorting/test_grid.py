@@ -94,11 +94,11 @@ def test_a_mean_has_the_normal_interval():
 def test_every_pair_has_its_episodes_of_its_numbers(disturbed):
     assert len(pairs_of(SHAPE)) == 10
     (batch,) = grid_batches(SHAPE, FAIL, 5, 3, disturbed)
-    rows = batch.rows
-    n_objects = (rows.clutter != NULL).sum(axis=1) + (rows.towers != NULL).sum(axis=(1, 2))
-    n_goal = (rows.goal != NULL).sum(axis=(1, 2))
+    envs = batch.envs
+    n_objects = (envs.clutter != NULL).sum(axis=1) + (envs.towers != NULL).sum(axis=(1, 2))
+    n_goal = (envs.goal != NULL).sum(axis=(1, 2))
     assert np.array_equal(np.stack([n_objects, n_goal], 1), np.repeat(pairs_of(SHAPE), 5, 0))
-    assert (rows.towers != NULL).any() == (disturbed > 0.0)
+    assert (envs.towers != NULL).any() == (disturbed > 0.0)
 
 
 def test_episodes_are_the_same_however_they_are_cut_into_batches(monkeypatch):

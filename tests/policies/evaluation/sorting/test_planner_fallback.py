@@ -37,7 +37,7 @@ class Followed(SortingBatch):
         self.verdicts: list[tuple[bool, bool]] = []
 
     def step(self, act, *, auto_reset=True):
-        for e in np.flatnonzero(self.rows.outcome == 0).tolist():
+        for e in np.flatnonzero(self.envs.outcome == 0).tolist():
             state = self.state_of(e)
             plan = solve(state, self.shape)
             record = observe_transition(
@@ -88,7 +88,7 @@ def test_every_verdict_is_that_of_the_rule_for_one_task(name):
 def test_different_states_have_different_keys():
     batch = SortingBatch(SHAPE, FAIL, 3000, 2, SortingSettings(disturbed_share=1.0))
     batch.reset()
-    rows = batch.rows
-    keys = state_keys(rows, np.arange(3000))
-    objects = np.concatenate([rows.clutter, rows.towers.reshape(3000, -1)], axis=1)
+    envs = batch.envs
+    keys = state_keys(envs, np.arange(3000))
+    objects = np.concatenate([envs.clutter, envs.towers.reshape(3000, -1)], axis=1)
     assert len(np.unique(keys)) == len(np.unique(objects, axis=0))

@@ -20,8 +20,8 @@ def arm() -> Arm:
 
 
 def around(people: Shapes, margin: float = 0.0, cell_margin: float = 0.0) -> free.Obstacles:
-    gap, work = np.empty(people.columns.shape[1]), np.empty((3, 6))
-    return free.Obstacles(people.columns, gap, people.cylinders, margin, cell_margin, *work)
+    gap, work = np.empty(people.capsules.shape[1]), np.empty((3, 6))
+    return free.Obstacles(people.capsules, gap, people.cylinders, margin, cell_margin, *work)
 
 
 def some_people(rng: np.random.Generator) -> free.Obstacles:
@@ -67,7 +67,7 @@ def test_first_blocked_period_is_where_the_person_stands(arm: Arm) -> None:
     pose = arm_kernel.new_robot_pose(arm)
     no_one = around(no_people())
     free.clearances_at(arm, turn[30], no_one, pose)
-    tool = ends_of(pose.columns[:, -1:], 1)
+    tool = ends_of(pose.capsules[:, -1:], 1)
     person = around(capsule_shapes(tool, np.array([0.02])))
     assert free.first_blocked(arm, turn, qd, arm.dt, 0, no_one, pose) == 80
     assert 15 < free.first_blocked(arm, turn, qd, arm.dt, 0, person, pose) <= 30

@@ -46,7 +46,7 @@ def test_frames_and_hands_are_those_of_the_tree() -> None:
 
 
 def test_capsules_are_those_of_the_tree_wherever_they_stand_among_the_columns() -> None:
-    trig, out = np.empty((3, 16)), body.capsule_columns(2)
+    trig, out = np.empty((3, 16)), body.new_body_capsules(2)
     points, rotations = np.empty((body.N_POINTS, 3)), np.empty((body.N_FRAMES, 3, 3))
     for number, (one, other) in enumerate(zip(SIZES, SIZES[::-1], strict=True)):
         q = joints(61 + number)
@@ -62,7 +62,7 @@ def test_capsules_are_those_of_the_tree_wherever_they_stand_among_the_columns() 
 
 
 def test_columns_know_lengths_and_radii_of_the_person_placed_last() -> None:
-    trig, out = np.empty((3, 16)), body.capsule_columns(1)
+    trig, out = np.empty((3, 16)), body.new_body_capsules(1)
     points, rotations = np.empty((body.N_POINTS, 3)), np.empty((body.N_FRAMES, 3, 3))
     for size in SIZES:
         vector, q = size.vector(FLOOR_Z), joints(71)[0]

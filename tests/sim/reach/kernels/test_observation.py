@@ -116,17 +116,17 @@ def test_worker_is_seen_as_the_cylinder_that_contains_the_capsules() -> None:
     for e in range(batch.n_envs):
         x, y, _, _, r = obs[e, 12:17]
         assert (x, y) == pytest.approx(people.q[e, 0, :2], abs=1e-6)
-        ends = ends_of(people.columns[e], body.N_CAPSULES)[..., :2] - people.q[e, 0, :2]
-        radii = people.columns[e, RADIUS, : body.N_CAPSULES]
+        ends = ends_of(people.capsules[e], body.N_CAPSULES)[..., :2] - people.q[e, 0, :2]
+        radii = people.capsules[e, RADIUS, : body.N_CAPSULES]
         reach = np.linalg.norm(ends, axis=2).max(axis=1) + radii
         assert r == pytest.approx(reach.max(), abs=1e-6)
 
 
 def test_enclosing_radius_of_one_capsule_is_its_farther_end_and_radius() -> None:
-    columns = np.zeros((9, 1))
-    columns[:, 0] = [1.0, 0.0, 0.0, 2.0, 0.0, 0.0, 4.0, 0.25, 0.25]
-    assert enclosing_radius(columns, 0, 1, 0.0, 0.0) == 3.25
-    assert enclosing_radius(columns, 0, 1, 3.0, 0.0) == 2.25
+    capsules = np.zeros((9, 1))
+    capsules[:, 0] = [1.0, 0.0, 0.0, 2.0, 0.0, 0.0, 4.0, 0.25, 0.25]
+    assert enclosing_radius(capsules, 0, 1, 0.0, 0.0) == 3.25
+    assert enclosing_radius(capsules, 0, 1, 3.0, 0.0) == 2.25
 
 
 def test_empty_cell_is_observed_as_a_person_far_away() -> None:

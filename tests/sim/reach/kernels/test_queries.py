@@ -105,7 +105,8 @@ def test_distances_are_those_to_each_person_and_the_nearest_is_the_least() -> No
         expected = [to_worker.people_m, *(one.people_m for one in to_walkers)]
         np.testing.assert_allclose(found[e], expected, atol=1e-12)
         batch.observe_goals(np.array([e]), state.goal[e : e + 1, None])
-        near = nearest_person(people, batch._sight.robot.columns, batch._sight.geometry)
+        work = batch._observation_work
+        near = nearest_person(people, work.robot.capsules, work.geometry)
         assert near == int(np.argmin(found[e]))
 
 

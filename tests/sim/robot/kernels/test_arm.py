@@ -30,12 +30,12 @@ def test_speed_bound_holds_for_every_point_of_the_robot(degree: int) -> None:
         kernel.place_robot(arm, q, before)
         kernel.place_robot(arm, at(arm.dt), after)
         bound = kernel.robot_speed_bound(
-            arm, JointPath(q, qd, c, d), before.columns, after.columns
+            arm, JointPath(q, qd, c, d), before.capsules, after.capsules
         )
         for x in np.linspace(0.0, arm.dt, 9):
             kernel.place_robot(arm, at(x), now)
             kernel.place_robot(arm, at(x + tick), soon)
-            moved = ends_of(soon.columns, 12) - ends_of(now.columns, 12)
+            moved = ends_of(soon.capsules, 12) - ends_of(now.capsules, 12)
             assert np.linalg.norm(moved, axis=2).max() / tick <= bound + 1e-4
 
 

@@ -21,7 +21,7 @@ def alone(q: Vec, cylinders: Vec, top: float) -> Vec:
     pose, found = new_robot_pose(ARM), []
     for joints, (x, y, r) in zip(q, cylinders, strict=True):
         place_robot(ARM, joints, pose)
-        found.append(cylinder_clearance(pose.columns, 0, x, y, r, top)[0])
+        found.append(cylinder_clearance(pose.capsules, 0, x, y, r, top)[0])
     return np.array(found)
 
 

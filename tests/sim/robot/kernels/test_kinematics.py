@@ -25,7 +25,7 @@ def test_links_tcp_and_capsules_are_where_pinocchio_places_them() -> None:
     for row, start, end in zip(q, p0, p1, strict=True):
         place_robot(arm, row, pose)
         links = robot.link_poses(row)
-        ends = ends_of(pose.columns, len(capsules.name))
+        ends = ends_of(pose.capsules, len(capsules.name))
         found = (
             np.abs(pose.rot - links[:, :3, :3]).max(),
             np.abs(pose.pos - links[:, :3, 3]).max(),

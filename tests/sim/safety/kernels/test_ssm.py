@@ -53,7 +53,7 @@ def motions(n, seed):
 
 def clearances_at(q, people, space):
     place_node(ARM, shapes(people), q, NOW, 0.0, space)
-    return space.gap[NOW].copy()
+    return space.clearance[NOW].copy()
 
 
 def path_of(q, qd, c, d, rate, times):
@@ -133,7 +133,7 @@ def test_people_of_known_velocity_are_not_met_on_an_admitted_path():
                     0.0,
                     other,
                 )
-                assert other.gap[NOW].min() > 0.05 + 0.1 * (0.02 + t) - 1e-9
+                assert other.clearance[NOW].min() > 0.05 + 0.1 * (0.02 + t) - 1e-9
     assert 40 < admitted < 360
 
 
@@ -206,7 +206,7 @@ def test_a_path_s_bounds_hold_for_points_of_every_link():
         ends, x, h = [], np.linspace(0.0, ARM.dt, 21), ARM.dt / 20
         for s in x:
             clearances_at(q + s * (qd + s * (c + s * d)), people, space)
-            ends.append(space.columns[NOW, :3].copy())
+            ends.append(space.capsules[NOW, :3].copy())
         speed = np.linalg.norm(np.diff(ends, axis=0), axis=1) / h
         bend = np.linalg.norm(np.diff(ends, n=2, axis=0), axis=1) / h**2
         assert speed.max() <= first * (1.0 + 1e-9)

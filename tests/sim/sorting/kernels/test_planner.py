@@ -11,7 +11,7 @@ from app.sim.sorting.kernels.planner import (
     plan_by_rules,
     plan_state,
 )
-from app.sim.sorting.kernels.planner_batch import TaskBatch, mark_rows, plan_rows
+from app.sim.sorting.kernels.planner_batch import TaskBatch, mark_tasks, plan_tasks
 from app.sim.sorting.kernels.shortest_paths import lay_out, most_states, new_shortest_paths
 from app.sim.sorting.planner import solve
 from app.sim.sorting.state import SortingShape, SortingState
@@ -38,7 +38,7 @@ def rows_of(states: list[SortingState]) -> tuple[np.ndarray, ...]:
 def planned(rows: tuple[np.ndarray, ...]) -> tuple[list[int], list[int]]:
     """Best actions and fewest moves of a batch."""
     best, fewest = (np.zeros(len(rows[0]), dtype=np.int64) for _ in range(2))
-    plan_rows(TaskBatch(*rows), new_work(8, 3, 2), best, fewest)
+    plan_tasks(TaskBatch(*rows), new_work(8, 3, 2), best, fewest)
     return best.tolist(), fewest.tolist()
 
 
@@ -65,7 +65,7 @@ def test_marks_of_rows_are_all_first_actions() -> None:
     first = np.zeros((50, SHAPE.n_actions), dtype=np.bool_)
     clutter, towers, heights, goal, goal_heights, fail = rows_of(states)
     batch = TaskBatch(clutter, towers, heights, goal, goal_heights, fail)
-    mark_rows(batch, new_work(8, 3, 2), first)
+    mark_tasks(batch, new_work(8, 3, 2), first)
     for state, marks in zip(states, first, strict=True):
         assert tuple(np.flatnonzero(marks).tolist()) == solve(state, SHAPE).first
 

@@ -80,13 +80,13 @@ def test_a_failed_pick_pays_for_the_failure_and_changes_nothing() -> None:
     for e in range(64):
         batch.put(e, state)
     result = batch.step(np.full(64, SHAPE.action_of(Move(0, 4))), auto_reset=False)
-    failed = batch.rows.failures == 1
+    failed = batch.envs.failures == 1
     assert failed.sum() > 50
     np.testing.assert_allclose(result.rew[failed], -ODD.move - ODD.fail, rtol=1e-6)
     np.testing.assert_array_equal(
-        batch.rows.clutter[failed], np.tile(state.clutter, (failed.sum(), 1))
+        batch.envs.clutter[failed], np.tile(state.clutter, (failed.sum(), 1))
     )
-    np.testing.assert_array_equal(batch.rows.moves, ~failed)
+    np.testing.assert_array_equal(batch.envs.moves, ~failed)
 
 
 def test_an_empty_pick_does_not_fail() -> None:

@@ -75,7 +75,7 @@ def _command_segment(
 
 
 @kernel(nogil=True, error_model="numpy")
-def step_rows(
+def step_envs(
     world: ReachCell,
     task: ReachTask,
     state: EpisodeState,

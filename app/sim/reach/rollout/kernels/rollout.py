@@ -98,18 +98,18 @@ def _observe_people(world: ReachCell, step: int, work: RolloutWorkspace) -> floa
     observation, robot, top = work.observation, work.observation.robot, world.people.top_z
     places, n, nearest, observed = work.people.places, work.people.n[0], FAR, 0
     for i in range(3):
-        observation.clearances[i] = FAR
+        observation.clearances_ahead[i] = FAR
     for p in range(n):
         x, y, r = places[step, p, 0], places[step, p, 1], places[step, p, 2]
-        d, _ = cylinder_clearance(robot.columns, 0, x, y, r, top)
+        d, _ = cylinder_clearance(robot.capsules, 0, x, y, r, top)
         if d < nearest:
             nearest, observed = d, p
         vx = (places[step + 1, p, 0] - x) / STEP_S
         vy = (places[step + 1, p, 1] - y) / STEP_S
         for i in range(3):
             there_x, there_y = x + HORIZONS[i] * vx, y + HORIZONS[i] * vy
-            d, _ = cylinder_clearance(robot.columns, 0, there_x, there_y, r, top)
-            observation.clearances[i] = min(observation.clearances[i], d)
+            d, _ = cylinder_clearance(robot.capsules, 0, there_x, there_y, r, top)
+            observation.clearances_ahead[i] = min(observation.clearances_ahead[i], d)
         for i in range(N_TIMES):
             for m in range(3):
                 observation.predicted[i, p, m] = places[step + 1 + i, p, m]
@@ -153,7 +153,7 @@ def _people_clearance(
         a, b = places[step, p], places[step + 1, p]
         x, y = a[0] + share * (b[0] - a[0]), a[1] + share * (b[1] - a[1])
         r = a[2] + share * (b[2] - a[2])
-        least, _ = cylinder_clearance(work.observation.robot.columns, 0, x, y, r, top, least)
+        least, _ = cylinder_clearance(work.observation.robot.capsules, 0, x, y, r, top, least)
     return least
 
 
@@ -258,7 +258,7 @@ def _collides(arm: Arm, clearance: float, work: RolloutWorkspace) -> bool:
     robot = work.observation.robot
     return bool(
         clearance <= 0.0
-        or cell_clearance(arm, robot.columns)[0] <= 0.0
+        or cell_clearance(arm, robot.capsules)[0] <= 0.0
         or self_clearance(arm, robot)[0] <= 0.0
     )
 
