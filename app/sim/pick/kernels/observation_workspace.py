@@ -20,12 +20,20 @@ from app.sim.scenario.kernels.person_observation import (
 
 STANDARD_TOOL = (0.12, 0.04)
 """Length from flange to tcp and radius of the tool of the last coarse capsule below [m]."""
+UPPER_ARM, FOREARM, WRIST_1, WRIST_2, WRIST_3 = 0.612, 0.57, 0.115, 0.116, 0.17
+"""Lengths of the segments of the coarse capsules of the UR10 [m]: ``LinkLengths`` (0.612,
+0.5723, 0.1149, 0.1157; wrist 3: flange 0.0922, and tool less its radius 0.08), rounded.
+
+They are inputs of trained policies, therefore constants of their own; a test compares them with
+the model of the robot."""
+UPPER_ARM_Y = -0.045
+"""Lateral offset of the axis of the upper arm's tube [m], as in ``ur10_capsules.json``."""
 COARSE_LINK = np.array([2, 3, 4, 5, 6], dtype=np.int64)
 """Link of each coarse capsule: the robot from the upper arm to the tool, simplified for
 features. Contacts use the capsules of ``robot/data/ur10_capsules.json``."""
 COARSE_P0 = np.array(
     [
-        [0.0, -0.045, 0.0],
+        [0.0, UPPER_ARM_Y, 0.0],
         [0.0, 0.0, 0.0],
         [0.0, 0.0, 0.0],
         [0.0, 0.0, 0.0],
@@ -35,16 +43,17 @@ COARSE_P0 = np.array(
 """First end of each segment in the link's frame [m], shape (N_COARSE, 3)."""
 COARSE_SPAN = np.array(
     [
-        [0.0, 0.0, 0.612],
-        [0.0, 0.0, 0.57],
-        [0.0, 0.115, 0.0],
-        [0.0, 0.0, 0.116],
-        [0.0, 0.17, 0.0],
+        [0.0, 0.0, UPPER_ARM],
+        [0.0, 0.0, FOREARM],
+        [0.0, WRIST_1, 0.0],
+        [0.0, 0.0, WRIST_2],
+        [0.0, WRIST_3, 0.0],
     ]
 )
 """Second end minus first end in that frame [m], for the standard tool, shape (N_COARSE, 3)."""
 COARSE_RADIUS = np.array([0.09, 0.075, 0.066, 0.066, 0.045])
-"""Radius of each [m], for the standard tool, shape (N_COARSE,)."""
+"""Radius of each [m], for the standard tool, shape (N_COARSE,): between the least and the
+greatest radius of the link's capsules in ``ur10_capsules.json``, or within 1 mm of it."""
 COARSE_FIRST = (0, 1, 2, 4, 5)
 """First coarse capsule of each of four groups of links (upper arm, forearm, wrists 1 and 2,
 wrist 3 with the tool), and the number of capsules."""
