@@ -42,9 +42,10 @@ def box_weights(x: Vec, y: Vec, z: Vec, goals: Vec, which: Indices, weights: Vec
     """Write the corners of each goal's box and their trilinear weights.
 
     Args:
-        x: Grid planes [m], ascending, shape (n_x,).
-        y: See x.
-        z: See x; targets are numbered with z varying fastest, then y.
+        x: x coordinates of the grid's planes [m], ascending, shape (n_x,).
+        y: y coordinates of the grid's planes [m], ascending, shape (n_y,).
+        z: z coordinates of the grid's planes [m], ascending, shape (n_z,); targets are
+            numbered with z varying fastest, then y.
         goals: Inside the grid [m], shape (n, 3).
         which: Filled with the numbers of targets, shape (n, N_BOX).
         weights: Filled, shape (n, N_BOX).

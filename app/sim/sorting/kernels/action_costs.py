@@ -12,7 +12,7 @@ from app.sim.sorting.kernels.shortest_paths import Ints, lay_out
 
 @kernel()
 def _shift(source: int, target: int, objects: Objects) -> None:
-    """Move the object at one position to another."""
+    """Move an object; positions below K are clutter slots, those from K on tops of towers."""
     n_slots = len(objects.clutter)
     if source < n_slots:
         code = objects.clutter[source]
@@ -40,7 +40,7 @@ def attempts_by_move(
         objects: Positions of the objects; restored at the end.
         task: Goal and failure probabilities.
         moves: Valid moves as positions to pick and to place, shape (n, 2).
-        most: States of the planner, over all moves, beyond which nothing is written.
+        most: Largest number of states times moves that is planned; nothing is written beyond.
         work: Work space of the shape.
         attempts: Expected attempts by move, shape (n,), written.
 

@@ -36,7 +36,7 @@ MAX_STATES = 20_000
 """Largest number of states with rollouts; larger tasks would take seconds."""
 LESS = 1e-9
 """Least reduction of attempts by a preferred plan."""
-CELLS_TRIED = 3
+SLOTS_TRIED = 3
 """Number of best free slots tried for an object put aside, besides the worst one."""
 
 
@@ -66,9 +66,9 @@ class PlannerWork(NamedTuple):
     """Work space of the planner for one shape."""
 
     paths: ShortestPaths
-    """States of the task."""
+    """State graph of the task."""
     at: Ints
-    """Work space of sweeps, shape (C,)."""
+    """Work space: progress of each tower in a sweep, shape (C,)."""
     now: Objects
     """Objects along the present plan."""
     trial: Objects
@@ -89,7 +89,7 @@ def _new_objects(n_slots: int, n_colours: int) -> Objects:
 
 
 def new_work(n_slots: int, n_colours: int, n_sizes: int) -> PlannerWork:
-    """Return work space: 30 kB for K = 20, C = 3; 10 MB for K = 40, C = 5."""
+    """Return work space: 30 kB for K = 20 slots, C = 3 towers; 10 MB for K = 40, C = 5."""
     return PlannerWork(
         paths=new_shortest_paths(n_slots, n_colours, n_sizes),
         at=np.zeros(n_colours, dtype=np.int64),
@@ -113,7 +113,7 @@ def copy_objects(source: Objects, target: Objects) -> None:
 
 @kernel()
 def lay_out_task(objects: Objects, task: Task, work: PlannerWork) -> int:
-    """Write the states of a task and the fewest moves from them; return their number."""
+    """Write the state graph of a task with the fewest moves; return its number of states."""
     size = lay_out(
         objects.clutter,
         objects.towers,
@@ -129,7 +129,7 @@ def lay_out_task(objects: Objects, task: Task, work: PlannerWork) -> int:
 
 @kernel()
 def _locate(objects: Objects, task: Task, p: ShortestPaths) -> None:
-    """Write the towers' progress."""
+    """Write the progress ``at`` of the towers."""
     for c in range(len(objects.heights)):
         height, level = objects.heights[c], 0
         while level < height and objects.towers[c, level] == task.goal[c, level]:
@@ -142,7 +142,8 @@ def _apply_action(action: int, objects: Objects, task: Task, work: PlannerWork) 
     """Execute an action and update the towers' progress.
 
     Returns:
-        Whether the states had to be written again: an object waits on a tower.
+        Whether the state graph was written again: the object is on a tower that does not need
+        it next.
     """
     p, n_slots, n_towers = work.paths, len(objects.clutter), len(objects.heights)
     moves = n_slots * n_towers
@@ -191,10 +192,10 @@ def _try(action: int, best: float, task: Task, work: PlannerWork) -> float:
     """Return the expected attempts from an action to the goal, by the rules after it.
 
     Args:
-        action: First action, from where the objects are now.
-        best: Expected attempts that would have to be less for it to be taken.
+        action: First action, from ``work.now``.
+        best: Least expected attempts so far; the evaluation ends when they are exceeded.
         task: Goal and failure probabilities.
-        work: Work space; its states fit where the objects are now, and do so again.
+        work: Work space whose state graph fits ``work.now``, before and after the call.
     """
     p = work.paths
     copy_objects(work.now, work.trial)
@@ -224,14 +225,14 @@ def _next_free(last: int, clutter: Bytes, fail: Vec) -> int:
 
 
 @kernel()
-def _try_cells(c: int, best: float, task: Task, work: PlannerWork) -> tuple[int, float]:
+def _try_slots(c: int, best: float, task: Task, work: PlannerWork) -> tuple[int, float]:
     """Evaluate the best free slots and the worst one for the top of a tower.
 
     Args:
         c: The tower.
-        best: Expected attempts that would have to be less.
+        best: Least expected attempts so far.
         task: Goal and failure probabilities.
-        work: Work space; its states fit where the objects are now.
+        work: Work space whose state graph fits ``work.now``.
 
     Returns:
         The best such action, -1 where none is better, and the expected attempts then.
@@ -239,8 +240,8 @@ def _try_cells(c: int, best: float, task: Task, work: PlannerWork) -> tuple[int,
     now, n_slots = work.now, len(work.now.clutter)
     base = n_slots * len(now.heights) + c * n_slots
     chosen, k = NONE, -1
-    for n in range(CELLS_TRIED + 1):
-        if n < CELLS_TRIED:
+    for n in range(SLOTS_TRIED + 1):
+        if n < SLOTS_TRIED:
             k = _next_free(k, now.clutter, task.fail)
         elif k >= 0:
             worst = worst_free(now.clutter, task.fail)
@@ -260,7 +261,7 @@ def _waiting(c: int, removed: int, p: ShortestPaths) -> int:
     Args:
         c: The other tower.
         removed: State after a removal to the clutter instead, on a shortest plan.
-        p: The states, ``table`` filled, the towers at ``at``.
+        p: State graph, ``table`` filled; ``at`` is the present state.
     """
     top = p.top[c, p.at[c]]
     for d in range(len(p.at)):
@@ -275,7 +276,7 @@ def _best_of_alternatives(task: Task, work: PlannerWork) -> int:
 
     Args:
         task: Goal and failure probabilities.
-        work: Work space; its states fit where the objects are now.
+        work: Work space whose state graph fits ``work.now``.
     """
     p, now = work.paths, work.now
     chosen = _choose(now, task, p)
@@ -294,7 +295,7 @@ def _best_of_alternatives(task: Task, work: PlannerWork) -> int:
             continue
         d = _waiting(c, removed, p)
         if d < 0:
-            action, attempts = _try_cells(c, best, task, work)
+            action, attempts = _try_slots(c, best, task, work)
         else:
             action = 2 * moves + c * n_towers + d
             attempts = _try(action, best, task, work)
@@ -310,7 +311,7 @@ def next_action(size: int, task: Task, work: PlannerWork) -> int:
     Args:
         size: Number of states.
         task: Goal and failure probabilities.
-        work: Work space; its states fit where the objects are now.
+        work: Work space whose state graph fits ``work.now``.
     """
     if size > MAX_STATES:
         return _choose(work.now, task, work.paths)
@@ -355,6 +356,7 @@ def plan_by_rules(objects: Objects, task: Task, work: PlannerWork) -> tuple[int,
     Args:
         objects: Positions of the objects.
         task: Goal and failure probabilities.
+        work: Work space of the shape.
 
     Returns:
         Fewest moves, and expected attempts of the plan; -1 and 0 where the goal cannot be met.

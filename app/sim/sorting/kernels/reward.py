@@ -78,6 +78,7 @@ def distance_cost(
     Args:
         towers: Objects on the towers, shape (C, K).
         goal: Goal of the towers, shape (C, K).
+        n_sizes: Number of sizes; code ``1 + colour * n_sizes + size`` is an object, 0 none.
         weights: Coefficients.
     """
     total: float = 0.0

@@ -1,26 +1,29 @@
-"""The sorting task as progress of its towers, and the fewest moves from there, compiled.
+"""State graph of a sorting task, and the fewest moves to its goal (compiled).
 
-A tower matches its goal up to level ``m``; what stands above must go, top first, and then the
-goal is built, lowest level first. So a tower is described by one number, its *progress*: the
-``R`` objects still above, one after the other, then the goal's levels ``cut .. G`` that stand.
-Progress of all towers is a state: what lies in the clutter follows from it by counting. From a
-state lead
+A tower matches its goal in its lowest ``m`` levels. The objects above must be removed, top
+first, before the rest of the goal is built, lowest level first. A tower is therefore described
+by one number, its *progress*: it counts the ``R`` removals that remain, then the levels of the
+goal from ``cut`` on that are built. The progress of all towers is a state; the contents of the
+clutter follow from it by counting. Moves from a state are
 
-- the removal of a tower's top to the clutter (there is always a free slot),
-- the placement of a tower's next object from the clutter, where there is one,
-- a tower's top straight onto a tower that wants it next: two moves' work in one,
+- the removal of a tower's top object to the clutter (there is always a free slot),
+- the placement of a tower's next object from the clutter, if it is there,
+- the transfer of a tower's top object to a tower that needs it next, which replaces a removal
+  and a placement.
 
-and the fewest moves to the goal are shortest paths over all states, by sweeps from the goal.
+The fewest moves to the goal are shortest paths in this graph, found by sweeps from the goal.
 
-**Why nothing else is needed.** An object put where the goal does not want it might as well lie
-in the clutter, where it covers nothing: no plan with such a move is shorter (some are as
-short, see :func:`ties_on_tower`). One thing more can shorten a plan: to take apart what
-*matches*. With towers ``a = X``, ``b`` empty, ``e = X W V`` and goals ``a = X``, ``b = X V W``
-the object of ``a`` is given to ``b`` and replaced at the end by that of ``e``: four moves, not
-five. In a shortest plan the lowest object so taken from ``a`` goes straight onto another tower
-``b``, and its duplicate comes straight from a third tower ``e`` (else leaving it is shorter).
-``cut`` is the lowest level for which such ``b`` and ``e`` exist; mostly there are none, ``cut``
-is ``m``, states follow one another in one order and one sweep is enough.
+**Why other moves are not needed.** An object on a tower that does not need it could as well be
+in the clutter, where it covers nothing: plans with such a move are never shorter (some are
+equally short, see :func:`ties_on_tower`). Only one other move can shorten a plan: the removal
+of an object that *matches*. With towers ``a = X``, ``b`` empty, ``e = X W V`` and goals
+``a = X``, ``b = X V W``, the object of ``a`` is transferred to ``b`` and replaced at the end by
+that of ``e``: four moves instead of five. In a shortest plan the lowest object removed so from
+``a`` is transferred to another tower ``b``, and its duplicate comes from a third tower ``e``
+(otherwise leaving it is shorter). ``cut`` is the lowest level for which such towers ``b`` and
+``e`` exist. Mostly there are none: then ``cut`` is ``m``, and one sweep is enough.
+
+Notation: K clutter slots, C towers, codes of objects as in ``state.py`` (0: no object).
 
 Source: docs/method.md 1.2; tests compare the number of moves with breadth-first search.
 """
@@ -35,44 +38,44 @@ from app.sim.core.jit import kernel
 Ints = NDArray[np.int64]
 Bytes = NDArray[np.int8]
 FAR = 10_000
-"""Moves from a state that was not reached yet."""
+"""Number of moves of a state from which no path is known yet."""
 
 
 class ShortestPaths(NamedTuple):
-    """The states of one task, and work space; made once, for any task of its shape."""
+    """State graph of one task, and work space; reused for all tasks of a shape."""
 
     n: Ints
     """Number of states of each tower, shape (C,)."""
     stride: Ints
     """Increment of the state's number per step of each tower, shape (C,)."""
     junk: Ints
-    """Objects above the matching levels at the start, ``R``, shape (C,)."""
+    """Objects above the matching levels at the start (``R``), shape (C,)."""
     match: Ints
-    """Matching levels at the start, ``m``, shape (C,)."""
+    """Matching levels at the start (``m``), shape (C,)."""
     cut: Ints
-    """Lowest level that plans may take apart, shape (C,)."""
+    """Lowest matching level that a plan may remove, shape (C,)."""
     at: Ints
-    """Progress of each tower now, shape (C,)."""
+    """Present progress of each tower, shape (C,)."""
     top: Bytes
-    """Object on top by tower and progress, 0 where none may be taken, shape (C, 2 K + 1)."""
+    """Code of the top object by tower and progress, 0 if none may be removed, (C, 2 K + 1)."""
     want: Bytes
-    """Object wanted next by tower and progress, 0 where none, shape (C, 2 K + 1)."""
+    """Code of the next object by tower and progress, 0 if none, shape (C, 2 K + 1)."""
     below: Ints
-    """Progress after a removal, shape (C, 2 K + 1)."""
+    """Progress after a removal, by tower and progress, shape (C, 2 K + 1)."""
     held: NDArray[np.int16]
     """Objects of each code on a tower by progress, shape (C, 2 K + 1, 1 + codes)."""
     left: Ints
-    """Objects of each code on no tower from the c-th on, shape (C + 1, 1 + codes)."""
+    """Objects of each code on none of the towers c, c + 1, ..., shape (C + 1, 1 + codes)."""
     table: NDArray[np.int16]
-    """Fewest moves from every state."""
+    """Fewest moves to the goal by number of the state, shape (most_states,)."""
     seen: Bytes
-    """Work space of searches: zero outside of them; as ``table``."""
+    """1 for states that a search has found; zero between searches, shape (most_states,)."""
     line: NDArray[np.int32]
-    """Work space of searches: states met; as ``table``."""
+    """Numbers of the states that a search has found, shape (most_states,)."""
 
 
 def most_states(n_slots: int, n_colours: int) -> int:
-    """Return the largest number of states of a task, with K removals and K goals."""
+    """Return the largest number of states of a task: K removals and K levels of goals."""
     each, more = divmod(2 * n_slots, n_colours)
     return int((each + 2) ** more * (each + 1) ** (n_colours - more))
 
@@ -100,7 +103,7 @@ def new_shortest_paths(n_slots: int, n_colours: int, n_sizes: int) -> ShortestPa
 
 
 @kernel()
-def _stands(codes: Bytes, lowest: int, end: int, code: int) -> bool:
+def _holds(codes: Bytes, lowest: int, end: int, code: int) -> bool:
     """Return whether ``code`` is at one of the levels ``lowest .. end - 1``."""
     for level in range(lowest, end):
         if codes[level] == code:
@@ -109,16 +112,16 @@ def _stands(codes: Bytes, lowest: int, end: int, code: int) -> bool:
 
 
 @kernel()
-def _lends(
+def _can_donate(
     a: int, towers: Bytes, heights: Ints, goal: Bytes, goal_heights: Ints, p: ShortestPaths
 ) -> bool:
-    """Return whether tower ``a`` might lend its object at level ``cut`` (module docstring)."""
+    """Return whether a tower needs the object of ``a`` at ``cut``, and a third has another."""
     code = goal[a, p.cut[a]]
     for b in range(len(p.cut)):
-        if b == a or not _stands(goal[b], p.cut[b], goal_heights[b], code):
+        if b == a or not _holds(goal[b], p.cut[b], goal_heights[b], code):
             continue
         for e in range(len(p.cut)):
-            if e not in (a, b) and _stands(towers[e], p.cut[e], heights[e], code):
+            if e not in (a, b) and _holds(towers[e], p.cut[e], heights[e], code):
                 return True
     return False
 
@@ -127,10 +130,10 @@ def _lends(
 def _find_cuts(
     towers: Bytes, heights: Ints, goal: Bytes, goal_heights: Ints, p: ShortestPaths
 ) -> None:
-    """Write matching levels and cuts.
+    """Write ``match``, ``junk`` and ``cut``.
 
-    Cuts rise from 0 as long as one's object has no tower to go to or none to come from: what
-    remains is at or below the cut of every shortest plan.
+    A cut rises from 0 while no tower needs its object or none has a duplicate: no shortest plan
+    removes a matching object below it.
     """
     c_most = len(p.cut)
     for c in range(c_most):
@@ -143,7 +146,7 @@ def _find_cuts(
     while rising:
         rising = False
         for c in range(c_most):
-            while p.cut[c] < p.match[c] and not _lends(
+            while p.cut[c] < p.match[c] and not _can_donate(
                 c, towers, heights, goal, goal_heights, p
             ):
                 p.cut[c] += 1
@@ -160,7 +163,7 @@ def _add(held: NDArray[np.int16], source: int, target: int, code: int) -> None:
 
 @kernel()
 def _lay_tower(c: int, tower: Bytes, goal: Bytes, goal_height: int, p: ShortestPaths) -> None:
-    """Write the states of one tower: top, want, below and held."""
+    """Write ``top``, ``want``, ``below`` and ``held`` of one tower by progress."""
     junk, match, cut = p.junk[c], p.match[c], p.cut[c]
     held = p.held[c]
     for x in range(held.shape[1]):
@@ -224,8 +227,8 @@ def lay_out(
         towers: Objects on the towers, lowest first, shape (C, K).
         heights: Objects per tower, shape (C,).
         goal: Goal of the towers, shape (C, K).
-        goal_heights: Objects per tower there, shape (C,).
-        p: The states, written.
+        goal_heights: Objects per tower of the goal, shape (C,).
+        p: State graph; all but ``table`` is written.
 
     Returns:
         Number of states; 0 where the goal cannot be met, or there are more than K objects.
@@ -243,7 +246,7 @@ def lay_out(
 
 @kernel()
 def _count_left(c: int, at: Ints, p: ShortestPaths) -> None:
-    """Write ``left`` of the towers up to ``c``, except the first."""
+    """Write ``left`` of the towers 1 to ``c`` at the progress ``at``, shape (C,)."""
     for d in range(c, 0, -1):
         for x in range(p.left.shape[1]):
             p.left[d, x] = p.left[d + 1, x] - p.held[d, at[d], x]
@@ -296,8 +299,8 @@ def fill(size: int, at: Ints, p: ShortestPaths) -> None:
 
     Args:
         size: Number of states.
-        at: Work space, shape (C,).
-        p: The states; ``table`` is written.
+        at: Work space for the progress of each tower, shape (C,).
+        p: State graph; ``table`` is written.
     """
     for index in range(size - 1):
         p.table[index] = FAR
@@ -311,7 +314,7 @@ def fill(size: int, at: Ints, p: ShortestPaths) -> None:
 
 @kernel()
 def state_number(p: ShortestPaths) -> int:
-    """Return the number of the state that the towers are in now."""
+    """Return the number of the present state, that of the progress ``at``."""
     index = 0
     for c in range(len(p.at)):
         index += p.at[c] * p.stride[c]
@@ -320,7 +323,7 @@ def state_number(p: ShortestPaths) -> int:
 
 @kernel()
 def in_clutter(index: int, code: int, p: ShortestPaths) -> int:
-    """Return the number of objects of a code in the clutter."""
+    """Return the number of objects of a code in the clutter in the state ``index``."""
     n_towers = len(p.n)
     count: int = p.left[n_towers, code]
     for c in range(n_towers):
@@ -329,8 +332,8 @@ def in_clutter(index: int, code: int, p: ShortestPaths) -> int:
 
 
 @kernel()
-def _meet(index: int, found: int, p: ShortestPaths) -> int:
-    """Add a state to the search, once; return the number of states."""
+def _add_state(index: int, found: int, p: ShortestPaths) -> int:
+    """Add a state to the search, once; return the number of states found."""
     if p.seen[index] == 0:
         p.seen[index] = 1
         p.line[found] = index
@@ -343,7 +346,7 @@ def _search_from(index: int, still: int, code: int, found: int, p: ShortestPaths
     """Add the states on shortest plans from one while tower ``still`` is unchanged.
 
     Returns:
-        Number of states noted; -1 where ``code`` may be placed from the clutter here.
+        Number of states found; -1 where ``code`` may be placed from the clutter here.
     """
     wanted = p.table[index] - 1
     for d in range(len(p.n)):
@@ -355,17 +358,17 @@ def _search_from(index: int, still: int, code: int, found: int, p: ShortestPaths
         if want != 0 and p.table[placed] == wanted and in_clutter(index, want, p) > 0:
             if want == code:
                 return -1
-            found = _meet(placed, found, p)
+            found = _add_state(placed, found, p)
         if top == 0:
             continue
         removed = index + (p.below[d, q] - q) * p.stride[d]
         if p.table[removed] == wanted:
-            found = _meet(removed, found, p)
+            found = _add_state(removed, found, p)
         for e in range(len(p.n)):
             if e in (d, still) or p.want[e, index // p.stride[e] % p.n[e]] != top:
                 continue
             if p.table[removed + p.stride[e]] == wanted:
-                found = _meet(removed + p.stride[e], found, p)
+                found = _add_state(removed + p.stride[e], found, p)
     return found
 
 
@@ -379,9 +382,10 @@ def ties_on_tower(index: int, still: int, code: int, p: ShortestPaths) -> bool:
     Args:
         index: State after the removal to the clutter, on a shortest plan.
         still: Tower on which it is put.
-        p: The states, ``table`` filled.
+        code: Code of the object.
+        p: State graph, ``table`` filled.
     """
-    found = _meet(index, 0, p)
+    found = _add_state(index, 0, p)
     looked, ties = 0, False
     while looked < found and not ties:
         more = _search_from(p.line[looked], still, code, found, p)

@@ -27,8 +27,14 @@ NONE = -1
 
 
 @kernel()
-def safest_cell(code: int, clutter: Bytes, fail: Vec) -> int:
-    """Return the least risky slot that holds a code (0: a free one), -1 without one."""
+def safest_slot(code: int, clutter: Bytes, fail: Vec) -> int:
+    """Return the least risky slot that contains an object (code 0: a free slot), -1 if none.
+
+    Args:
+        code: Code of the object.
+        clutter: Objects in the slots, shape (K,).
+        fail: Failure probabilities of the slots, shape (K,).
+    """
     best = -1
     for k in range(len(clutter)):
         if clutter[k] == code and (best < 0 or fail[k] < fail[best]):
@@ -48,7 +54,7 @@ def worst_free(clutter: Bytes, fail: Vec) -> int:
 
 @kernel()
 def still_wanted(code: int, goal: Bytes, goal_heights: Ints, p: ShortestPaths) -> int:
-    """Return the number of missing objects of a code on the towers."""
+    """Return how many objects of a code the towers still need for the goal."""
     count = 0
     for c in range(len(p.at)):
         level = p.match[c] if p.at[c] < p.junk[c] else p.at[c] - p.junk[c] + p.cut[c]
@@ -78,9 +84,9 @@ def _next_risk(code: int, wanted: int, clutter: Bytes, fail: Vec, free: int) -> 
 
 
 @kernel()
-def _cell_for(code: int, wanted: int, clutter: Bytes, fail: Vec) -> int:
+def _slot_for(code: int, wanted: int, clutter: Bytes, fail: Vec) -> int:
     """Return the slot for a removed object: the best one if it is picked again."""
-    free = safest_cell(0, clutter, fail)
+    free = safest_slot(0, clutter, fail)
     if free < 0:
         return -1
     safer = 0
@@ -114,7 +120,7 @@ def _placement(index: int, clutter: Bytes, fail: Vec, p: ShortestPaths) -> int:
         want = p.want[c, p.at[c]]
         if want == 0 or p.table[index + p.stride[c]] != p.table[index] - 1:
             continue
-        k = safest_cell(want, clutter, fail)
+        k = safest_slot(want, clutter, fail)
         if k >= 0 and fail[k] < least:
             best, least = k * n_towers + c, fail[k]
     return best
@@ -127,7 +133,7 @@ def _removal(
     """Return the action of the least risky removal of a shortest plan, -1 without one."""
     n_slots, n_towers = len(clutter), len(p.at)
     best, least = NONE, 2.0
-    free = safest_cell(0, clutter, fail)
+    free = safest_slot(0, clutter, fail)
     for c in range(n_towers):
         top = p.top[c, p.at[c]]
         removed = index + (p.below[c, p.at[c]] - p.at[c]) * p.stride[c]
@@ -139,7 +145,7 @@ def _removal(
         wanted = still_wanted(top, goal, goal_heights, p)
         risk = _next_risk(top, wanted, clutter, fail, free)
         if risk < least:
-            k = _cell_for(top, wanted, clutter, fail)
+            k = _slot_for(top, wanted, clutter, fail)
             best, least = n_slots * n_towers + c * n_slots + k, risk
     return best
 
@@ -151,9 +157,9 @@ def choose(clutter: Bytes, goal: Bytes, goal_heights: Ints, fail: Vec, p: Shorte
     Args:
         clutter: Objects in the slots, shape (K,).
         goal: Goal of the towers, shape (C, K).
-        goal_heights: Objects per tower there, shape (C,).
+        goal_heights: Objects per tower of the goal, shape (C,).
         fail: Failure probabilities of the slots, shape (K,).
-        p: The states, ``table`` filled, the towers at ``at``.
+        p: State graph, ``table`` filled; ``at`` is the present state.
     """
     index = state_number(p)
     if p.table[index] == 0:
@@ -174,7 +180,7 @@ def mark_first(clutter: Bytes, p: ShortestPaths, first: NDArray[np.bool_]) -> No
 
     Args:
         clutter: Objects in the slots, shape (K,).
-        p: The states, ``table`` filled, the towers at ``at``.
+        p: State graph, ``table`` filled; ``at`` is the present state.
         first: Marks, shape (n_actions,), written.
     """
     n_slots, n_towers = len(clutter), len(p.at)
