@@ -28,8 +28,9 @@ def measured_report(settings: Settings, episodes: int | None) -> Mapping[str, An
         episodes: Episodes of each evaluation, where it admits so many; None for its own number.
 
     Raises:
-        NotReady: No server answers, or its shipped checkpoints are not stored yet.
-        Conflict: The server refuses the job, or it was cancelled or has failed.
+        NotReady: No server answers.
+        Conflict: The server refuses the job, also while it starts; or the job was cancelled or
+            has failed.
     """
     address = settings.worker_address
     try:
