@@ -52,7 +52,8 @@ def report(
                 raise
             remedy = ".venv/bin/pip install '.[client]', or add --quick"
             raise MissingPackage("httpx", "measuring by the server", remedy) from None
-        result = job.measured_report(settings, episodes)
+        written = output.stat().st_mtime if output.exists() else 0.0
+        result = job.measured_report(settings, episodes, written)
         text, missing, failed = result["markdown"], result["missing"], result["failed"]
     output.parent.mkdir(parents=True, exist_ok=True)
     write_output(output, text.encode())

@@ -17,7 +17,7 @@ from app.policies.report.page import evaluations
 from app.store import jobs
 from app.store.database.migrate import migrate
 from app.store.engine import Store
-from tests.jobs.composed.test_reports import look, run_one
+from tests.jobs.composed.test_reports import look, post, run_one
 from tests.jobs.remote.serving import TOKEN, serving
 from tests.support.waiting import wait_until
 
@@ -79,6 +79,30 @@ def test_the_command_measures_as_a_job_and_goes_on_with_it_when_repeated(
     assert json.loads(out)["failed"] == []
     assert f"0 of {len(evaluations())} evaluations" in said
     assert len(jobs.list_jobs(store, part_of=jobs.NO_PARTS).items) == 1
+
+
+def test_a_job_that_ended_without_the_command_is_delivered_once(
+    store: Store, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    page = tmp_path / "report.md"
+    page.write_text("an older page", encoding="utf-8")
+    posted = post(store, measure=True, episodes=7)
+    look(store, posted)
+    while look(store, posted).state == "running":
+        run_one(store)
+    command = Command(page)
+    command.join()
+    assert command.status == 0
+    assert "12.34 % (10.00-20.00)" in page.read_text(encoding="utf-8")
+    assert "job 1 of" in (said := capsys.readouterr().err) and "has measured" in said
+
+    command = Command(page)  # its page is written: a new job
+    wait_until(lambda: len(jobs.list_jobs(store, part_of=jobs.NO_PARTS).items) == 2)
+    newest = jobs.list_jobs(store, part_of=jobs.NO_PARTS).items[0]
+    jobs.request_cancel(store, newest.id)
+    wait_until(lambda: look(store, newest).state == "cancelled")
+    command.join()
+    assert command.status == 1
 
 
 def test_without_a_server_the_command_says_what_to_do(
