@@ -29,8 +29,9 @@ def curve_of_run(folder: Path, per_target: int | None) -> Json:
     """Return the curve of a training: its points, and its policies on all targets."""
     points, n = lines(folder / "curve.jsonl"), per_target or PER_TARGET
     spent = {one["step"]: one["cpu_s"] for one in points}
-    targets = []
+    targets, commits = [], list[str]()
     for checkpoint in policies(folder):
+        commits = checkpoint.manifest["commits"]
         rates = ReachBench(checkpoint, SEED).on_targets(n).rates()
         step = checkpoint.manifest["step"]
         ends = {end: rates[end]["mean"] for end in ENDS}
@@ -38,6 +39,7 @@ def curve_of_run(folder: Path, per_target: int | None) -> Json:
     return {
         "name": points[0]["preset"],
         "seed": points[0]["seed"],
+        "commits": commits,
         "episodes_per_target": n,
         "played": [
             {key: one[key] for key in ("step", "cpu_s", *ENDS)}
