@@ -1,4 +1,4 @@
-"""Offline generators, run by hand.
+"""Offline generators, run by hand; compiled kernels are kept in ``data``, as those of tests.
 
 arguments               Arguments of the generators and scripts
 augmentation            Variation of the elbow along the same palm path, an augmentation of
@@ -21,3 +21,10 @@ train_motion_predictor  Train the shipped motion predictor of pedestrians
 train_worker_predictor  Train the shipped motion predictor of workers
 docs/                   Scripts that measure, draw and write the result pages of ``docs``
 """
+
+import os
+from pathlib import Path
+
+from app.sim.core.kernel_cache import kernel_cache
+
+os.environ.setdefault("NUMBA_CACHE_DIR", str(kernel_cache(Path(__file__).parents[1] / "data")))

@@ -5,12 +5,16 @@ instruction per array) took more than half of a step's time. Without reference c
 cannot allocate arrays: its caller allocates the work space, once per batch.
 """
 
+import os
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any, ParamSpec, TypeVar
 
+import numba
 from numba import typeof
 
 from app.sim.core.dispatcher import Kernel
+from app.sim.core.kernel_cache import kernel_cache
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -19,6 +23,19 @@ FAST = {"contract", "nsz", "arcp"}
 """Fast-math flags: fused multiply-add, signs of zero, reciprocals."""
 FAR = 1e3
 """Distance where nothing is near [m]."""
+
+
+def _keep_by_version() -> None:
+    """Keep compiled kernels in a folder of this version where the program has set none.
+
+    numba would keep them beside the sources and use them after an update, in part.
+    """
+    if not numba.config.CACHE_DIR:
+        user = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
+        numba.config.CACHE_DIR = str(kernel_cache(Path(user) / "tandem"))
+
+
+_keep_by_version()
 
 
 def kernel(**options: Any) -> Callable[[Callable[P, R]], Callable[P, R]]:

@@ -2,7 +2,7 @@
 
 numba compiles a function again when *its* file changes, but not when a function changes that it
 calls from another file: after an update it would go on with old code. So the folder's name is
-a fingerprint of all kernels.
+a fingerprint of all kernels. It must be set before numba is imported.
 """
 
 import hashlib
