@@ -135,6 +135,29 @@ def queued(
             submitted=submitted,
         )
         services.supervisor.wake()
+    return _located(job, response)
+
+
+def repeated(
+    services: Services, response: Response, key: str | None, submitted: Mapping[str, Any]
+) -> JobPublic | None:
+    """Return the job that the same action on another job has queued; None: none yet.
+
+    The other job may have been deleted since.
+
+    Args:
+        key: Idempotency key of the request.
+        submitted: As for :func:`queued`.
+
+    Raises:
+        Conflict: The key was used for another request.
+    """
+    job = None if key is None else jobs.find_repetition(services.store, key, submitted)
+    return None if job is None else _located(job, response)
+
+
+def _located(job: JobRecord, response: Response) -> JobPublic:
+    """Return a queued job, with its address in the answer."""
     response.headers["Location"] = f"/v1/jobs/{job.id}"
     return JobPublic.from_domain(job)
 

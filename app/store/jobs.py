@@ -18,7 +18,7 @@ from typing import Any, get_args
 
 import sqlalchemy as sa
 
-from app.digests import digest
+from app.digests import digest, has_digest
 from app.errors import Conflict, InvalidInput, NotFound, WrongState
 from app.store.cursors import read_page
 from app.store.database.reserve import write_with_reserve
@@ -90,6 +90,28 @@ def find_submission(
     key = _key_of(new, idempotency_key, submitted)
     with store.reading() as connection:
         return _submitted_before(connection, new, key)
+
+
+def find_repetition(
+    store: Store, idempotency_key: str, submitted: Mapping[str, Any]
+) -> JobRecord | None:
+    """Return the job that the same action on another job, even a deleted one, has queued.
+
+    Args:
+        idempotency_key, submitted: As for :func:`create_job`.
+
+    Returns:
+        The job; None before it was queued, and where it was queued without a digest.
+
+    Raises:
+        Conflict: The key was used for another submission.
+    """
+    with store.reading() as connection:
+        earlier = _job_of_key(connection, idempotency_key)
+    if earlier is None or earlier.submission_digest is None:
+        return None
+    _require_same(earlier, same=has_digest(earlier.submission_digest, submitted))
+    return earlier
 
 
 def get_job(store: Store, job_id: str) -> JobRecord:
@@ -286,11 +308,18 @@ def _submitted_before(
     connection: sa.Connection, new: NewJob, key: Mapping[str, str]
 ) -> JobRecord | None:
     """Return the job with the key of a submission; refuse another submission under it."""
-    same_key = jobs.c.idempotency_key == key["idempotency_key"]
-    earlier = next(iter(select_jobs(connection, same_key)), None)
+    earlier = _job_of_key(connection, key["idempotency_key"])
     if earlier is not None:
-        _require_same(earlier, new, key["submission_digest"])
+        same = earlier.submission_digest == key["submission_digest"]
+        if earlier.submission_digest is None:  # a job queued before migration 0015
+            same = dict(earlier.spec) == dict(new.spec)
+        _require_same(earlier, same=same)
     return earlier
+
+
+def _job_of_key(connection: sa.Connection, idempotency_key: str) -> JobRecord | None:
+    same_key = jobs.c.idempotency_key == idempotency_key
+    return next(iter(select_jobs(connection, same_key)), None)
 
 
 def _insert(connection: sa.Connection, new: NewJob, key: Mapping[str, str]) -> JobRecord:
@@ -351,11 +380,8 @@ def _cancel(connection: sa.Connection, job: JobRecord) -> None:
     append_event(connection, job.id, job.last_event + 1, "state", data=data)
 
 
-def _require_same(earlier: JobRecord, new: NewJob, submission: str) -> None:
+def _require_same(earlier: JobRecord, *, same: bool) -> None:
     """Refuse another submission under the key of an earlier one."""
-    same = earlier.submission_digest == submission
-    if earlier.submission_digest is None:  # a job queued before migration 0015
-        same = dict(earlier.spec) == dict(new.spec)
     if not same:
         raise Conflict(
             f"idempotency key {earlier.idempotency_key!r} belongs to job {earlier.id}, which "

@@ -11,6 +11,7 @@ from app.api.job_requests import (
     JobDep,
     known_spec,
     queued,
+    repeated,
     require_named,
     shown,
     stored_references,
@@ -94,7 +95,7 @@ def resume_job(
     responses=REPEATED,
 )
 def retry_job(
-    job: JobDep,
+    job_id: str,
     services: ServicesDep,
     response: Response,
     idempotency_key: IdempotencyKey = None,
@@ -103,6 +104,10 @@ def retry_job(
 
     The first job stays as it is; its notes are not copied.
     """
+    submitted = {"retry": job_id}
+    if (earlier := repeated(services, response, idempotency_key, submitted)) is not None:
+        return earlier
+    job = jobs.get_job(services.store, job_id)
     labels = {"name": job.name, "priority": job.priority}
     spec = known_spec(job)
     if spec.get("checkpoint") is not None:
@@ -114,7 +119,7 @@ def retry_job(
         job_actions.require_repeatable(job, "retry")
         require_named(body, new, services)
 
-    return queued(new, services, response, idempotency_key, check, {"retry": job.id})
+    return queued(new, services, response, idempotency_key, check, submitted)
 
 
 @router.post(
@@ -124,7 +129,7 @@ def retry_job(
     responses=REPEATED,
 )
 def clone_job(
-    job: JobDep,
+    job_id: str,
     services: ServicesDep,
     response: Response,
     changes: Annotated[dict[str, Any], CHANGES],
@@ -134,13 +139,16 @@ def clone_job(
 
     Name, notes and priority are those of the changes, or the defaults.
     """
+    submitted = {"clone": job_id, "changes": changes}
+    if (earlier := repeated(services, response, idempotency_key, submitted)) is not None:
+        return earlier
+    job = jobs.get_job(services.store, job_id)
     body = validated(SPEC_TYPES[job.kind], merge({**known_spec(job), **budgets(job)}, changes))
     new = replace(body.new_job(), parent=job.id)
 
     def check() -> None:
         require_named(body, new, services)
 
-    submitted = {"clone": job.id, "changes": changes}
     return queued(new, services, response, idempotency_key, check, submitted)
 
 

@@ -69,6 +69,21 @@ def test_repetition_is_the_same_job_after_its_parent_was_changed(
     assert (again.status_code, again.json()["id"]) == (202, first["id"])
 
 
+@pytest.mark.parametrize("action", ["retry", "clone"])
+def test_repetition_is_the_same_job_after_its_parent_was_deleted(
+    idle: TestClient, ended: str, action: str
+) -> None:
+    first = idle.post(f"{ended}/{action}", json={}, headers=KEY).json()
+    idle.delete(ended).raise_for_status()
+    again = idle.post(f"{ended}/{action}", json={}, headers=KEY)
+    assert (again.status_code, again.json()["id"]) == (202, first["id"])
+    assert again.headers["location"] == f"/v1/jobs/{first['id']}"
+    other = idle.post(f"{ended}/clone", json={"seed": 1}, headers=KEY)
+    assert other.status_code == 409
+    new = idle.post(f"{ended}/{action}", json={}, headers={"Idempotency-Key": "z2"})
+    assert new.status_code == 404
+
+
 @pytest.mark.parametrize("action", ["", "/retry", "/clone"])
 def test_repetition_is_the_same_job_after_its_cell_was_removed(
     idle: TestClient, action: str
