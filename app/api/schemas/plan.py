@@ -62,7 +62,8 @@ class PlanRequest(SortingFields):
     previous: Word | None = Field(
         None,
         description="station of the last answer's motion, for hysteresis: that of `pick`, or "
-        "of `place` while an object is held; null: none",
+        "of `place` while an object is held; one to which no motion is offered counts as none, "
+        "and is refused in the phase `lift`; null: none",
     )
     phase: Phase = Field(
         "approach", description="phase of the motion to `previous`, as in `/v1/task-selection`"

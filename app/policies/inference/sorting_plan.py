@@ -65,7 +65,7 @@ class PlanQuery:
     held: int | None = None
     """Position from which the held object was picked; None: the gripper is empty."""
     previous: str | None = None
-    """Station of the last choice, for hysteresis."""
+    """Station of the last choice, for hysteresis; one that is not offered counts as none."""
     progress: PickProgress = NOT_BEGUN
     """Progress of the motion to it."""
     time_left_s: float = 10.0
@@ -149,8 +149,8 @@ class SortingPlanner:
         """Choose the next move and its motion.
 
         Raises:
-            InvalidInput: The goal cannot be met, no move can be reached, or a value of the
-                query is invalid.
+            InvalidInput: The goal cannot be met, no move can be reached, the object that is
+                lifted is not offered, or a value of the query is invalid.
         """
         started, held = time.perf_counter(), query.held
         qdd = self._limits.take(query.q, query.qd, query.qdd).clamped.qdd
@@ -255,11 +255,19 @@ class SortingPlanner:
         for move in near.moves:
             end = self._ends(query.state, move)[int(held)]
             targets[move.place if held else move.pick] = end
+        candidates = self._candidates(targets)
+        offered = tuple(one.id for one in candidates)
+        if query.progress.phase == LIFT and query.previous not in offered:
+            rule = (
+                "must be the station of an offered motion in the phase lift; an object that is "
+                "in the gripper is sent as held"
+            )
+            raise InvalidInput("previous", query.previous, rule, offered)
         decision = self._policy.decide(
             query.q,
             query.qd,
             query.people,
-            self._candidates(targets),
+            candidates,
             previous=query.previous,
             progress=query.progress,
             time_left_s=query.time_left_s,

@@ -130,3 +130,12 @@ def test_policy_that_sorts_is_refused(client: TestClient) -> None:
 def test_previous_is_a_station(client: TestClient, changes: dict[str, Any]) -> None:
     found = refused(client, **changes)
     assert found["field"] == "previous" and "red" in found["choices"]
+
+
+def test_lift_of_an_object_that_is_not_offered_is_refused(client: TestClient) -> None:
+    found = refused(client, previous="blue", phase="lift")
+    assert (found["field"], found["value"]) == ("previous", "'blue'")
+    assert "offered motion in the phase lift" in found["rule"]
+    offered = [one["pick"]["station"] for one in asked(client)["moves"]]
+    assert set(found["choices"]) == set(offered)
+    assert asked(client, previous="blue")["symbol"] == "pick"

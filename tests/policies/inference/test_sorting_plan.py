@@ -203,6 +203,24 @@ def test_object_being_lifted_stays_chosen() -> None:
     assert found.decision is not None and found.decision.chosen == lifted
 
 
+@pytest.mark.parametrize(("held", "offered"), [(None, ("cell5", "cell9")), (5, ("red",))])
+def test_lift_at_a_station_that_is_not_offered_is_refused(
+    held: int | None, offered: tuple[str, ...]
+) -> None:
+    progress = PickProgress(phase=LIFT, closing_s=1.3)
+    asked = query(task(5, 9), held=held, previous="cell7", progress=progress)
+    with pytest.raises(InvalidInput, match="an offered motion in the phase lift") as refused:
+        planner().plan(asked)
+    assert (refused.value.field, refused.value.value) == ("previous", "cell7")
+    assert set(refused.value.choices) == set(offered)
+
+
+def test_previous_station_that_is_not_offered_counts_as_none() -> None:
+    fresh, stale = (planner().plan(query(task(5, 9), previous=one)) for one in (None, "cell7"))
+    assert stale.chosen is not None and fresh.chosen is not None
+    assert stale.chosen.move == fresh.chosen.move
+
+
 def test_solved_task_has_neither_options_nor_segment() -> None:
     found = planner().plan(query(empty_state(SHAPE)))
     assert (found.chosen, found.segment, found.symbol) == (None, None, None)
