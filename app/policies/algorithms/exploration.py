@@ -121,6 +121,10 @@ class OUNoise(Exploration):
 class OptionExploration(Exploration):
     """AR(1) noise, and temporally extended options in every second noisy environment.
 
+    Deviates: an option does not end with its episode. It goes on in the next episode of the
+    environment until its duration is over, toward the goal that it had. The shipped pick
+    policies were trained so, and other trainings with AR(1) noise would get other bits.
+
     Args:
         configurations: Goals of options besides home [rad], shape (n, 6).
         rate: Probability per control period that an option starts.
