@@ -14,6 +14,7 @@ from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from fastapi import FastAPI
 from opentelemetry.trace import NoOpTracerProvider, Tracer, TracerProvider
 from starlette.concurrency import run_in_threadpool
@@ -332,24 +333,30 @@ def start_world(
 
 
 def build_task_policy(manifest: Mapping[str, Any], tensors: bytes) -> TaskPolicy:
-    """Return the task-selection policy of a checkpoint."""
+    """Return the task-selection policy of a checkpoint, whose numbers are finite."""
     checkpoint = load(manifest, tensors)
     require_purpose(checkpoint, CHOOSING)
-    return TaskChooser(checkpoint)
+    with np.errstate(all="ignore"):  # numbers that overflow are refused
+        policy = TaskChooser(checkpoint)
+        policy.require_finite()
+    return policy
 
 
 def build_sorting_policy(manifest: Mapping[str, Any], tensors: bytes) -> SortingValues:
-    """Return the sorting policy of a checkpoint."""
+    """Return the sorting policy of a checkpoint, whose values are finite."""
     checkpoint = load(manifest, tensors)
     require_purpose(checkpoint, SORTING)
-    return SortingPolicy(checkpoint)
+    policy = SortingPolicy(checkpoint)
+    policy.require_finite()
+    return policy
 
 
 def build_reach_policy(manifest: Mapping[str, Any], tensors: bytes) -> MotionDecider:
-    """Return the reach policy of a checkpoint, with compiled kernels."""
+    """Return the reach policy of a checkpoint, with compiled kernels and finite actions."""
     actor = ReachPolicy(load(manifest, tensors))
     decider = MotionDecider(actor, cell_of(manifest))
-    decider.warm_up()
+    with np.errstate(all="ignore"):  # actions that overflow are refused
+        decider.warm_up()
     return decider
 
 

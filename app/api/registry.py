@@ -218,7 +218,8 @@ class PolicyRegistry(Generic[P]):
 
         Raises:
             InvalidInput: The manifest breaks a rule.
-            CheckpointMismatch: It is of another kind, or its tensors do not fit.
+            CheckpointMismatch: It is of another kind, its tensors do not fit, or its numbers
+                overflow.
         """
         self._build(manifest, tensors)
 
@@ -230,7 +231,7 @@ class PolicyRegistry(Generic[P]):
 
         Raises:
             InvalidInput: Nothing has that name.
-            CheckpointMismatch: It is a policy of another kind.
+            CheckpointMismatch: It is a policy of another kind, or its numbers overflow.
             Damaged: It is damaged, and not shipped.
         """
         policy = self._loaded(reference)

@@ -144,7 +144,7 @@ def newest_for(
         if purpose_of(record.manifest) == purpose and is_for(record.manifest, cell):
             try:
                 return policies.load(record.sha256)
-            except (Damaged, InvalidInput) as error:  # damaged, or deleted since
+            except (CheckpointMismatch, Damaged, InvalidInput) as error:  # or deleted since
                 logger.warning("left out for cell %s: %s", cell.name, error.message)
     return None
 

@@ -4,7 +4,9 @@ Rollouts of an untrained policy end in collisions, so that every candidate is si
 of episodes with rollouts take a fraction of the time with the shipped policy.
 """
 
+import numpy as np
 import torch
+from numpy.typing import NDArray
 
 from app.policies.checkpoints import checkpoint as formats
 from app.policies.checkpoints import pretrained
@@ -86,3 +88,19 @@ def overflowing_reach() -> Checkpoint:
     arrays["actor.net.2.weight"][:] = 3e38
     arrays["actor.net.4.weight"][:, ::2], arrays["actor.net.4.weight"][:, 1::2] = 1.0, -1.0
     return formats.pack(whole.manifest, arrays)
+
+
+def overflowing(alias: str, part: str = "") -> Checkpoint:
+    """Return a shipped policy with weights so large that sums overflow, although finite.
+
+    Args:
+        part: Start of the names of its changed tensors.
+    """
+    shipped = pretrained.load(alias)
+
+    def changed(name: str, array: NDArray[np.float32]) -> NDArray[np.float32]:
+        is_weight = name.startswith(part) and name.endswith("weight")
+        return np.copysign(np.float32(3e38), array) if is_weight else array
+
+    arrays = {name: changed(name, array) for name, array in shipped.arrays().items()}
+    return formats.pack(shipped.manifest, arrays)

@@ -58,7 +58,10 @@ def list_checkpoints(
     openapi_extra=BODY,
     responses={
         **STORED,
-        409: {"description": "Its format, layout or tensors are not of this version"},
+        409: {
+            "description": "Its format, layout or tensors are not of this version, or its "
+            "networks give numbers that are not finite"
+        },
     },
 )
 async def upload_checkpoint(

@@ -19,8 +19,11 @@ from app.policies.configs.fields import read_config
 from app.policies.configs.sorting import SortingPreset
 from app.policies.inference.trained_policy import TrainedPolicy
 from app.policies.networks.sorting_q import NETWORKS, layout_of
-from app.sim.sorting.batch import Obs, shape_of
+from app.sim.sorting.batch import Obs, batch_in, shape_of
 from app.sim.sorting.state import SortingShape
+
+_N_PROBED = 32
+"""Number of tasks by which the values of a policy are checked."""
 
 
 class SortingPolicy(TrainedPolicy):
@@ -63,3 +66,13 @@ class SortingPolicy(TrainedPolicy):
         with torch.inference_mode():
             found: NDArray[np.float32] = self._network(torch.as_tensor(obs)).numpy()
         return found
+
+    def require_finite(self) -> None:
+        """Check that the values of moves are finite in tasks of the training cell.
+
+        Raises:
+            CheckpointMismatch: A value is not finite: sums of large weights overflow.
+        """
+        tasks = batch_in(self._cell, _N_PROBED, seed=0)
+        if not np.isfinite(self.values(tasks.reset())).all():
+            raise CheckpointMismatch("value", "finite numbers", "NaN or infinite")

@@ -72,6 +72,10 @@ _LOWEST, _HIGHEST = np.full(3, -10.0), np.full(3, 10.0)
 """Bounds of the coordinates of a candidate [m]."""
 _FAR_PERSON = Person(q=human.rest_posture(*FAR_AWAY), qd=np.zeros(18))
 """Observed person of an empty cell."""
+_NEAR_PERSON = Person(q=human.rest_posture(0.0, 1.0, -math.pi / 2.0), qd=np.zeros(18))
+"""Person in front of the robot."""
+_MAX_PROBED = 32
+"""Most targets by which the numbers of a policy are checked."""
 
 
 def select(
@@ -147,6 +151,20 @@ class TaskChooser(TrainedPolicy):
         self._observer = CandidateObserver(self._cell, n_obs=n_obs, grasp=self.grasp)
         self._limits = StateLimits(self._arm, limits_jerk=False)
         self._ranges = PickTrainingRange(checkpoint)
+
+    def require_finite(self) -> None:
+        """Check that the networks give finite numbers in the training cell.
+
+        The robot is at home, the targets are stations, and a person is there or not.
+
+        Raises:
+            CheckpointMismatch: A number is not finite: sums of large weights overflow.
+        """
+        goals = np.array([one.position for one in self._cell.stations[:_MAX_PROBED]])
+        robot, body = (self._arm.home, np.zeros(6)), self._people.bodies[0]
+        for person in (_FAR_PERSON, _NEAR_PERSON):
+            obs, _ = self._observer.observe(robot, _arrays([(None, person)], body), goals, 10.0)
+            self._networks.require_finite(obs)
 
     def decide(
         self,

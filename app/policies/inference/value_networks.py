@@ -149,9 +149,7 @@ class ValueNetworks:
             Actions, shape (n, 5), values, shape (n,), and predicted outcomes; None where they
             are not asked for or the checkpoint does not predict them.
         """
-        if self._qd_max is not None:
-            state = raw_state(obs, self._qd_max)
-            obs = np.hstack([state, np.zeros((len(obs), CONTROLLED), dtype=np.float32)])
+        obs = self._seen(obs)
         act = np.empty((len(obs), CONTROLLED), dtype=np.float32)
         values, outcomes = np.empty(len(obs), dtype=np.float32), new_prediction(len(obs))
         predict = predict and self.predicts
@@ -168,6 +166,43 @@ class ValueNetworks:
                 self._few = direct(evaluate_few, arguments)
             self._few(*arguments)
         return act, values, outcomes if predict else None
+
+    def require_finite(self, obs: Floats) -> None:
+        """Check that each network gives finite numbers.
+
+        The least of two critics may be finite where one is not.
+
+        Args:
+            obs: Observations, shape (n, n_obs), n at most ``MANY``, contiguous.
+
+        Raises:
+            CheckpointMismatch: A number is not finite: sums of large weights overflow.
+        """
+        act, _, outcomes = self.evaluate(obs)
+        nets, seen = self._networks, self._seen(obs)
+        rows, work = np.hstack([seen, act]), new_columns((nets.actor, *nets.critics))
+
+        def are_finite(layers: Layers, given: Floats) -> bool:
+            columns, constant = np.ascontiguousarray(given.T), np.zeros_like(given[:1])
+            varying = np.ones(given.shape[1], dtype=np.bool_)
+            found = forward_many(layers, columns, constant, varying, work)
+            return bool(np.isfinite(found).all())
+
+        finite = {
+            "action": are_finite(nets.actor, seen),
+            "value": all(are_finite(critic, rows) for critic in nets.critics),
+            "outcome": all(np.isfinite(one).all() for one in outcomes or ()),
+        }
+        for name, is_finite in finite.items():
+            if not is_finite:
+                raise CheckpointMismatch(name, "finite numbers", "NaN or infinite")
+
+    def _seen(self, obs: Floats) -> Floats:
+        """Return the inputs of the networks, which may be the raw state."""
+        if self._qd_max is None:
+            return obs
+        state = raw_state(obs, self._qd_max)
+        return np.hstack([state, np.zeros((len(obs), CONTROLLED), dtype=np.float32)])
 
     def _evaluate_many(
         self,

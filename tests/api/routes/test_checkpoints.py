@@ -11,6 +11,7 @@ from app.policies.checkpoints import checkpoint, pretrained
 from app.policies.checkpoints.upload import MAX_FILE, MAX_MANIFEST
 from tests.api.answers import problem_of
 from tests.api.routes.motion.motion_requests import TASK
+from tests.policies.untrained import overflowing
 from tests.support import workshop
 
 
@@ -124,6 +125,20 @@ def test_upload_whose_tensors_do_not_fit_is_refused(client: TestClient) -> None:
     body = with_tensor("actor.net.4.bias", np.zeros(5, dtype=np.float32))
     answer = client.post("/v1/checkpoints", content=body, headers=FILE)
     assert (answer.status_code, answer.json()["property"]) == (409, "tensors.actor.net.4")
+
+
+@pytest.mark.parametrize(
+    ("alias", "number"), [("pick", "action"), ("reach", "action"), ("sorting-e0", "value")]
+)
+def test_upload_whose_numbers_overflow_is_refused(
+    client: TestClient, alias: str, number: str
+) -> None:
+    found = overflowing(alias)
+    body = uploaded(found.manifest, found.tensors)
+    refused = problem_of(client.post("/v1/checkpoints", content=body, headers=FILE), 409)
+    assert (refused["field"], refused["property"]) == ("checkpoint", number)
+    assert refused["value"] == f"<{number} 'NaN or infinite'>"
+    assert refused["rule"] == f"must have the {number} 'finite numbers'"
 
 
 def test_upload_over_the_limit_is_refused(client: TestClient) -> None:

@@ -4,9 +4,11 @@ import numpy as np
 import pytest
 import torch
 
+from app.errors import CheckpointMismatch
 from app.policies.checkpoints import pretrained
 from app.policies.checkpoints.model_state import tensors_under
 from app.policies.configs.pick import PICK, THESIS
+from app.policies.inference.task_selection import TaskChooser
 from app.policies.inference.value_networks import ValueNetworks, pick_preset_of
 from app.policies.networks.forward import FEW
 from app.policies.networks.outcome import OutcomeHead
@@ -15,6 +17,7 @@ from app.policies.training.pick import settings_of, start
 from app.sim.cells.cell import load_cell
 from app.sim.pick.batch import WHOLE_PICK, PickBatch, PickSettings
 from app.sim.pick.kernels.observation_layout import N_PICK
+from tests.policies.untrained import overflowing
 
 
 @pytest.mark.parametrize("n", [1, 3, FEW, FEW + 1, 200])
@@ -74,3 +77,22 @@ def test_a_policy_of_the_raw_state_decides_on_features(n: int) -> None:
         least = critics.least(rows, expected)
     np.testing.assert_allclose(act, expected.numpy(), atol=1e-5)
     np.testing.assert_allclose(values, least.numpy(), atol=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("part", "number"),
+    [("actor.net", "action"), ("critic.q2", "value"), ("outcome.members.2", "outcome")],
+)
+def test_a_network_whose_numbers_overflow_is_found(part: str, number: str) -> None:
+    obs = PickBatch(load_cell(), 8, 5, WHOLE_PICK).reset()
+    ValueNetworks(pretrained.load("pick")).require_finite(obs)
+    with np.errstate(all="ignore"):
+        networks = ValueNetworks(overflowing("pick", part))
+        with pytest.raises(CheckpointMismatch, match=f"{number} is 'NaN or infinite'"):
+            networks.require_finite(obs)
+
+
+def test_untrained_policies_of_both_recipes_give_finite_numbers() -> None:
+    for preset in (PICK, THESIS):
+        run, _ = start(preset, 4, load_cell(preset.cell))
+        TaskChooser(run.policy()).require_finite()

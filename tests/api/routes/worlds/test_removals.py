@@ -23,7 +23,8 @@ from app.sim.pick.task_policy import TaskPolicy
 from app.store import attempts, checkpoints, completion
 from app.store.database import tables
 from app.store.engine import Store
-from jobs.checkpoints import shipped
+from jobs.checkpoints import shipped, to_store
+from tests.policies.untrained import overflowing
 from tests.support import workshop
 from tests.support.databases import SQLITE_ONLY, claimed, started
 from tests.support.idle_service import add_world, idle_service, loading, own_policy
@@ -160,3 +161,12 @@ def test_newest_policy_of_a_cell_is_left_out_if_it_is_deleted_meanwhile(
     finally:
         logging.getLogger("app.api.registry").removeHandler(handler)
     assert [one.sha256 for one in checkpoints.list_checkpoints(store).items] == [damaged]
+
+
+def test_newest_policy_of_a_cell_is_one_whose_numbers_are_finite(
+    services: Services, store: Store, own: str
+) -> None:
+    checkpoints.put_checkpoint(store, to_store(overflowing("pick")))
+    cell = load_cell("pick-and-place")
+    newest = newest_for(cell, CHOOSING, services.task_policies, services)
+    assert newest is not None and newest.checkpoint == own
