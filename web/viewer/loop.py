@@ -14,6 +14,7 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -67,6 +68,8 @@ class LiveCell:
         # Compile the kernels that are not cached.
         new_world(cell, policy, seed, id, sorting_policy, reach_policy).step()
         self._world = new_world(cell, policy, seed, id, sorting_policy, reach_policy)
+        self._builder = ThreadPoolExecutor(1, thread_name_prefix="work-loop")
+        self._world.people.executor = self._builder
         self.handle = WorldHandle(id, cell, self._world.snapshot())
         """Commands in, snapshots out."""
         self.lateness = Lateness()
@@ -109,6 +112,7 @@ class LiveCell:
             self._thread.join(timeout=5.0)
             self._thread = None
         self._risk.close()
+        self._builder.shutdown(wait=False, cancel_futures=True)
         if self._server is not None:
             self._server.stop()
             self._server = None

@@ -1,6 +1,7 @@
 """People of a live cell by id: the base of its workers and of its pedestrians."""
 
 from collections.abc import Iterator
+from concurrent.futures import Executor
 from typing import Generic, TypeVar
 
 P = TypeVar("P")
@@ -9,6 +10,8 @@ P = TypeVar("P")
 class PeopleById(Generic[P]):
     """People of one live cell, in the order of their ids."""
 
+    executor: Executor | None = None
+    """Builds what people need for their work; None: the caller of a command waits for it."""
     _people: dict[int, P]
 
     def __iter__(self) -> Iterator[P]:

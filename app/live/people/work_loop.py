@@ -33,14 +33,20 @@ class WorkLoop:
     def __init__(
         self, cell: Cell, seed: int, size: BodySize | None = None, variants: int = VARIANTS
     ) -> None:
-        alone = with_people(cell, ("worker",))
+        self.arguments = (cell, seed, size, variants)
+        """What it was made of."""
+        self._alone, self._seed = with_people(cell, ("worker",)), seed
         work = HumanMotionConfig(
             seed=seed, bodies=(size or cell.human.size,), variants=variants
         )
-        self._people = people_of(alone, work)
-        self._state = new_people_state(alone, self._people, 1)
-        self._seed, self._block, self._begin = seed, 0, 0.0
+        self._people = people_of(self._alone, work)
         self._away = np.empty(36)
+        self.restart()
+
+    def restart(self) -> None:
+        """Begin again with the first script, at time 0."""
+        self._state = new_people_state(self._alone, self._people, 1)
+        self._block, self._begin = 0, 0.0
         self._end = self._draw(-1)
 
     def _draw(self, first: int) -> float:

@@ -5,6 +5,8 @@ and size change continuously between them.
 """
 
 import math
+from collections.abc import Callable
+from concurrent.futures import Future
 
 import numpy as np
 
@@ -18,7 +20,7 @@ from app.live.snapshot import PersonSnapshot
 from app.sim.cells.cell import Cell
 from app.sim.core.arrays import Vec
 from app.sim.human import model as human
-from app.sim.human.anthropometry import percentile_body
+from app.sim.human.anthropometry import BodySize, percentile_body
 from app.sim.human.person import Person
 from app.sim.people.reach_script import ReachScript
 from app.sim.pick.cases import Case, script_of
@@ -35,11 +37,18 @@ class LiveWorker:
 
     Args:
         place: The cell restricted to this person: home, stations and walking area.
+        build: Begins to build the work loop of a place, seed, size and number of variants.
         q: Initial posture [m, rad], shape (18,); None: already at work.
     """
 
     def __init__(
-        self, cell: Cell, place: Cell, id: int, seed: int, q: Vec | None = None
+        self,
+        cell: Cell,
+        place: Cell,
+        id: int,
+        seed: int,
+        build: Callable[[Cell, int, BodySize, int], Future[WorkLoop]],
+        q: Vec | None = None,
     ) -> None:
         self.id = id
         """Number of the person."""
@@ -49,9 +58,12 @@ class LiveWorker:
         """Body dimensions."""
         self._cell, self._place, self._seed = cell, place, seed
         self._played: PlayedMotion | None = None
-        self._work: WorkLoop | ReachScript = self._new_work()
-        self._t, self._joining = 0.0, q is not None
-        self._limbs = DraggedPerson(cell, self._work.at(0.0)[0] if q is None else q)
+        self._build = build
+        self._work: WorkLoop | ReachScript | None = None
+        self._building: Future[WorkLoop] | None = None
+        self.begin_work()
+        self._joining = q is not None
+        self._limbs = DraggedPerson(cell, self._source_at(0.0)[0] if q is None else q)
 
     @property
     def q(self) -> Vec:
@@ -82,9 +94,9 @@ class LiveWorker:
     def start(self, case: Case | None) -> None:
         """Restart work or the script of a case study; a dragged person stays."""
         if case is not None:
-            self._work = script_of(self._cell, case)
+            self._work, self._building = script_of(self._cell, case), None
         elif self.mode == "auto":
-            self._work = self._new_work()
+            self.begin_work()
         self._t, self._joining = 0.0, False
         if self.mode != "manual":
             self.body.rise = self._rise()
@@ -136,17 +148,31 @@ class LiveWorker:
             self.body.use_recorded(self._played.size)
 
     def begin_work(self) -> None:
-        """Start the work loop, for the present dimensions and place."""
-        self._work = self._new_work()
-        self._t, self._joining = 0.0, self.mode == "auto"
+        """Start the work loop for the present dimensions and place.
 
-    def _new_work(self) -> WorkLoop:
+        Until it is built, the person goes home and rests.
+        """
         worker = self._place.human
         stature, arms, shoulders = self.body.percentiles
         size = percentile_body(stature, arms, shoulders, worker.pelvis_height)
         own = self._place == self._cell and size == worker.size
-        variants = VARIANTS if own else FEWER_VARIANTS
-        return WorkLoop(self._place, self._seed, size, variants)
+        wanted = (self._place, self._seed, size, VARIANTS if own else FEWER_VARIANTS)
+        self._t, self._joining = 0.0, self.mode == "auto"
+        if self._building is not None:
+            self._building.cancel()
+            self._building = None
+        if isinstance(self._work, WorkLoop) and self._work.arguments == wanted:
+            self._work.restart()
+            return
+        self._work, self._building = None, self._build(*wanted)
+        self._take_work()
+
+    def _take_work(self) -> None:
+        """Start the work loop that was being built, once it is there."""
+        if self._building is not None and self._building.done() and self.mode == "auto":
+            built, self._building = self._building, None
+            self._work = built.result()
+            self._t, self._joining = 0.0, True
 
     def _join_run(self) -> None:
         self._t, self._joining = 0.0, True
@@ -157,6 +183,7 @@ class LiveWorker:
 
     def move(self, dt: float) -> bool:
         """Move for ``dt`` [s]; return whether the person moved."""
+        self._take_work()
         resized = self.advance_size(dt)
         if self.mode in ("auto", "recorded") and not self._joining:
             self._t += dt
@@ -178,9 +205,10 @@ class LiveWorker:
         """
         if not self.body.advance_size(dt):
             return False
+        is_scripted = isinstance(self._work, ReachScript)
         if self.mode == "manual":
             self._limbs.drag(MovePerson(), self.size)
-        elif self.mode == "auto" and self.body.settled and isinstance(self._work, WorkLoop):
+        elif self.mode == "auto" and self.body.settled and not is_scripted:
             self.begin_work()
         return True
 
@@ -197,7 +225,7 @@ class LiveWorker:
         """Return posture and speed of the motion source at ``t`` [s]."""
         if self.mode == "recorded" and self._played is not None:
             return self._played.at(t)
-        if self.mode == "still":
+        if self.mode == "still" or self._work is None:
             return human.rest_posture(*self._place.human.home), np.zeros(18)
         return self._work.at(t)
 

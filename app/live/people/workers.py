@@ -2,7 +2,11 @@
 
 Homes lie side by side along the walking area. A new person starts at a free position and walks
 to work; work areas are divided again when people come or leave. People do not avoid each other.
+Keyframe postures of work with another size or area take some tenths of a second to compute:
+with an executor the person rests at home until then, and no command waits.
 """
+
+from concurrent.futures import Future
 
 import numpy as np
 
@@ -11,12 +15,14 @@ from app.live.command_checks import people_after
 from app.live.commands import FIRST, AddPerson, RemovePerson
 from app.live.people.dragging import STEP_BACK
 from app.live.people.people_by_id import PeopleById
+from app.live.people.work_loop import WorkLoop
 from app.live.people.worker import LiveWorker
 from app.sim.cells.cell import Cell
 from app.sim.cells.parts import Station
 from app.sim.cells.people import Worker
 from app.sim.core.arrays import Vec
 from app.sim.human import model as human
+from app.sim.human.anthropometry import BodySize
 from app.sim.human.kernels.kinematics import N_SIZE
 from app.sim.scene.scene import NO_CYLINDERS
 
@@ -45,8 +51,17 @@ class LiveWorkers(PeopleById[LiveWorker]):
 
     def only_first(self) -> None:
         """Replace all people by the worker of the cell."""
-        first = LiveWorker(self._cell, place_of(self._cell, 0, 1), FIRST, self._seed)
+        place = place_of(self._cell, 0, 1)
+        first = LiveWorker(self._cell, place, FIRST, self._seed, self._build)
         self._people = {FIRST: first}
+
+    def _build(self, place: Cell, seed: int, size: BodySize, variants: int) -> Future[WorkLoop]:
+        """Build a work loop by the executor, or at once where there is none."""
+        if self.executor is not None:
+            return self.executor.submit(WorkLoop, place, seed, size, variants)
+        built = Future[WorkLoop]()
+        built.set_result(WorkLoop(place, seed, size, variants))
+        return built
 
     def change(self, command: AddPerson | RemovePerson) -> None:
         """Add or remove a person and divide the work areas again."""
@@ -59,7 +74,7 @@ class LiveWorkers(PeopleById[LiveWorker]):
                 people[id].move_to(place)
             else:
                 seed, start = self._seed + SEED_STEP * id, self._entrance(place.human)
-                people[id] = LiveWorker(self._cell, place, id, seed, start)
+                people[id] = LiveWorker(self._cell, place, id, seed, self._build, start)
         self._people = people
 
     def _entrance(self, worker: Worker) -> Vec:

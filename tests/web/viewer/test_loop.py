@@ -1,5 +1,6 @@
 import asyncio
 import stat
+import threading
 import time
 from collections.abc import Iterator
 from typing import Any
@@ -9,6 +10,7 @@ import pytest
 
 from app.errors import InvalidInput
 from app.live import commands
+from app.live.people import work_loop
 from app.live.snapshot import MAX_REFUSED
 from app.live.sorting import commands as commands_of_sorting
 from app.sim.cells.cell import load_cell
@@ -204,6 +206,32 @@ def test_command_that_fails_is_named_and_the_next_ones_are_carried_out() -> None
     [refused] = now.refused
     assert (refused.number, refused.reason) == (number, "add-person failed: two people")
     assert (len(now.people), now.mode) == (1, "still")
+
+
+def test_world_goes_on_and_can_be_stopped_while_work_of_people_is_built(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    live, begun, may_end = LiveCell(load_cell(), None), threading.Event(), threading.Event()
+    build = work_loop.people_of
+
+    def slow(*of: Any) -> Any:
+        begun.set()
+        may_end.wait()
+        return build(*of)
+
+    monkeypatch.setattr(work_loop, "people_of", slow)
+    live.start()
+    try:
+        live.handle.submit(commands.AddPerson())
+        last = live.handle.submit(commands.SetAnthropometry(person=1, stature=95.0))
+        wait_until(begun.is_set)
+        tick = live.handle.snapshot().tick
+        wait_until(lambda: live.handle.snapshot().tick >= tick + 20)
+        assert live.handle.snapshot().commands == last
+        live.stop()
+    finally:
+        may_end.set()
+    assert [one.id for one in live.handle.snapshot().people] == [0, 1]
 
 
 def test_nothing_is_drawn_without_a_viewer_but_the_first_one_sees_the_present() -> None:
