@@ -116,7 +116,7 @@ def test_dragging_a_hand_onto_the_chosen_cube_changes_the_choice(
     server = resumed
     pause_after_a_pick(server)
     page = open_page()
-    expect(page.locator(".story .chip")).to_have_text("Paused")
+    expect(page.locator(".story .chip").first).to_have_text("Paused")
     chosen = settle(page, server)
     target = np.array(CELL.station(chosen).position)
     name = "right" if target[0] < 0 else "left"

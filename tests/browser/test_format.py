@@ -65,6 +65,12 @@ RANGES = """(all) => Promise.all(["/vendor/htm-preact-standalone.module.js",
     render(html`<${TrainingRange} world=${world} />`, document.body);
     return document.body.textContent;
   }))"""
+STATES = """(world) => Promise.all(["/vendor/htm-preact-standalone.module.js",
+    "/live/status.js"].map((path) => import(path)))
+  .then(([{html, render}, {StatusPanel}]) => {
+    render(html`<${StatusPanel} world=${world} />`, document.body);
+    return [...document.querySelectorAll(".story .chip")].map((one) => one.textContent);
+  })"""
 VALUES = [-5.126, -0.52, -0.004, 0.0, 0.004, 3.3201]
 
 
@@ -242,6 +248,27 @@ def test_inputs_are_in_distribution_only_if_those_of_all_candidates_are(page: Pa
     far = {"field": "position.x", "value": 3.0, "low": 0.0, "high": 1.0}
     texts = page.evaluate(RANGES, [[], [far]])
     assert ["In distribution" in text for text in texts] == [True, False]
+
+
+@pytest.mark.parametrize(
+    ("status", "paused", "shown"),
+    [
+        ("contact", True, ["Paused", "Contact"]),
+        ("contact", False, ["Contact"]),
+        ("moving", True, ["Paused", "Stopped"]),
+    ],
+)
+def test_pause_hides_no_state_of_the_robot(
+    page: Page, status: str, paused: bool, shown: list[str]
+) -> None:
+    world = {
+        "status": status,
+        "paused": paused,
+        "t_s": 1.0,
+        "clearance_m": 0.3,
+        "safety": {"on": True, "override": 0.0, "person": None},
+    }
+    assert page.evaluate(STATES, world) == shown
 
 
 @pytest.mark.parametrize(

@@ -29,14 +29,14 @@ def test_a_visit_leaves_no_errors_in_the_console(open_page: Callable[..., Page])
 def test_page_shows_what_the_world_says(open_page: Callable[..., Page], server: str) -> None:
     page = open_page(scene=False)
     page.click('[data-action="pause"]')
-    expect(page.locator(".story .chip")).to_have_text("Paused")
+    expect(page.locator(".story .chip").first).to_have_text("Paused")
     now = world(server)
     shown = page.locator("[data-candidate]").evaluate_all(
         "rows => rows.map(r => r.dataset.candidate)"
     )
     assert sorted(shown) == sorted(c["id"] for c in now["candidates"])
     page.click('[data-action="pause"]')
-    expect(page.locator(".story .chip")).not_to_have_text("Paused")
+    expect(page.locator(".story .chip").first).not_to_have_text("Paused")
 
 
 def test_value_plot_draws_while_its_data_is_older_than_the_history(

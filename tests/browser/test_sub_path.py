@@ -36,7 +36,7 @@ def test_page_scene_and_commands_work_below_a_path(
     page = open_page()
     page.frame_locator('[data-role="viewer"]').locator("canvas").first.wait_for()
     page.click('[data-action="pause"]')
-    expect(page.locator(".story .chip")).to_have_text("Paused")
+    expect(page.locator(".story .chip").first).to_have_text("Paused")
     assert patient_http.get(f"{server}v1/worlds/main").json()["paused"]
     page.click("#tab-training")
     page.wait_for_selector("#jobs-title")

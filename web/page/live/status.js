@@ -26,9 +26,10 @@ export function StatusPanel({ world, chip = null }) {
   return html`<section class="story" aria-labelledby="story-title">
     <h2 id="story-title" class="sr">What the robot does and why</h2>
     <div class="story-top">
-      <span class=${`chip chip-${world.paused ? "quiet" : tone}`} data-status=${world.status}
-        role="status">
-        ${world.paused ? "Paused" : text}</span>
+      <span class="story-state" role="status">
+        ${world.paused && html`<span class="chip">Paused</span>${" "}`}
+        <span class=${`chip chip-${tone}`} data-status=${world.status}>${text}</span>
+      </span>
       <span class="clock">${format.seconds(world.t_s)}</span>
     </div>
     <p class="sentence">${format.typeset(world.message || "Waiting for the first decision.")}</p>
