@@ -10,7 +10,16 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from app.cli.cells import file_content
-from app.cli.options import Json, Map, RootUnit, Unit, Up, prepared_settings, read_options
+from app.cli.options import (
+    Json,
+    Map,
+    RootUnit,
+    Unit,
+    Up,
+    check_kernels_kept,
+    prepared_settings,
+    read_options,
+)
 from app.cli.output import every_fault_printed, print_result, table
 from app.errors import InvalidInput, NotFound
 
@@ -57,6 +66,7 @@ def evaluate(
     protocols.require_use(protocol, checkpoint)
     reference = protocols.default_checkpoint(protocol) if checkpoint is None else checkpoint
     tested = None if reference is None else find_checkpoint(reference, settings)
+    check_kernels_kept(settings)
     torch.set_num_threads(1)
     result = protocols.evaluate(protocol, tested, episodes=episodes, seed=seed, motions=motions)
     result = {**result, "machine": describe()}
@@ -127,7 +137,7 @@ def bench(
     }
     if name not in scripts:
         raise InvalidInput("NAME", name, "is not a benchmark of this checkout", list(scripts))
-    prepared_settings()
+    check_kernels_kept(prepared_settings())
     command = [sys.executable, str(scripts[name]), *context.args]
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     raise typer.Exit(subprocess.run(command, env=environment, check=False).returncode)

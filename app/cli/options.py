@@ -1,6 +1,8 @@
 """Options that several commands have, and the environment that every command prepares."""
 
+import logging
 import os
+from tempfile import TemporaryFile
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -8,6 +10,8 @@ import typer
 if TYPE_CHECKING:
     from app.settings import Settings
     from app.sim.mocap.read_options import ReadOptions
+
+logger = logging.getLogger(__name__)
 
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object.")]
 Unit = Annotated[
@@ -61,3 +65,25 @@ def prepared_settings(
     logs.set_up(settings.log)
     os.environ.setdefault("NUMBA_CACHE_DIR", str(kernel_cache(settings.data)))
     return settings
+
+
+def check_kernels_kept(settings: "Settings") -> None:
+    """Log a warning if the data folder cannot keep compiled kernels; for commands that compile.
+
+    Another folder that is set as ``NUMBA_CACHE_DIR`` is not checked.
+    """
+    from app.sim.core.kernel_cache import kernel_cache
+
+    folder = kernel_cache(settings.data)
+    if os.environ.get("NUMBA_CACHE_DIR") != str(folder):
+        return
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        TemporaryFile(dir=folder).close()
+    except OSError as error:
+        logger.warning(
+            "compiled kernels cannot be kept in TANDEM_DATA = %s, so that later commands may "
+            "compile them again: %s",
+            settings.data,
+            error.strerror,
+        )

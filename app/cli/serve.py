@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from app.cli.options import prepared_settings
+from app.cli.options import check_kernels_kept, prepared_settings
 
 
 def serve(
@@ -24,6 +24,7 @@ def serve(
     check_access(settings)
     sock = listen(settings.host, settings.port)
     check_database_unused(settings)
+    check_kernels_kept(settings)
 
     from app.cli.uvicorn_server import run
 
@@ -43,6 +44,7 @@ def setup() -> None:
     with closing(Store(settings.database)) as store:
         upgrade(store, settings)
         print(f"database: {store.shown_url}", flush=True)
+    check_kernels_kept(settings)
     print("compiling the simulator's kernels (several minutes, once) ...", flush=True)
     started = time.monotonic()
     for n, (name, cpu_s) in enumerate(compile_all(cores()), 1):

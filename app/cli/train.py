@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from app.cli.options import Json, prepared_settings
+from app.cli.options import Json, check_kernels_kept, prepared_settings
 from app.cli.output import print_result
 from app.durable_files import write_durably
 from app.errors import CheckpointMismatch, InvalidInput
@@ -59,6 +59,7 @@ def train(
 
     configuration = presets.resolve(preset, presets.nested(parse_overrides(sets or [])))
     cell = named_cell(configuration.cell, settings)
+    check_kernels_kept(settings)
     with in_use(output):
         path = _train(configuration, cell, seed, output)
     print_result(f"wrote {path}", {"checkpoint": str(path)}, as_json=as_json)
