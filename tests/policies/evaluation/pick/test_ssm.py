@@ -10,7 +10,7 @@ from app.policies.evaluation.registry import evaluate
 from app.policies.evaluation.rows import EvaluationRequest
 from tests.policies.untrained import shipped_pick_of
 
-N = 80
+N = 40
 
 
 @pytest.fixture(scope="module")

@@ -51,8 +51,8 @@ def test_equal_tasks_have_an_interval_of_no_width() -> None:
 def test_result_has_a_row_per_condition_and_paired_differences(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(people, "N_OBJECTS", 4)
-    monkeypatch.setattr(people, "LIMIT_S", 100.0)
+    monkeypatch.setattr(people, "N_OBJECTS", 2)
+    monkeypatch.setattr(people, "LIMIT_S", 40.0)
     reported = []
     result = evaluate(
         "sorting-cycle-time",

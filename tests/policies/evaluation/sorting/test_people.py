@@ -89,7 +89,8 @@ def bench(n: int, *, active: bool = True) -> SortingBesidePeople:
     return SortingBesidePeople(networks, CELL, settings, n, 3, condition)
 
 
-def test_same_rule_repeats_its_run() -> None:
+def test_same_rule_repeats_its_run(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(people, "N_OBJECTS", 2)
     ran = bench(3)
     first, second = ran.run(order_rules.nearest), ran.run(order_rules.nearest)
     assert first.finished.all() and first.stopped.any()
@@ -162,7 +163,10 @@ def test_task_that_is_cut_off_has_failed(monkeypatch: pytest.MonkeyPatch) -> Non
     assert cut.row("planner")["cycle_time_s"] is None
 
 
-def test_result_compares_the_rules_on_the_same_tasks() -> None:
+def test_result_compares_the_rules_on_the_same_tasks(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(people, "N_OBJECTS", 2)
     reported = []
     request = EvaluationRequest(episodes=2, seed=4, on_row=lambda *what: reported.append(what))
     result = run_sorting_people(pretrained.load("pick"), request)
