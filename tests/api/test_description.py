@@ -21,6 +21,8 @@ document = schemathesis.openapi.from_dict(
         {"checks": {"positive_data_acceptance": {"enabled": False}}}
     ),
 )
+document.config.generation.codec = None
+"""All characters but surrogates, as with UTF-8, for which each is tried out in seconds."""
 
 
 @pytest.fixture(scope="module")
