@@ -15,16 +15,16 @@ from app.cli.train import INTERRUPTED, cut_curve, in_use
 from tests.cli.test_commands import ROOT, environment
 
 FIELDS = {
-    "learning.total_steps": 2048,
+    "learning.total_steps": 1024,
     "learning.n_envs": 8,
     "learning.buffer_size": 2000,
     "learning.batch_size": 16,
     "learning.learning_starts": 128,
     "learning.progress_steps": 64,
-    "learning.checkpoint_steps": 512,
+    "learning.checkpoint_steps": 256,
     "networks.width": 16,
 }
-STEPS = list(range(64, 2049, 64))
+STEPS = list(range(64, 1025, 64))
 
 
 def call(output: Path, *more: str) -> list[str]:
@@ -42,7 +42,7 @@ def interrupted(output: Path, data: Path, step: int) -> tuple[int, str]:
         assert process.stderr is not None
         for line in process.stderr:
             lines.append(line)
-            if f"{step} of 2048 steps" in line:
+            if f"{step} of 1024 steps" in line:
                 process.send_signal(signal.SIGINT)
     return process.returncode, "".join(lines)
 
@@ -56,7 +56,7 @@ def test_interrupted_command_continues_with_the_same_result(
     tmp_path: Path, data: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     parts, whole = tmp_path / "parts", tmp_path / "whole"
-    status, messages = interrupted(parts, data, 640)
+    status, messages = interrupted(parts, data, 320)
     assert status == INTERRUPTED, messages
     assert f"the same command continues from {parts}" in messages
     assert any((parts / "resume").glob("step-*.json"))
