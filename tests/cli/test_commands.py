@@ -44,52 +44,6 @@ def run(
     )
 
 
-@pytest.fixture(scope="module")
-def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[int, Path]]:
-    """A server started as people start it; yields its port and data folder."""
-    data = tmp_path_factory.mktemp("served")
-    with listen("127.0.0.1", 0) as sock:
-        port = sock.getsockname()[1]
-    process = subprocess.Popen(
-        [sys.executable, "-m", "app", "serve"],
-        cwd=ROOT,
-        env=environment(data, TANDEM_PORT=str(port)),
-        stdout=subprocess.PIPE,
-        text=True,
-    )
-    assert process.stdout is not None
-    with process.stdout as lines:
-        for line in lines:
-            if line.startswith("Tandem is ready"):
-                assert f"http://127.0.0.1:{port}" in line
-                break
-        yield port, data
-        process.send_signal(signal.SIGTERM)
-        assert process.wait(timeout=30.0) == -signal.SIGTERM
-
-
-def test_served_address_answers(server: tuple[int, Path]) -> None:
-    with urllib.request.urlopen(f"http://127.0.0.1:{server[0]}/healthz") as answer:
-        assert json.load(answer)["status"] == "ok"
-
-
-def test_second_server_on_the_port_says_so_in_one_line(
-    server: tuple[int, Path], tmp_path: Path
-) -> None:
-    second = run("serve", data=tmp_path / "other", TANDEM_PORT=str(server[0]))
-    assert second.returncode == 1
-    assert second.stderr.count("\n") == 1
-    assert f"another program already listens on 127.0.0.1:{server[0]}" in second.stderr
-    assert not (tmp_path / "other").exists()
-
-
-def test_second_server_on_the_database_says_so_in_one_line(server: tuple[int, Path]) -> None:
-    second = run("serve", data=server[1], TANDEM_PORT="0")
-    assert second.returncode == 1
-    assert second.stderr.count("\n") == 1
-    assert "another Tandem server" in second.stderr
-
-
 def test_setup_makes_the_database_and_compiles_every_part(tmp_path: Path) -> None:
     done = run("setup", data=tmp_path, timeout=COMPILE_S)
     assert done.returncode == 0, done.stderr
@@ -385,3 +339,52 @@ def test_address_that_is_not_ours_is_refused() -> None:
         listen("no-such-host.invalid", 0)
     with pytest.raises(InvalidInput, match="TANDEM_HOST"):
         listen(f"{'a' * 64}.example", 0)
+
+
+@pytest.fixture(scope="module")
+def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[int, Path]]:
+    """A server started as people start it; yields its port and data folder.
+
+    Its tests are the last of this module, because its live cell takes processor time.
+    """
+    data = tmp_path_factory.mktemp("served")
+    with listen("127.0.0.1", 0) as sock:
+        port = sock.getsockname()[1]
+    process = subprocess.Popen(
+        [sys.executable, "-m", "app", "serve"],
+        cwd=ROOT,
+        env=environment(data, TANDEM_PORT=str(port)),
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    assert process.stdout is not None
+    with process.stdout as lines:
+        for line in lines:
+            if line.startswith("Tandem is ready"):
+                assert f"http://127.0.0.1:{port}" in line
+                break
+        yield port, data
+        process.send_signal(signal.SIGTERM)
+        assert process.wait(timeout=30.0) == -signal.SIGTERM
+
+
+def test_served_address_answers(server: tuple[int, Path]) -> None:
+    with urllib.request.urlopen(f"http://127.0.0.1:{server[0]}/healthz") as answer:
+        assert json.load(answer)["status"] == "ok"
+
+
+def test_second_server_on_the_port_says_so_in_one_line(
+    server: tuple[int, Path], tmp_path: Path
+) -> None:
+    second = run("serve", data=tmp_path / "other", TANDEM_PORT=str(server[0]))
+    assert second.returncode == 1
+    assert second.stderr.count("\n") == 1
+    assert f"another program already listens on 127.0.0.1:{server[0]}" in second.stderr
+    assert not (tmp_path / "other").exists()
+
+
+def test_second_server_on_the_database_says_so_in_one_line(server: tuple[int, Path]) -> None:
+    second = run("serve", data=server[1], TANDEM_PORT="0")
+    assert second.returncode == 1
+    assert second.stderr.count("\n") == 1
+    assert "another Tandem server" in second.stderr
