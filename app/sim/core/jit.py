@@ -10,8 +10,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, ParamSpec, TypeVar
 
-import numba
 from numba import typeof
+from numba.core import config
 
 from app.sim.core.dispatcher import Kernel
 from app.sim.core.kernel_cache import kernel_cache
@@ -30,9 +30,9 @@ def _keep_by_version() -> None:
 
     numba would keep them beside the sources and use them after an update, in part.
     """
-    if not numba.config.CACHE_DIR:
+    if not config.CACHE_DIR:
         user = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
-        numba.config.CACHE_DIR = str(kernel_cache(Path(user) / "tandem"))
+        config.CACHE_DIR = str(kernel_cache(Path(user) / "tandem"))
 
 
 _keep_by_version()
