@@ -132,43 +132,41 @@ def samples(schema: dict[str, Any], depth: int = 0) -> list[Any]:
     return [plain.get(kind, "pick-and-place")]
 
 
-Way = tuple[tuple[Any, tuple[str, ...]], ...]
-"""Keys from a body to a place in it, each with the fields of the object that has it."""
-
-
-def places(value: Any) -> Iterator[Way]:
-    """Ways to everything inside a body; of a list only to its first item."""
+def places(value: Any) -> Iterator[tuple[Any, ...]]:
+    """Keys to everything inside a body; of a list only to its first item."""
     yield ()
-    fields = tuple(value) if isinstance(value, dict) else ()
-    inner = [(name, value[name]) for name in fields]
-    for key, one in inner or ([(0, value[0])] if isinstance(value, list) and value else []):
-        for way in places(one):
-            yield ((key, fields), *way)
+    inner = value.items() if isinstance(value, dict) else ()
+    for name, one in list(inner) + (
+        [(0, value[0])] if isinstance(value, list) and value else []
+    ):
+        for keys in places(one):
+            yield (name, *keys)
 
 
-def with_value(body: Any, way: Way, value: Any) -> Any:
-    if not way:
+def with_value(body: Any, keys: tuple[Any, ...], value: Any) -> Any:
+    if not keys:
         return value
     changed = copy.deepcopy(body)
     inner = changed
-    for key, _ in way[:-1]:
-        inner = inner[key]
-    inner[way[-1][0]] = value
+    for part in keys[:-1]:
+        inner = inner[part]
+    inner[keys[-1]] = value
     return changed
 
 
-def places_of_all(bodies: list[Any]) -> Iterator[tuple[Any, Way]]:
-    """Places of each body that differ from those of the bodies before it."""
+def places_of_all(bodies: list[Any]) -> Iterator[tuple[Any, tuple[Any, ...]]]:
+    """Places of each body that differ from those before: in keys, value or fields beside."""
     seen = set()
     for body in bodies:
-        for way in places(body):
-            found = body
-            for key, _ in way:
-                found = found[key]
-            place = (way, json.dumps(found))
+        for keys in places(body):
+            inner, beside = body, []
+            for key in keys:
+                beside.append(tuple(inner) if isinstance(inner, dict) else ())
+                inner = inner[key]
+            place = (keys, tuple(beside), json.dumps(inner))
             if place not in seen:
                 seen.add(place)
-                yield body, way
+                yield body, keys
 
 
 def address_of(path: str, names: dict[str, str]) -> str:
@@ -259,8 +257,8 @@ def test_hostile_bodies_are_refused(
     url = address_of(path, known)
     headers = {"Content-Type": "application/json"}
     texts = {
-        json.dumps(with_value(body, way, value)).encode(): None
-        for body, way in places_of_all(json_bodies(method, path))
+        json.dumps(with_value(body, keys, value)).encode(): None
+        for body, keys in places_of_all(json_bodies(method, path))
         for value in (*TEXTS, *NUMBERS, *OTHERS)
     }
     bodies = [*RAW, *texts]

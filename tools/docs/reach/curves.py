@@ -31,7 +31,7 @@ def curve_of_run(folder: Path, per_target: int | None) -> Json:
     spent = {one["step"]: one["cpu_s"] for one in points}
     targets, commits = [], list[str]()
     for checkpoint in policies(folder):
-        commits = checkpoint.manifest["commits"]
+        commits = checkpoint.manifest.get("commits", [])
         rates = ReachBench(checkpoint, SEED).on_targets(n).rates()
         step = checkpoint.manifest["step"]
         ends = {end: rates[end]["mean"] for end in ENDS}

@@ -78,7 +78,7 @@ def curve_of_run(folder: Path, episodes: int | None) -> Json:
             "task": manifest["cell"],
             "name": manifest["preset"]["name"],
             "seed": manifest["seed"],
-            "commits": manifest["commits"],
+            "commits": manifest.get("commits", []),
             "episodes_per_pair": n,
         }
         step = manifest["step"]
