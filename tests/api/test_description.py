@@ -22,7 +22,7 @@ document = schemathesis.openapi.from_dict(
     ),
 )
 document.config.generation.codec = None
-"""All characters but surrogates, as with UTF-8, for which each is tried out in seconds."""
+"""Texts have all characters but surrogates, as with UTF-8, whose test of each takes seconds."""
 
 
 @pytest.fixture(scope="module")
