@@ -136,7 +136,7 @@ def test_effect_of_a_command_is_unknown_after_a_lost_connection(
     page.wait_for_selector('[data-role="link"][data-pending="1"]')
     page.evaluate(SEE, True)
     unknown = page.locator(".banner.bad")
-    expect(unknown).to_contain_text("Effect unknown: toggle candidate.", timeout=10_000)
+    expect(unknown).to_contain_text("Effect unknown: toggle candidate.")
     with page.expect_request(EVENTS):
         page.evaluate(SEE, False)
     expect(unknown).to_contain_text("look at the cell again")

@@ -10,6 +10,7 @@ from playwright.sync_api import Page, expect
 from app.policies.inference.task_selection import HYSTERESIS
 from app.sim.cells.cell import load_cell
 from app.sim.human import model as human
+from tests.browser.conftest import LIMIT_S
 from tests.browser.scene import drag_along
 from tests.support import patient_http
 
@@ -22,8 +23,6 @@ GRIP_M = 0.12
 """Where along a gizmo's arrow the mouse takes it; the arrows of the hands are 0.2 m long."""
 NEAR_M = 0.03
 ROUNDS = 4
-PICK_S = 120.0
-"""Time the robot may take for its first pick, on a busy machine [s]."""
 
 
 def tell(server: str, *commands: dict) -> None:
@@ -75,20 +74,20 @@ def pause_after_a_pick(server: str) -> None:
         {"tag": "set-mode", "mode": "manual"},
         {"tag": "resume"},
     )
-    until(server, lambda now: now["status"] == "picking", PICK_S)
+    until(server, lambda now: now["status"] == "picking")
     tell(server, {"tag": "pause"}, {"tag": "set-candidates", "ids": sorted(GOALS)})
     for _ in range(100):
-        before = until(server, lambda now: now["paused"], PICK_S)
+        before = until(server, lambda now: now["paused"])
         if before["status"] == "moving" and len(before["candidates"]) == len(GOALS):
             return
         tell(server, {"tag": "step"})
-        until(server, lambda now, tick=before["tick"]: now["tick"] > tick, PICK_S)
+        until(server, lambda now, tick=before["tick"]: now["tick"] > tick)
     raise AssertionError(f"the robot does not go on after its pick: {before['message']}")
 
 
-def until(server: str, holds: Callable[[dict], bool], limit_s: float) -> dict:
+def until(server: str, holds: Callable[[dict], bool]) -> dict:
     """Return the first state of the world for which ``holds`` is true."""
-    end = time.monotonic() + limit_s
+    end = time.monotonic() + LIMIT_S
     while time.monotonic() < end:
         now = state(server)
         if holds(now):

@@ -25,7 +25,7 @@ def test_presets_are_loaded_after_a_failure(open_page: Callable[..., Page]) -> N
     page = open_page(scene=False)
     page.route("**/v1/presets", lambda route: route.fulfill(status=502, body=""), times=1)
     open_form(page)
-    expect(page.locator("#train-preset")).to_be_visible(timeout=30_000)
+    expect(page.locator("#train-preset")).to_be_visible()
 
 
 def test_size_is_that_of_the_world_after_a_failed_command(
@@ -38,7 +38,7 @@ def test_size_is_that_of_the_world_after_a_failed_command(
     page.route(COMMANDS, lambda route: route.fulfill(status=500, body=""))
     slider.fill("95")
     expect(page.locator(".banner.bad")).to_contain_text("The server answered 500.")
-    expect(slider).to_have_value(before, timeout=10_000)
+    expect(slider).to_have_value(before)
     page.unroute(COMMANDS)
     slider.fill("80")
     expect(slider).to_have_value("80")

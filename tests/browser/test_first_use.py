@@ -12,7 +12,6 @@ from tests.browser.test_drag import state, tell, until
 pytestmark = pytest.mark.browser
 
 LINE, TRY = '[data-role="first-use"]', '[data-action="try"]'
-LIMIT_S = 60.0
 
 
 @pytest.fixture
@@ -28,7 +27,7 @@ def test_hint_places_a_hand_before_the_robot_and_stays_dismissed(
 ) -> None:
     page = open_page(scene=False)
     page.click(TRY)
-    until(clean, lambda now: now["people"][0]["mode"] == "manual", LIMIT_S)
+    until(clean, lambda now: now["people"][0]["mode"] == "manual")
     page.click('[data-action="dismiss-first-use"]')
     expect(page.locator(LINE)).to_have_count(0)
     page.reload()
@@ -51,7 +50,6 @@ def test_line_puts_the_person_beside_the_goal_of_a_reach_cell(
             abs(now["people"][0]["cylinder"]["x"] - goal[0]) < 0.1
             and abs(now["people"][0]["cylinder"]["y"] - goal[1] - 0.3) < 0.1
         ),
-        LIMIT_S,
     )
 
 
@@ -59,5 +57,5 @@ def test_line_starts_a_sorting_test(open_page: Callable[..., Page], clean: str) 
     show(clean, "sorting-e0")
     page = open_page(scene=False)
     page.click(TRY)
-    until(clean, lambda now: now["sorting"]["test"] == "test-1", LIMIT_S)
+    until(clean, lambda now: now["sorting"]["test"] == "test-1")
     expect(page.locator('[data-role="verdict"]')).to_contain_text("Every block is sorted")

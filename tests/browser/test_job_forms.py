@@ -11,7 +11,7 @@ from playwright.sync_api import Page, Route, expect
 from app.sim.cells.cell import load_cell
 from tests.browser.conftest import show
 from tests.browser.test_drag import tell
-from tests.browser.test_training import GROWTH_MS, open_form, stop
+from tests.browser.test_training import open_form, stop
 from tests.support import patient_http
 
 pytestmark = pytest.mark.browser
@@ -69,9 +69,7 @@ def test_training_ends_at_its_budget_and_goes_on_with_a_larger_one(
     expect(page.locator(".job.is-open .job-sub")).to_contain_text("attempt 2")
     assert state_of(page) == "succeeded"
     assert job(server, job_id)["step"] == 5120
-    expect(page.locator(".is-open [data-points]")).to_have_attribute(
-        "data-points", "40", timeout=GROWTH_MS
-    )
+    expect(page.locator(".is-open [data-points]")).to_have_attribute("data-points", "40")
     assert len(page.problems) == 2  # type: ignore[attr-defined]  # two refusals
 
 
@@ -311,14 +309,14 @@ def test_sweep_shows_its_trials_and_marks_the_best(
     page.locator(".drawn").last.locator('[data-range="low"]').fill("16")
     page.locator(".drawn").last.locator('[data-range="high"]').fill("32")
     job_id = submit(page)
-    page.wait_for_selector(".job.is-open [data-trial]", timeout=GROWTH_MS)
+    page.wait_for_selector(".job.is-open [data-trial]")
     made = job(server, job_id)
     assert made["spec"]["ranges"]["learning.lr_start"] == {
         "low": 1e-4,
         "high": 1e-3,
         "log": True,
     }
-    page.wait_for_selector('.job.is-open[data-state="succeeded"]', timeout=4 * GROWTH_MS)
+    page.wait_for_selector('.job.is-open[data-state="succeeded"]')
     rows = page.locator('[data-role="trials"] tbody tr')
     expect(rows).to_have_count(2)
     expect(page.locator('[data-best="true"]')).to_have_count(1)
@@ -374,13 +372,13 @@ def test_cell_follows_a_training_and_says_with_which_step(
         page.fill(f"#train-learning-{name}", str(value))
     job_id = submit(page)
     page.click('.is-open [data-action="follow"]')
-    expect(page.locator('[data-role="follow"]')).to_contain_text("acts with", timeout=GROWTH_MS)
+    expect(page.locator('[data-role="follow"]')).to_contain_text("acts with")
     page.click('[data-action="unfollow"]')
     expect(page.locator('.is-open [data-action="follow"]')).to_have_count(1)
     page.click('.is-open [data-action="follow"]')
     patient_http.post(f"{server}/v1/jobs/{job_id}/cancel")
     expect(page.locator('[data-role="follow"]')).to_contain_text(
-        "is cancelled: its last checkpoint acts", timeout=GROWTH_MS
+        "is cancelled: its last checkpoint acts"
     )
     tell(server, {"tag": "set-policy", "checkpoint": "pick"})
     assert page.problems == []  # type: ignore[attr-defined]

@@ -142,7 +142,7 @@ def test_person_follows_the_mode_chosen_by_arrow_keys(
     page = open_page(scene=False)
     page.locator('[data-mode="auto"]').focus()
     page.keyboard.press("ArrowLeft")
-    until(server, lambda now: now["people"][0]["mode"] == "manual", 60.0)
+    until(server, lambda now: now["people"][0]["mode"] == "manual")
     expect(page.locator('[data-mode="manual"]')).to_be_focused()
     tell(server, {"tag": "set-mode", "mode": "auto"})
     assert state(server)["people"]

@@ -11,8 +11,6 @@ from tests.support import patient_http
 
 pytestmark = pytest.mark.browser
 
-LIMIT_S = 60.0
-
 
 @pytest.fixture
 def one_person(server: str) -> Iterator[str]:
@@ -84,7 +82,7 @@ def test_visitor_adds_a_person_changes_its_size_and_plays_a_recording(
     page.click('[data-action="size"]')
     page.locator('[data-size="stature"] input').fill("95")
     expect(page.locator('[data-role="stature-text"]')).to_have_text("1.87 m")
-    now = until(server, lambda world: world["people"][1]["size"][11] > 1.08, LIMIT_S)
+    now = until(server, lambda world: world["people"][1]["size"][11] > 1.08)
     assert [one["anthropometry"]["stature"] for one in now["people"]] == [50.0, 95.0]
     posted = patient_http.post(
         f"{server}/v1/recordings",
@@ -98,7 +96,7 @@ def test_visitor_adds_a_person_changes_its_size_and_plays_a_recording(
     page.locator('[data-role="motion"]').select_option("visit")
     expect(page.locator('[data-role="progress"]')).to_contain_text("of 4.0 s")
     playing = until(
-        server, lambda world: (world["people"][0]["motion"] or {}).get("t_s", 0) > 0.3, LIMIT_S
+        server, lambda world: (world["people"][0]["motion"] or {}).get("t_s", 0) > 0.3
     )
     assert [one["mode"] for one in playing["people"]] == ["recorded", "auto"]
     assert page.problems == []  # type: ignore[attr-defined]

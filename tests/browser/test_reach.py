@@ -15,7 +15,6 @@ pytestmark = pytest.mark.browser
 
 CELL = load_cell("shared-workspace")
 PHONE = (390, 844)
-LIMIT_S = 120.0
 GRIP_M = 0.15
 """Where along the arrow of the goal's handle the mouse takes it; it is 0.26 m long."""
 
@@ -47,9 +46,9 @@ def test_visitor_opens_the_cell_sees_it_reach_and_obstructs_it(
     page.click('[data-mode="manual"]')
     tell(server, {"tag": "move-person", "pelvis": [-2.0, 2.0, 0.0]})
     page.locator('[data-role="speed"]').select_option("4")
-    now = until(server, lambda one: one["counters"]["reached"] > 0, LIMIT_S)
+    now = until(server, lambda one: one["counters"]["reached"] > 0)
     expect(page.locator('[data-counter="reached"]')).not_to_have_text("0")
-    now = until(server, lambda one: one["safety"]["override"] == 1.0, LIMIT_S)
+    now = until(server, lambda one: one["safety"]["override"] == 1.0)
     x, y, _ = now["tcp"]
     tell(server, {"tag": "move-person", "pelvis": [x, y + 0.3, 0.0]})
     expect(page.locator('[data-status="moving"]')).to_have_text("Stopped")
@@ -59,7 +58,7 @@ def test_visitor_opens_the_cell_sees_it_reach_and_obstructs_it(
     expect(page.locator('[data-role="override"]')).to_contain_text("disabled")
     page.click('[data-choice="safety:measured"]')
     page.click('[data-action="remove-person"]')
-    until(server, lambda one: one["people"] == [], LIMIT_S)
+    until(server, lambda one: one["people"] == [])
     expect(page.locator('[data-role="override"]')).to_have_attribute("data-override", "1.000")
     assert page.problems == []  # type: ignore[attr-defined]
     page.locator('[data-role="cell"]').select_option(load_cell().name)
@@ -75,7 +74,7 @@ def test_two_quick_changes_of_the_policy_both_hold(
         """() => ["between:false", "ahead:false"].forEach((one) =>
              document.querySelector(`[data-choice="${one}"]`).click())"""
     )
-    until(reaching, lambda one: one["reach"]["inference_mode"] == "direct", LIMIT_S)
+    until(reaching, lambda one: one["reach"]["inference_mode"] == "direct")
 
 
 def test_goal_is_dragged_by_its_arrow(open_page: Callable[..., Page], reaching: str) -> None:

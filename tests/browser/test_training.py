@@ -15,8 +15,6 @@ from tests.support import patient_http
 
 pytestmark = pytest.mark.browser
 
-GROWTH_MS = 240_000
-"""Time for a job to start its process, warm up and report several points [ms]."""
 FINE = {"learning": {"progress_steps": 5120, "checkpoint_steps": 5120}}
 """Points and checkpoints close together, so that the curve grows while one looks."""
 
@@ -45,12 +43,11 @@ def test_posted_job_appears_and_its_curve_grows(
         page.click("form.train button[type=submit]")
     job_id = answer.value.json()["id"]
     page.wait_for_selector(f'.job.is-open[data-job="{job_id}"]')
-    page.wait_for_selector("[data-points]", timeout=GROWTH_MS)
+    page.wait_for_selector("[data-points]")
     seen = points(page)
     page.wait_for_function(
         "n => Number(document.querySelector('[data-points]').dataset.points) >= n + 2",
         arg=seen,
-        timeout=GROWTH_MS,
     )
     stored = patient_http.get(f"{server}/v1/jobs/{job_id}/metrics").json()["items"]
     steps = [row["step"] for row in stored]
@@ -98,7 +95,6 @@ def resume(page: Page, job_id: str | None) -> None:
     page.wait_for_function(
         "n => Number(document.querySelector('[data-points]').dataset.points) > n",
         arg=before,
-        timeout=GROWTH_MS,
     )
     expect(page.locator(".job.is-open")).to_have_attribute("data-job", job_id or "")
     expect(page.locator(".job.is-open .job-sub")).to_contain_text("attempt 2")
@@ -274,9 +270,7 @@ def test_groups_of_a_comparison_look_different(
 def cancel(page: Page) -> None:
     page.get_by_role("button", name="Cancel …").click()
     page.get_by_role("button", name="Cancel the job").click()
-    expect(page.locator(".job.is-open")).to_have_attribute(
-        "data-state", "cancelled", timeout=GROWTH_MS
-    )
+    expect(page.locator(".job.is-open")).to_have_attribute("data-state", "cancelled")
 
 
 def test_bad_input_is_explained_at_its_field(open_page: Callable[..., Page]) -> None:
@@ -319,7 +313,7 @@ def test_evaluation_is_shown_with_its_intervals(
     page = open_page(scene=False)
     page.click("#tab-training")
     rows = page.locator(f'[data-job="{posted.json()["id"]}"] [data-role="rows"]')
-    expect(rows).to_contain_text("n = 40", timeout=GROWTH_MS)
+    expect(rows).to_contain_text("n = 40")
     result = patient_http.get(f"{server}/v1/jobs/{posted.json()['id']}").json()["result"]
     success = result["results"][0]["success"]
     low, high = (f"{100 * success[end]:.1f}" for end in ("low", "high"))
@@ -343,7 +337,7 @@ def test_evaluation_of_another_protocol_shows_its_own_measures(
     page = open_page(scene=False)
     page.click("#tab-training")
     rows = page.locator(f'[data-job="{posted.json()["id"]}"] [data-role="rows"]')
-    expect(rows).to_contain_text("n = 4", timeout=GROWTH_MS)
+    expect(rows).to_contain_text("n = 4")
     result = patient_http.get(f"{server}/v1/jobs/{posted.json()['id']}").json()["result"]
     contact = result["results"][0]["contact"]
     for label, value in (("observed", contact["rate"]), ("predicted", contact["mean"])):

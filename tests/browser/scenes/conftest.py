@@ -6,7 +6,6 @@ from app.sim.cells.cell import load_cell
 from tests.browser.conftest import show
 
 REACH, SORT = "shared-workspace", "sorting-e0"
-LIMIT_S = 180.0
 
 
 @pytest.fixture

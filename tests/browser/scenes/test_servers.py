@@ -11,7 +11,7 @@ from playwright.sync_api import Page, Route, expect
 from app.sim.cells.cell import load_cell
 from tests.browser.conftest import free_port, serving, show
 from tests.browser.scene import VIEWER, expect_drawing
-from tests.browser.scenes.conftest import LIMIT_S, REACH, SORT
+from tests.browser.scenes.conftest import REACH, SORT
 from tests.browser.test_drag import state, tell, until
 
 pytestmark = pytest.mark.browser
@@ -25,7 +25,7 @@ def test_scene_follows_into_other_cells_and_back_in_every_window(
         expect_drawing(page)
     for cell in (REACH, SORT, load_cell().name):
         pages[0].locator('[data-role="cell"]').select_option(cell)
-        until(shown, lambda now, cell=cell: now["cell"] == cell, LIMIT_S)
+        until(shown, lambda now, cell=cell: now["cell"] == cell)
         for page in pages:
             expect(page.locator('[data-role="cell"]')).to_have_value(cell)
             expect_drawing(page)
@@ -94,6 +94,6 @@ def test_page_and_scene_come_back_by_themselves_after_the_server_was_killed(
         page.wait_for_selector('[data-link="live"]')
         expect_drawing(page)
         page.click('[data-action="pause"]')
-        until(address, lambda now: now["paused"], LIMIT_S)
+        until(address, lambda now: now["paused"])
         expect(page.locator('[data-role="link"]')).to_have_attribute("data-pending", "0")
         assert state(address)["people"]

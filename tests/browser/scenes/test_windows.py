@@ -6,7 +6,6 @@ import pytest
 from playwright.sync_api import Page, expect
 
 from tests.browser.scene import expect_drawing, scene_of
-from tests.browser.scenes.conftest import LIMIT_S
 from tests.browser.test_drag import tell, until
 
 pytestmark = pytest.mark.browser
@@ -19,18 +18,18 @@ def test_scene_goes_on_in_two_windows_while_people_come_and_go(
     for page in pages:
         expect_drawing(page)
     pages[0].click('[data-action="add-person"]')
-    until(shown, lambda now: len(now["people"]) == 2, LIMIT_S)
+    until(shown, lambda now: len(now["people"]) == 2)
     expect_drawing(pages[1])
     pages[0].click('[data-person="1"]')
     pages[0].click('[data-action="remove-person"]')
-    until(shown, lambda now: len(now["people"]) == 1, LIMIT_S)
+    until(shown, lambda now: len(now["people"]) == 1)
     for page in pages:
         expect_drawing(page)
     tell(shown, {"tag": "set-anthropometry", "stature": 95}, {"tag": "add-person"})
     tell(shown, {"tag": "remove-person", "person": 0}, {"tag": "remove-person", "person": 1})
-    until(shown, lambda now: now["people"] == [], LIMIT_S)
+    until(shown, lambda now: now["people"] == [])
     tell(shown, {"tag": "add-person"}, {"tag": "add-person"})
-    until(shown, lambda now: len(now["people"]) == 2, LIMIT_S)
+    until(shown, lambda now: len(now["people"]) == 2)
     for page in pages:
         expect_drawing(page)
         assert page.locator('[data-role="scene-note"]').all_inner_texts() == []
