@@ -46,7 +46,7 @@ class Row(NamedTuple):
     title: str
     """Name of the scenario."""
     curves: tuple[tuple[str, str, str], ...]
-    """File, name and colour of each training."""
+    """File, name and colour of each training; the first one of a colour names it."""
     printed: tuple[tuple[str, float], ...]
     """Rates of the thesis."""
 
@@ -140,16 +140,19 @@ def recipes(results: Path) -> Figure:
     figure, axes = panels(len(ROWS), len(AXES), 10.4, sharey=True)
     for row, views in zip(ROWS, axes, strict=True):
         for view, (over, label) in zip(views, AXES, strict=True):
+            named = set()
             for file, name, colour in row.curves:
-                for k, curve in enumerate(curves_of(results, file, name)):
+                for curve in curves_of(results, file, name):
                     points = pooled(curve)
-                    shown = name.replace(", ", ",\n") if k == 0 else None
+                    shown = None if colour in named else name.replace(", ", ",\n")
+                    named.add(colour)
                     view.plot(
                         *_columns(points, over, "success"), color=colour, lw=1.2, label=shown
                     )
                     view.plot(*_columns(points, over, "collision"), "--", color=colour, lw=0.9)
             for end, rate in row.printed:
-                view.axhline(rate, color=GREY, lw=0.9, ls=":" if end == "success" else "-.")
+                style = ":" if end == "success" else "-."
+                view.axhline(rate, color=GREY, lw=0.9, ls=style, label=f"thesis: {end}")
             view.set(xscale="log", ylim=(-0.02, 1.02), xlabel=label)
             view.xaxis.set_major_formatter(FuncFormatter(_short))
             view.xaxis.set_minor_formatter(NullFormatter())
