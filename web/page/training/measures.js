@@ -17,6 +17,7 @@ const MEASURES = [
   ["never_stopped", "never stopped by the safety layer", "%"],
   ["never_at_standstill", "never at standstill", "%"],
   ["touched_at_rest", "robot at rest touched", "%"],
+  ["frozen_share", "time people stand still", "%"],
   ["exactly_minimal", "minimum number of moves", "%"],
   ["stopped", "time stopped by the safety layer", "%"],
   ["stopped_share", "time stopped by the safety layer", "%"],

@@ -12,7 +12,7 @@ the 5th and of the 95th percentile; a worker and a pedestrian; synthetic reaches
 ``pick-rest``: people who stand still, with the policy alone and with a planner.
 
 Except in ``pick-rest``, each row also states how often the same people touch a robot that never
-moves.
+moves, and for which share of the time recorded people stand still.
 
 Source: docs/method.md 3.4 and 4 (several people; a model whose dimensions are known; a human
 that reacts).
@@ -70,9 +70,9 @@ def beside_each(
     results = bench.request.rows(len(rows) * len(planners))
     for name, settings in rows.items():
         evaluator = bench.evaluator(settings)
-        touched = _touched_at_rest(evaluator.batch)
+        people = _beside_a_resting_robot(evaluator.batch)
         for _, row in _runs(evaluator, rule, name, planners):
-            results.append(row | {"touched_at_rest": touched})
+            results.append(row | people)
         stated[name] = settings_of(evaluator.batch)
     return {"settings": stated, "results": results}
 
@@ -95,13 +95,25 @@ def _planners(settings: PickSettings) -> tuple[bool, ...]:
     return (False, True) if whole else (False,)
 
 
-def _touched_at_rest(batch: PickBatch) -> dict[str, float]:
-    """Return the rate of episodes in which people touch a robot that stays at its start."""
+def _beside_a_resting_robot(batch: PickBatch) -> Json:
+    """Return what people do beside a robot that stays at its start.
+
+    ``touched_at_rest`` is the rate of episodes in which they touch it. For recorded people
+    ``frozen_share`` is the share of the control periods in which none of them moves.
+    """
     batch.reset()
     rest = np.zeros((batch.n_envs, CONTROLLED), dtype=np.float32)
-    while (batch.state.outcome == RUNNING).any():
+    workers, outcome = batch.state.people.q, batch.state.outcome
+    periods = frozen = 0
+    while (running := outcome == RUNNING).any():
+        before = workers.copy()
         batch.step(rest, auto_reset=False, features=False)
-    return rate_of(batch.state.outcome == COLLISION)
+        periods += int(running.sum())
+        frozen += int((running & (workers == before).all(axis=(1, 2))).sum())
+    result: Json = {"touched_at_rest": rate_of(outcome == COLLISION)}
+    if batch.settings.work.motion == "recorded":
+        result["frozen_share"] = frozen / periods
+    return result
 
 
 def run_people(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:

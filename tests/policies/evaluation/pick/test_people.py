@@ -92,6 +92,10 @@ def test_recorded_people_are_evaluated_together_and_one_by_one():
     rows, stated = rows_of(result), result["settings"]
     assert list(rows) == ["library", "recorded", "recorded stands", "recorded works"]
     assert rows["recorded stands"]["touched_at_rest"]["mean"] == 0.0
+    assert rows["recorded stands"]["frozen_share"] == 1.0
+    assert 0.0 < rows["recorded"]["frozen_share"] < 1.0
+    assert rows["recorded works"]["frozen_share"] < 0.01  # when it turns, back and forth
+    assert "frozen_share" not in rows["library"]
     assert "hand_speed_median_m_s" not in stated["recorded stands"]
     assert stated["recorded works"]["hand_speed_median_m_s"] > 0.05
     assert stated["motions"][1] == {"source": "works, made up", "seconds": 13.98}
