@@ -137,11 +137,9 @@ TABLES: Mapping[str, Callable[[list[Json]], list[list[str]]]] = {
 
 def pairs_of(result: Json) -> list[list[str]]:
     """Return the paired comparisons of a result as lines of cells, the header first."""
-    head = ["pair", "difference [points]", "only the first", "only the second", "p"]
-    lines = [[*head, "share of the oracle's gain"]]
-    for row in result["paired"]:
-        gain = row.get("oracle_gain")
-        won = f"{100.0 * row['difference'] / gain:.0f} %" if gain else ""
+    rows: list[Json] = result["paired"]
+    lines = [["pair", "difference [points]", "only the first", "only the second", "p"]]
+    for row in rows:
         lines.append(
             [
                 row["name"],
@@ -149,7 +147,11 @@ def pairs_of(result: Json) -> list[list[str]]:
                 str(row["only_first"]),
                 str(row["only_second"]),
                 f"{row['p']:.1g}",
-                won,
             ]
         )
+    if any("oracle_gain" in row for row in rows):
+        lines[0].append("share of the oracle's gain")
+        for row, line in zip(rows, lines[1:], strict=True):
+            gain = row.get("oracle_gain")
+            line.append(f"{100.0 * row['difference'] / gain:.0f} %" if gain else "")
     return lines

@@ -75,15 +75,18 @@ def table(result: Json, others: Sequence[Json] = ()) -> str:
     if is_sorting(result):
         return _markdown(lines_of(result), result)
     if pick_tables.has_own_table(result):
-        return _markdown(pick_tables.lines_of(result), result)
-    rows: list[Json] = result["results"]
-    columns = list(dict.fromkeys(key for row in rows for key in row if key != "name"))
-    head = ["", *(header(key) for key in columns)]
-    lines = [[f"`{row['name']}`", *(cell(row.get(key)) for key in columns)] for row in rows]
-    if "paired" in result:
-        pairs = _table(pick_tables.pairs_of(result))
-        return f"{_table([head, *lines])}\n\n{pairs}\n\n{origin(result)}"
-    return _markdown([head, *lines], result)
+        lines = pick_tables.lines_of(result)
+    else:
+        rows: list[Json] = result["results"]
+        columns = list(dict.fromkeys(key for row in rows for key in row if key != "name"))
+        head = ["", *(header(key) for key in columns)]
+        cells = ([cell(row.get(key)) for key in columns] for row in rows)
+        lines = [
+            head,
+            *([f"`{row['name']}`", *one] for row, one in zip(rows, cells, strict=True)),
+        ]
+    pairs = [_table(pick_tables.pairs_of(result))] if "paired" in result else []
+    return "\n\n".join([_table(lines), *pairs, origin(result)])
 
 
 def _markdown(lines: list[list[str]], result: Json, others: Sequence[Json] = ()) -> str:

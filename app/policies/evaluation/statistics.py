@@ -202,3 +202,17 @@ def mcnemar(first: ArrayLike, second: ArrayLike) -> dict[str, float]:
     gained, lost = int((a & ~b).sum()), int((~a & b).sum())
     p = scipy.stats.binomtest(gained, gained + lost).pvalue if gained + lost else 1.0
     return {"only_first": gained, "only_second": lost, "p": float(p)}
+
+
+def paired(name: str, first: ArrayLike, second: ArrayLike) -> dict[str, str | float]:
+    """Return a named comparison of two success rates on the same episodes.
+
+    Args:
+        first: Whether each episode succeeded under the first condition, shape (n,).
+        second: The same under the second one.
+
+    Returns:
+        Name, first rate less the second, and the numbers of :func:`mcnemar`.
+    """
+    a, b = np.asarray(first, dtype=bool), np.asarray(second, dtype=bool)
+    return {"name": name, "difference": float(a.mean() - b.mean()), **mcnemar(a, b)}

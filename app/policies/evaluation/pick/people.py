@@ -29,7 +29,7 @@ from app.policies.evaluation.pick import selection_rules
 from app.policies.evaluation.pick.episodes import Episodes, Evaluator, PickBench, Rule
 from app.policies.evaluation.pick.tasks import settings_of
 from app.policies.evaluation.rows import EvaluationRequest, Json
-from app.policies.evaluation.statistics import rate_of, wilson
+from app.policies.evaluation.statistics import paired, rate_of, wilson
 from app.policies.inference.task_selection import HYSTERESIS
 from app.sim.cells.cell import Cell
 from app.sim.collision.contact import clearance
@@ -67,23 +67,43 @@ def beside_each(
         planners: Whether a planner acts beside people at rest, for the rows of one setting.
     """
     stated, rule = Json(hysteresis=HYSTERESIS), selection_rules.critic(HYSTERESIS)
-    results = bench.request.rows(len(rows) * len(planners))
+    results, differences = bench.request.rows(len(rows) * len(planners)), list[Json]()
     for name, settings in rows.items():
         evaluator = bench.evaluator(settings)
         people = _beside_a_resting_robot(evaluator.batch)
-        for _, row in _runs(evaluator, rule, name, planners):
+        for _, row in _runs(evaluator, rule, name, planners, differences):
             results.append(row | people)
         stated[name] = settings_of(evaluator.batch)
-    return {"settings": stated, "results": results}
+    return {"settings": stated, "results": results} | _paired(differences)
 
 
 def _runs(
-    evaluator: Evaluator, rule: Rule, name: str, planners: Sequence[bool]
+    evaluator: Evaluator,
+    rule: Rule,
+    name: str,
+    planners: Sequence[bool],
+    differences: list[Json],
 ) -> Iterator[tuple[Episodes, Json]]:
-    """Yield the same episodes without and with a planner beside people at rest, and rows."""
+    """Yield the same episodes without and with a planner beside people at rest, and rows.
+
+    Args:
+        name: Name of the row without the planner.
+        planners: Whether the planner acts, for each row.
+        differences: Gets the success with the planner against that without.
+    """
+    alone: Episodes | None = None
     for planned in planners:
         run = evaluator.run(rule, planned=planned)
+        if alone is not None:
+            differences.append(
+                paired(f"{name}, planner - {name}", run.succeeded, alone.succeeded)
+            )
+        alone = run
         yield run, run.row(f"{name}, planner" if planned else name)
+
+
+def _paired(differences: list[Json]) -> Json:
+    return {"paired": differences} if differences else {}
 
 
 def _planners(settings: PickSettings) -> tuple[bool, ...]:
@@ -160,13 +180,15 @@ def run_rest(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
         "stops": replace(usual.work, at_rest=1.0, off_task=0.5),
         "works": usual.work,
     }
-    stated, results = Json(), request.rows(len(rows) * len(planners))
+    stated, differences = Json(), list[Json]()
+    results = request.rows(len(rows) * len(planners))
     for name, work in rows.items():
         evaluator = bench.evaluator(replace(usual, work=work))
-        for run, row in _runs(evaluator, selection_rules.fixed(0), name, planners):
+        rule = selection_rules.fixed(0)
+        for run, row in _runs(evaluator, rule, name, planners, differences):
             results.append(row | _timeouts(evaluator.batch, run))
         stated[name] = settings_of(evaluator.batch)
-    return {"settings": stated, "results": results}
+    return {"settings": stated, "results": results} | _paired(differences)
 
 
 def _timeouts(batch: PickBatch, run: Episodes) -> dict[str, dict[str, float]]:

@@ -36,7 +36,7 @@ from app.policies.evaluation.pick import selection_rules
 from app.policies.evaluation.pick.episodes import CANDIDATES, Evaluator, PickBench
 from app.policies.evaluation.pick.tasks import settings_of
 from app.policies.evaluation.rows import EvaluationRequest, Json
-from app.policies.evaluation.statistics import mean_of, rate_of
+from app.policies.evaluation.statistics import mean_of, paired, rate_of
 from app.policies.inference.task_selection import HYSTERESIS
 from app.sim.pick.monitored_batch import AMONG_HANDS, MonitoredPickBatch
 from app.sim.safety.layer import SafetySettings
@@ -140,15 +140,20 @@ def run_ssm(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
     runs: dict[str, MonitoredEpisodes] = {}
     can_choose = len(bench.cell.pick_stations) >= CANDIDATES[1]
     conditions = {name: c for name, c in CONDITIONS.items() if can_choose or not c.choice}
-    rows = request.rows(len(conditions))
+    rows, differences = request.rows(len(conditions)), list[Json]()
     for name, condition in conditions.items():
         runs[name] = run_condition(bench, condition)
-        without = runs["choice-no-ssm" if condition.choice else "no-ssm"]
+        other = "choice-no-ssm" if condition.choice else "no-ssm"
+        without = runs[other]
         rows.append(row_of(name, runs[name], without if condition.active else None))
+        if condition.active:
+            won = runs[name].arrived, without.arrived
+            differences.append(paired(f"{name} - {other}", *won))
     stated = {name: one.safety.describe() for name, one in conditions.items() if one.active}
     started = batch_of(bench, CONDITIONS["ssm"], 0)
     started.reset()  # the first states of at most CHUNK episodes are stated
     return {
         "settings": {**settings_of(started), "hysteresis": HYSTERESIS, "safety": stated},
         "results": rows,
+        "paired": differences,
     }

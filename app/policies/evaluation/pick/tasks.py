@@ -22,7 +22,7 @@ from app.policies.evaluation.pick.episodes import (
     time_limits,
 )
 from app.policies.evaluation.rows import EvaluationRequest, Json
-from app.policies.evaluation.statistics import mcnemar
+from app.policies.evaluation.statistics import paired
 from app.policies.inference.task_selection import HYSTERESIS
 from app.sim.collision.fcl_recheck import Trajectory
 from app.sim.pick.batch import OUTCOMES, PickBatch
@@ -122,9 +122,7 @@ def compare_rules(
     critic, gain = won.pop(CRITIC), float(won[ORACLE].mean() - won["nearest"].mean())
     return runs[CRITIC], [
         {
-            "name": f"{prefix}{CRITIC} - {rule}",
-            "difference": float(critic.mean() - other.mean()),
-            **mcnemar(critic, other),
+            **paired(f"{prefix}{CRITIC} - {rule}", critic, other),
             **({"oracle_gain": gain} if rule == "nearest" else {}),
         }
         for rule, other in won.items()
@@ -135,17 +133,17 @@ def run_choice(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
     """Evaluate selection among 2 or 3 random targets, and other rules on the same episodes."""
     evaluators = evaluators_of(PickBench(checkpoint, request))
     rows = request.rows(len(evaluators) * (len(OTHER_RULES) + 2))
-    paired, trajectories = list[Json](), list[Trajectory]()
+    differences, trajectories = list[Json](), list[Trajectory]()
     for name, evaluator in evaluators.items():
         recorded = 0 if name else N_RECHECKED
-        critic, differences = compare_rules(evaluator, request.seed, rows, name, recorded)
-        paired += differences
+        critic, compared = compare_rules(evaluator, request.seed, rows, name, recorded)
+        differences += compared
         trajectories += critic.trajectories
     usual = evaluators[""].batch
     return {
         "settings": {**settings_of(usual), "hysteresis": HYSTERESIS},
         "results": rows,
-        "paired": paired,
+        "paired": differences,
         "fcl_recheck": recheck(usual.cell, trajectories),
     }
 
@@ -167,12 +165,12 @@ def run_choice_hard(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
         more = replace(usual, people=PAIR, n_candidates=MANY_TARGETS)
         settings["two-people-4-to-6-targets"] = more
     rows = request.rows(len(settings) * (len(OTHER_RULES) + 2))
-    paired, stated = list[Json](), Json(hysteresis=HYSTERESIS)
+    differences, stated = list[Json](), Json(hysteresis=HYSTERESIS)
     for name, one in settings.items():
         evaluator = bench.evaluator(one)
-        paired += compare_rules(evaluator, request.seed, rows, name)[1]
+        differences += compare_rules(evaluator, request.seed, rows, name)[1]
         stated[name] = {**settings_of(evaluator.batch), "pace": one.work.pace}
-    return {"settings": stated, "results": rows, "paired": paired}
+    return {"settings": stated, "results": rows, "paired": differences}
 
 
 def _oracle(runs: list[Episodes]) -> Episodes:

@@ -79,6 +79,7 @@ def test_yielding_people_touch_a_robot_at_rest_less_often():
     touched = [rows[kind]["touched_at_rest"]["mean"] for kind in kinds]
     assert touched[0] > touched[2] + 0.05
     assert touched[0] >= touched[1] >= touched[2]
+    assert [one["name"] for one in result["paired"]] == [f"{k}, planner - {k}" for k in kinds]
     late = [row["timeout"]["mean"] for name, row in rows.items() if "yielding-1" in name]
     assert late[1] < late[0]  # people who yield stop in the robot's path
 

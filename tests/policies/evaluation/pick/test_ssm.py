@@ -54,6 +54,20 @@ def test_every_episode_has_one_end(found):
         assert sum(row[key]["mean"] for key in ends) == pytest.approx(1.0)
 
 
+def test_layer_is_compared_on_the_same_episodes(found):
+    rows = {row["name"]: row for row in found["results"]}
+    assert [one["name"] for one in found["paired"]] == [
+        f"{name} - {'choice-' if name.startswith('choice') else ''}no-ssm"
+        for name in rows
+        if not name.endswith("no-ssm")
+    ]
+    for one in found["paired"]:
+        first, second = (rows[name] for name in one["name"].split(" - "))
+        gain = first["success"]["mean"] - second["success"]["mean"]
+        assert one["difference"] == pytest.approx(gain)
+        assert one["only_first"] - one["only_second"] == round(N * gain)
+
+
 def test_chunks_equal_one_batch(monkeypatch):
     bench = PickBench(pretrained.load("pick"), EvaluationRequest(episodes=12, seed=5))
     whole = run_condition(bench, CONDITIONS["ssm"])

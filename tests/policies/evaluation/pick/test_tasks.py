@@ -159,6 +159,7 @@ def test_people_at_rest_do_not_move_and_timeouts_have_their_causes():
     kinds = ("library", "off-task", "reaches", "stops", "works")
     names = [name for kind in kinds for name in (kind, f"{kind}, planner")]
     assert [row["name"] for row in result["results"]] == names
+    assert [one["name"] for one in result["paired"]] == [f"{k}, planner - {k}" for k in kinds]
     moves = ["hand_moving_share" in one for one in result["settings"].values()]
     assert moves == [kind in ("stops", "works") for kind in kinds]
     for row in result["results"]:
