@@ -135,6 +135,25 @@ TABLES: Mapping[str, Callable[[list[Json]], list[list[str]]]] = {
 """Tables of the protocols with a form of their own."""
 
 
+def more_of(result: Json) -> list[list[list[str]]]:
+    """Return the further tables of a result."""
+    pairs = [pairs_of(result)] if "paired" in result else []
+    timed = [row for row in result["results"] if "expected_time_s" in row]
+    return [*pairs, _times(timed)] if timed else pairs
+
+
+def _times(rows: list[Json]) -> list[list[str]]:
+    columns = {
+        "time_to_success_s": "time to success [s]",
+        "expected_time_s": "expected [s]",
+        "time_ece_s": "difference over ten bins [s]",
+        "time_error_s": "absolute error [s]",
+        "time_error_constant_s": "of the mean time [s]",
+    }
+    cells = ([f"`{row['name']}`", *(f"{row[key]:.2f}" for key in columns)] for row in rows)
+    return [["", *columns.values()], *cells]
+
+
 def pairs_of(result: Json) -> list[list[str]]:
     """Return the paired comparisons of a result as lines of cells, the header first."""
     rows: list[Json] = result["paired"]

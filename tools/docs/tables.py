@@ -85,8 +85,8 @@ def table(result: Json, others: Sequence[Json] = ()) -> str:
             head,
             *([f"`{row['name']}`", *one] for row, one in zip(rows, cells, strict=True)),
         ]
-    pairs = [_table(pick_tables.pairs_of(result))] if "paired" in result else []
-    return "\n\n".join([_table(lines), *pairs, origin(result)])
+    more = (_table(one) for one in pick_tables.more_of(result))
+    return "\n\n".join([_table(lines), *more, origin(result)])
 
 
 def _markdown(lines: list[list[str]], result: Json, others: Sequence[Json] = ()) -> str:

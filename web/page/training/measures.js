@@ -28,6 +28,8 @@ const MEASURES = [
   ["switches_per_episode", "switches per episode", ""],
   ["moves_over_minimum", "moves / minimum", ""],
   ["time_to_success_s", "time to success", "s"],
+  ["expected_time_s", "expected time to success", "s"],
+  ["time_ece_s", "difference of expected times over ten bins", "s"],
   ["time_to_goal_s", "time to goal", "s"],
   ["time_s", "time to goal", "s"],
   ["time_lost_s", "time lost by the safety layer", "s"],

@@ -8,6 +8,8 @@ calibration error (ECE) is the mean absolute difference of probability and rate 
 equal counts; ``ece_floor`` is the ECE of perfectly calibrated predictions with these counts, if
 the two predictions of an episode come true together as often as possible. The Brier score is
 compared with that of a constant; AUC measures how well the probability ranks episodes.
+The expected time to success is compared with the time that passed in the episodes that
+succeeded.
 
 The probabilities were fitted to the mixture of people of the training; an observation does not
 reveal the kind of a person. ``recalibrated`` states ECE and Brier score after a recalibration
@@ -52,16 +54,20 @@ class _Predictions:
 
     def __init__(self, n: int, dt: float, seed: int) -> None:
         self._at = np.random.default_rng(seed).integers(1, round(LATEST_S / dt), n)
-        self._step = 0
+        self._step, self._dt = 0, dt
         self.rows: list[Index] = []
+        self.times: list[Vec] = []
+        """Time since the start [s], (k,)."""
         self.predictions: list[Vec] = []
-        """Probabilities of success and contact, half widths of their intervals, (k, 4)."""
+        """Probabilities of success and contact, half widths of their intervals, and expected
+        times to success [s], (k, 5)."""
 
     def __call__(self, view: SelectionInput) -> Index:
-        wanted = view.first | (self._at[view.rows] == self._step)
+        wanted, now_s = view.first | (self._at[view.rows] == self._step), self._step * self._dt
         self._step += 1
         if wanted.any() and view.outcomes is not None:
             self.rows.append(view.rows[wanted])
+            self.times.append(np.full(np.count_nonzero(wanted), now_s))
             self.predictions.append(view.outcomes[wanted, 0])
         return np.zeros(len(view.rows), dtype=np.int64)
 
@@ -104,7 +110,9 @@ def run_calibration(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
             row[what]["recalibrated"] = {
                 size: _errors(one[:, k], happened) for size, one in corrected.items()
             }
-        rows.append(row)
+        won = run.outcome[kept] == SUCCESS
+        left_s = run.duration_s[kept] - np.concatenate(rule.times)
+        rows.append(row | times_of(found[won, 4], left_s[won]))
         stated[name] = settings_of(evaluator.batch)
     return {"settings": stated, "results": rows}
 
@@ -155,6 +163,23 @@ def calibration(
     }
 
 
+def times_of(predicted: Vec, passed: Vec) -> Json:
+    """Return how expected times to success agree with those that passed; empty without any.
+
+    ``time_ece_s`` is the mean absolute difference of their means over ten bins of equal counts,
+    ``time_error_s`` that of the single times, and ``time_error_constant_s`` that of their mean.
+    """
+    if not len(passed):
+        return {}
+    return {
+        "time_to_success_s": float(passed.mean()),
+        "expected_time_s": float(predicted.mean()),
+        "time_ece_s": _ece(predicted, passed, _bins(predicted)),
+        "time_error_s": float(np.abs(passed - predicted).mean()),
+        "time_error_constant_s": float(np.abs(passed - passed.mean()).mean()),
+    }
+
+
 def _recalibrated(found: Vec, outcome: Index, episode: Index, seed: int) -> dict[str, Vec]:
     """Return probabilities after recalibrations, each half of the episodes by the other one.
 
@@ -189,9 +214,9 @@ def _bins(probability: Vec) -> list[Index]:
     return np.array_split(np.argsort(probability, kind="stable"), min(BINS, len(probability)))
 
 
-def _ece(probability: Vec, happened: Flags, parts: list[Index]) -> float:
-    errors = [abs(probability[one].mean() - happened[one].mean()) * len(one) for one in parts]
-    return float(sum(errors) / len(probability))
+def _ece(predicted: Vec, observed: Vec | Flags, parts: list[Index]) -> float:
+    errors = [abs(predicted[one].mean() - observed[one].mean()) * len(one) for one in parts]
+    return float(sum(errors) / len(predicted))
 
 
 def _auc(probability: Vec, happened: Flags) -> float | None:

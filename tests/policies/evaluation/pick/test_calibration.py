@@ -6,7 +6,7 @@ import pytest
 from app.errors import InvalidInput
 from app.policies.checkpoints import checkpoint as formats
 from app.policies.checkpoints import pretrained
-from app.policies.evaluation.pick.calibration import calibration
+from app.policies.evaluation.pick.calibration import calibration, times_of
 from app.policies.evaluation.registry import evaluate
 
 
@@ -82,9 +82,29 @@ def test_every_kind_of_people_has_a_row_with_both_outcomes():
     assert rows["mixture"]["success"]["rate"] != rows["two-people"]["success"]["rate"]
     short = rows["short-time"]["success"]
     assert short["brier"] < 0.7 * short["brier_constant"]
+    library = rows["library"]
+    assert abs(library["expected_time_s"] - library["time_to_success_s"]) < 1.0
     for row in rows.values():
         assert 60 <= row["predictions"] <= 120
         for what in ("success", "contact"):
             assert sum(one["n"] for one in row[what]["bins"]) == row["predictions"]
             assert 0.0 <= row[what]["mean"] <= 1.0
             assert row[what]["recalibrated"]["half"]["brier"] < 0.25
+        assert abs(row["expected_time_s"] - row["time_to_success_s"]) < 3.0
+        assert row["time_ece_s"] <= row["time_error_s"] < row["time_error_constant_s"] + 0.5
+
+
+def test_expected_times_are_compared_in_bins_and_one_by_one():
+    predicted, passed = np.arange(20.0), np.arange(20.0)
+    passed[::2] += 3.0  # one of the two of each bin
+    assert times_of(predicted, passed) == {
+        "time_to_success_s": 11.0,
+        "expected_time_s": 9.5,
+        "time_ece_s": 1.5,
+        "time_error_s": 1.5,
+        "time_error_constant_s": pytest.approx(np.abs(passed - 11.0).mean()),
+    }
+    passed[1::2] -= 3.0
+    assert times_of(predicted, passed)["time_ece_s"] == 0.0
+    assert times_of(predicted, passed)["time_error_s"] == 3.0
+    assert times_of(np.zeros(0), np.zeros(0)) == {}
