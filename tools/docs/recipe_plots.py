@@ -6,12 +6,14 @@ Reads the curves in ``docs/results``: ``thesis-sorting``, ``thesis-reach`` and `
 of the recipes, ``sorting-curves``, ``reach-curves`` and ``pick-curves`` of ours. Writes
 ``docs/img/recipes.png``: success and collisions over environment steps, updates and processor
 time, a line per seed. A curve without a result file is left out. Writes also
-``docs/img/reach/curves-thesis.png`` and ``docs/img/pick/curve-thesis.png``: return and rates of
-the recipes, like figures 4.4 and 5.3 of the thesis.
+``docs/img/reach/curves-thesis.png`` and ``docs/img/pick/curve-thesis.png``, return and rates of
+the recipes like figures 4.4 and 5.3 of the thesis, and ``docs/img/reach/ablation.png``, success
+of ``reach-ddpg-authors`` with one change at a time.
 """
 
 from collections.abc import Sequence
 from pathlib import Path
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -21,7 +23,7 @@ from numpy.typing import NDArray
 
 from app.policies.configs import presets
 from tools.arguments import parser_of
-from tools.docs.reach.style import THESIS_SUCCESS
+from tools.docs.reach.style import PURPLE, THESIS_SUCCESS
 from tools.docs.results import IMAGES, RESULTS, Json, read_if_measured
 from tools.docs.world.plots import BLUE, GREEN, GREY, ORANGE, RED, panels, save
 
@@ -37,6 +39,17 @@ FOUR = "four attempts per update"
 """Another one."""
 POOLED = 200
 """Least number of episodes behind a drawn point."""
+ABLATED = "reach-ddpg-authors"
+CHANGES = MappingProxyType(
+    {
+        "exchanged learning rates": ORANGE,
+        "observations not normalised": RED,
+        "goals at random": GREEN,
+        "contacts do not block": PURPLE,
+        "an update per step": GREY,
+    }
+)
+"""Variants of the recipe ``ABLATED``, by the change, and their colours."""
 Grid = NDArray[np.float64]
 
 
@@ -194,6 +207,27 @@ def recorded(results: Path, file: str, names: Sequence[str], printed: float) -> 
     return figure
 
 
+def ablation(results: Path) -> Figure:
+    """Draw success of a recipe and its variants over environment steps and updates."""
+    figure, axes = panels(1, 2, 3.4, sharey=True)
+    for view, (over, label) in zip(axes[0], AXES[:2], strict=True):
+        for change, colour in (("", BLUE), *CHANGES.items()):
+            name = f"{ABLATED}, {change}" if change else ABLATED
+            for k, curve in enumerate(curves_of(results, "thesis-reach", name)):
+                shown = None if k else change or ABLATED
+                points = _columns(pooled(curve), over, "success")
+                view.plot(*points, color=colour, lw=1.2, label=shown)
+        view.axhline(THESIS_SUCCESS, color=GREY, lw=0.9, ls=":", label="thesis")
+        view.set(xscale="log", ylim=(-0.02, 1.02), xlabel=label)
+        view.xaxis.set_major_formatter(FuncFormatter(_short))
+        view.xaxis.set_minor_formatter(NullFormatter())
+        view.yaxis.set_major_formatter(PercentFormatter(1.0, decimals=0, symbol=" %"))
+    axes[0, 0].set_title("success, one change at a time")
+    lines = axes[0, 0].get_legend_handles_labels()
+    figure.legend(*lines, loc="outside lower center", ncols=4)
+    return figure
+
+
 def _short(value: float, _place: int) -> str:
     for factor, unit in ((1e6, " M"), (1e3, " k")):
         if value >= factor:
@@ -204,6 +238,7 @@ def _short(value: float, _place: int) -> str:
 def main() -> None:
     """Draw all pictures."""
     save(recipes, IMAGE, RESULTS)
+    save(ablation, IMAGES / "reach/ablation.png", RESULTS)
     reach = ("reach-ddpg-authors", "reach-ddpg-thesis")
     for file, names, printed, image in (
         ("thesis-reach", reach, THESIS_SUCCESS, "reach/curves-thesis.png"),

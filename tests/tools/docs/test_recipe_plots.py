@@ -7,7 +7,16 @@ import numpy as np
 import pytest
 
 from tests.policies.conftest import TINY, preset_of
-from tools.docs.recipe_plots import curves_of, pooled, recipes, recorded, updates_at
+from tools.docs.recipe_plots import (
+    ABLATED,
+    CHANGES,
+    ablation,
+    curves_of,
+    pooled,
+    recipes,
+    recorded,
+    updates_at,
+)
 from tools.docs.results import RESULTS
 from tools.docs.thesis_curves import curve_of
 from tools.docs.training_curves import record
@@ -69,3 +78,14 @@ def test_folder_of_a_training_is_a_curve(tmp_path: Path) -> None:
     assert other == {key: value for key, value in curve.items() if key != "name"}
     (tmp_path / "pick-curves.json").write_text(json.dumps({"curves": [curve]}))
     assert curves_of(tmp_path, "pick-curves", "pick-td3") == [curve]
+
+
+def test_each_change_of_a_recipe_is_drawn_beside_it(tmp_path: Path) -> None:
+    assert [len(view.lines) for view in ablation(tmp_path).axes] == [1, 1]
+    stored = {
+        one["name"] for one in json.loads((RESULTS / "thesis-reach.json").read_text())["curves"]
+    }
+    assert {f"{ABLATED}, {change}" for change in CHANGES} <= stored
+    n = sum(name.startswith(ABLATED) for name in stored)
+    labels = {line.get_label() for line in ablation(RESULTS).axes[0].lines}
+    assert len({one for one in labels if not str(one).startswith("_")}) == n + 1  # the thesis

@@ -212,7 +212,7 @@ def between_targets(results: Sequence[Json]) -> Figure:
     right.set(xlabel="goal to the nearest target [mm]")
     percent(right.yaxis)
     if several:
-        right.legend(loc="lower left")
+        figure.legend(*right.get_legend_handles_labels(), loc="outside lower right", ncols=3)
     return figure
 
 
