@@ -15,13 +15,12 @@ import httpx
 import pytest
 from playwright.sync_api import Browser, ConsoleMessage, Page, Request, expect, sync_playwright
 
-from jobs.attempt import NICENESS
 from tests.support import patient_http
 
 ROOT = Path(__file__).parents[2]
 LIMIT_S = 900.0
 """Time that anything may take, far above what it takes; only a hang reaches it. Software draws
-3 to 12 pictures per second [s]."""
+3 to 12 pictures per second, and jobs have a lower priority than it [s]."""
 FLAGS = [
     "--no-sandbox",
     "--disable-gpu",
@@ -135,24 +134,14 @@ def free_port() -> int:
 
 
 @pytest.fixture(scope="session")
-def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
-    """Start the system's Chromium, headless, with software rendering.
-
-    It has the priority of jobs, which would stand still beside windows that draw. Root's
-    Chromium raises it again unless it loses that capability.
-    """
+def browser() -> Iterator[Browser]:
+    """Start the system's Chromium, headless, with software rendering."""
     path = shutil.which("chromium") or shutil.which("chromium-browser")
     path = path or shutil.which("google-chrome")
     if path is None:
         pytest.fail("no chromium, chromium-browser or google-chrome on PATH")
-    lowered = tmp_path_factory.mktemp("browser") / "chromium"
-    as_user = (
-        "setpriv --bounding-set=-sys_nice --inh-caps=-sys_nice" if not os.geteuid() else ""
-    )
-    lowered.write_text(f'#!/bin/sh\nexec {as_user} nice -n {NICENESS} "{path}" "$@"\n')
-    lowered.chmod(0o755)
     with sync_playwright() as driver:
-        running = driver.chromium.launch(executable_path=lowered, args=FLAGS)
+        running = driver.chromium.launch(executable_path=path, args=FLAGS)
         yield running
         running.close()
 
