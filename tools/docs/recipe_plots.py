@@ -17,6 +17,7 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, NullFormatter, PercentFormatter
 from numpy.typing import NDArray
@@ -40,6 +41,7 @@ FOUR = "four attempts per update"
 POOLED = 200
 """Least number of episodes behind a drawn point."""
 ABLATED = "reach-ddpg-authors"
+"""The recipe that is changed."""
 CHANGES = MappingProxyType(
     {
         "exchanged learning rates": ORANGE,
@@ -49,7 +51,7 @@ CHANGES = MappingProxyType(
         "an update per step": GREY,
     }
 )
-"""Variants of the recipe ``ABLATED``, by the change, and their colours."""
+"""Colour of each variant of it, by the change."""
 Grid = NDArray[np.float64]
 
 
@@ -166,10 +168,7 @@ def recipes(results: Path) -> Figure:
             for end, rate in row.printed:
                 style = ":" if end == "success" else "-."
                 view.axhline(rate, color=GREY, lw=0.9, ls=style, label=f"thesis: {end}")
-            view.set(xscale="log", ylim=(-0.02, 1.02), xlabel=label)
-            view.xaxis.set_major_formatter(FuncFormatter(_short))
-            view.xaxis.set_minor_formatter(NullFormatter())
-            view.yaxis.set_major_formatter(PercentFormatter(1.0, decimals=0, symbol=" %"))
+            _rates_over(view, label)
         dashed = "; dashed: collisions" if row.printed else ""
         views[0].set_title(f"{row.title}: success{dashed}")
         lines = views[0].get_legend_handles_labels()
@@ -218,14 +217,19 @@ def ablation(results: Path) -> Figure:
                 points = _columns(pooled(curve), over, "success")
                 view.plot(*points, color=colour, lw=1.2, label=shown)
         view.axhline(THESIS_SUCCESS, color=GREY, lw=0.9, ls=":", label="thesis")
-        view.set(xscale="log", ylim=(-0.02, 1.02), xlabel=label)
-        view.xaxis.set_major_formatter(FuncFormatter(_short))
-        view.xaxis.set_minor_formatter(NullFormatter())
-        view.yaxis.set_major_formatter(PercentFormatter(1.0, decimals=0, symbol=" %"))
+        _rates_over(view, label)
     axes[0, 0].set_title("success, one change at a time")
     lines = axes[0, 0].get_legend_handles_labels()
     figure.legend(*lines, loc="outside lower center", ncols=4)
     return figure
+
+
+def _rates_over(view: Axes, label: str) -> None:
+    """Set the axes of rates over a logarithmic amount of training."""
+    view.set(xscale="log", ylim=(-0.02, 1.02), xlabel=label)
+    view.xaxis.set_major_formatter(FuncFormatter(_short))
+    view.xaxis.set_minor_formatter(NullFormatter())
+    view.yaxis.set_major_formatter(PercentFormatter(1.0, decimals=0, symbol=" %"))
 
 
 def _short(value: float, _place: int) -> str:

@@ -80,11 +80,8 @@ def table(result: Json, others: Sequence[Json] = ()) -> str:
         rows: list[Json] = result["results"]
         columns = list(dict.fromkeys(key for row in rows for key in row if key != "name"))
         head = ["", *(header(key) for key in columns)]
-        cells = ([cell(row.get(key)) for key in columns] for row in rows)
-        lines = [
-            head,
-            *([f"`{row['name']}`", *one] for row, one in zip(rows, cells, strict=True)),
-        ]
+        lines = [[f"`{row['name']}`", *(cell(row.get(key)) for key in columns)] for row in rows]
+        lines.insert(0, head)
     more = (_table(one) for one in pick_tables.more_of(result))
     return "\n\n".join([_table(lines), *more, origin(result)])
 

@@ -167,7 +167,12 @@ def times_of(predicted: Vec, passed: Vec) -> Json:
     """Return how expected times to success agree with those that passed; empty without any.
 
     ``time_ece_s`` is the mean absolute difference of their means over ten bins of equal counts,
-    ``time_error_s`` that of the single times, and ``time_error_constant_s`` that of their mean.
+    ``time_error_s`` that of the single times, and ``time_error_constant_s`` that of the single
+    times and their mean.
+
+    Args:
+        predicted: Expected times to success [s], shape (n,).
+        passed: Times that passed until success [s], shape (n,).
     """
     if not len(passed):
         return {}
