@@ -14,9 +14,11 @@ from app.policies.algorithms.exploration import (
 )
 from app.policies.algorithms.parameter_noise import ParameterNoise
 from app.policies.algorithms.td3 import BatchTD3, Networks, critics_of
+from app.policies.checkpoints.checkpoint import Checkpoint
 from app.policies.checkpoints.model_state import tensors_under
 from app.policies.configs.pick import PickPeople, PickPreset
 from app.policies.networks.actor_critic import Critics
+from app.policies.networks.outcome import OutcomeHead
 from app.policies.networks.pick import LAYOUTS, actor_of, critics_for
 from app.policies.training.curve import CURVE_SEED, outcome_rates, played_rates
 from app.policies.training.outcome import FitStopped, collect, fit
@@ -173,20 +175,44 @@ def add_outcomes(run: TrainingRun, preset: PickPreset, should_stop: Callable[[],
     Returns:
         Whether that was done; false where ``should_stop`` ended it.
     """
-    learning, arrays = preset.learning, run.policy().arrays()
-    batch = batch_of(preset, run.cell, learning.n_envs, run.seed + OUTCOME_SEED)
+    try:
+        head = outcomes_of(run.policy(), preset, run.cell, should_stop)
+    except FitStopped:
+        return False
+    if head is not None:
+        run.add("outcome", head)
+    return True
+
+
+def outcomes_of(
+    checkpoint: Checkpoint, preset: PickPreset, cell: Cell, should_stop: Callable[[], bool]
+) -> OutcomeHead | None:
+    """Return outcome probabilities fitted to episodes of a policy.
+
+    Args:
+        checkpoint: Actor and critics.
+        preset: Preset of their training.
+        cell: Cell of their training.
+        should_stop: Called before every step and every pass over the data.
+
+    Returns:
+        The ensemble; None where fewer than MIN_EPISODES ended.
+
+    Raises:
+        FitStopped: ``should_stop`` asked for it.
+    """
+    learning, arrays = preset.learning, checkpoint.arrays()
+    seed = int(checkpoint.manifest["seed"])
+    batch = batch_of(preset, cell, learning.n_envs, seed + OUTCOME_SEED)
     actor = actor_of(preset, batch.obs_size)
     critic = critics_for(preset, batch.obs_size)
     actor.load_state_dict(tensors_under(arrays, "actor"))
     critic.load_state_dict(tensors_under(arrays, "critic"))
     n_steps = round(OUTCOME_SHARE * learning.total_steps) // learning.n_envs
-    try:
-        data = collect(batch, actor, critic, n_steps, run.seed, should_stop)
-        if len(np.unique(data.episode)) >= MIN_EPISODES:
-            run.add("outcome", fit(data, run.seed, should_stop))
-    except FitStopped:
-        return False
-    return True
+    data = collect(batch, actor, critic, n_steps, seed, should_stop)
+    if len(np.unique(data.episode)) < MIN_EPISODES:
+        return None
+    return fit(data, seed, should_stop)
 
 
 def collision_cost(preset: PickPreset, step: int) -> float:

@@ -35,6 +35,17 @@ def test_a_fit_recovers_a_rate_that_depends_on_one_input(n: int, error: float) -
     np.testing.assert_allclose(found.time_s, 3.0, atol=0.3)
 
 
+def test_times_that_are_skewed_have_their_mean_as_expected_time() -> None:
+    """Most successes take 2 s, a tenth of them 12 s: the median is 2 s, the mean 3 s."""
+    rng, n = np.random.default_rng(2), 20_000
+    obs = rng.normal(size=(n, 4)).astype(np.float32)
+    time_s = np.where(rng.random(n) < 0.1, 12.0, 2.0).astype(np.float32)
+    zeros = np.zeros(n, dtype=np.float32)
+    data = OutcomeData(obs, zeros, zeros.astype(np.int64), time_s, np.arange(n))
+    found = fit(data, 1, lambda: False).predict(torch.zeros(1, 4), torch.zeros(1))
+    np.testing.assert_allclose(found.time_s, 3.0, atol=0.3)
+
+
 def test_small_errors_of_certain_outcomes_widen_no_interval() -> None:
     """Three equal members predict 99.93 %, and all succeed: the spread is 0, the error not."""
     head, n = OutcomeHead(1), 1000
