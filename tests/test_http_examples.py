@@ -59,6 +59,12 @@ def shape(value: Any) -> Any:
     return "number" if isinstance(value, int | float) else type(value).__name__
 
 
+def assert_same_outcome(answered: Any, shown: Any) -> None:
+    for what in ("success", "contact"):
+        assert answered[what] == pytest.approx(shown[what], abs=0.02)
+    assert answered["time_s"] == pytest.approx(shown["time_s"], abs=0.1)
+
+
 def flagged(value: Any, place: str = "") -> list[str]:
     """Return what an answer flags: where, and what."""
     if isinstance(value, list):
@@ -109,6 +115,7 @@ def test_task_selection_answers_in_the_shape_that_is_shown(address: str) -> None
     assert answer["chosen"] == SAMPLES[0]["chosen"]
     for one, shown in zip(answer["candidates"], SAMPLES[0]["candidates"], strict=True):
         assert one["value"] == pytest.approx(shown["value"], abs=0.02)
+        assert_same_outcome(one["outcome"], shown["outcome"])
 
 
 def test_motion_answers_as_is_shown(address: str) -> None:
@@ -130,7 +137,9 @@ def test_plan_answers_as_is_shown(address: str) -> None:
     assert shape(answer) == shape(shown)
     assert (answer["symbol"], answer["move"]) == (shown["symbol"], shown["move"])
     for one, two in zip(answer["moves"], shown["moves"], strict=True):
-        assert one["to_object"]["value"] == pytest.approx(two["to_object"]["value"], abs=0.02)
+        for motion in ("to_object", "to_place"):
+            assert one[motion]["value"] == pytest.approx(two[motion]["value"], abs=0.02)
+            assert_same_outcome(one[motion]["outcome"], two[motion]["outcome"])
 
 
 def test_risk_map_answers_as_is_shown(address: str) -> None:
@@ -139,8 +148,9 @@ def test_risk_map_answers_as_is_shown(address: str) -> None:
     answer = json.loads(shell(command, address))
     assert shape(answer) == shape(shown)
     assert (answer["chosen"], answer["reason"]) == (shown["chosen"], shown["reason"])
-    for one, two in zip(answer["contact"], shown["contact"], strict=True):
-        assert one == pytest.approx(two, abs=0.02)
+    for what in ("success", "contact"):
+        for one, two in zip(answer[what], shown[what], strict=True):
+            assert one == pytest.approx(two, abs=0.02)
 
 
 def test_every_protocol_is_listed() -> None:

@@ -82,15 +82,13 @@ def test_every_kind_of_people_has_a_row_with_both_outcomes():
     assert rows["mixture"]["success"]["rate"] != rows["two-people"]["success"]["rate"]
     short = rows["short-time"]["success"]
     assert short["brier"] < 0.7 * short["brier_constant"]
-    library = rows["library"]
-    assert abs(library["expected_time_s"] - library["time_to_success_s"]) < 1.0
     for row in rows.values():
         assert 60 <= row["predictions"] <= 120
         for what in ("success", "contact"):
             assert sum(one["n"] for one in row[what]["bins"]) == row["predictions"]
             assert 0.0 <= row[what]["mean"] <= 1.0
             assert row[what]["recalibrated"]["half"]["brier"] < 0.25
-        assert abs(row["expected_time_s"] - row["time_to_success_s"]) < 3.0
+        assert abs(row["expected_time_s"] - row["time_to_success_s"]) < 1.0, row["name"]
         assert row["time_ece_s"] <= row["time_error_s"] < row["time_error_constant_s"] + 0.5
 
 
