@@ -88,7 +88,7 @@ def test_every_kind_of_people_has_a_row_with_both_outcomes():
             assert sum(one["n"] for one in row[what]["bins"]) == row["predictions"]
             assert 0.0 <= row[what]["mean"] <= 1.0
             assert row[what]["recalibrated"]["half"]["brier"] < 0.25
-        assert abs(row["expected_time_s"] - row["time_to_success_s"]) < 1.0, row["name"]
+        assert abs(row["expected_time_s"] - row["time_to_success_s"]) < 1.5, row["name"]
         assert row["time_ece_s"] <= row["time_error_s"] < row["time_error_constant_s"] + 0.5
 
 
