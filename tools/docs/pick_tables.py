@@ -68,7 +68,7 @@ def _variants(rows: list[Json]) -> list[list[str]]:
 def _calibration(rows: list[Json]) -> list[list[str]]:
     head = ["", "outcome", "predictions", "rate [%]", "mean [%]", "ECE [%]", "by chance [%]"]
     more = ["ECE after 200 [%]", "ECE after half [%]", "Brier after half"]
-    lines = [[*head, "Brier", "constant", "AUC", *more]]
+    lines = [[*head, "rate inside interval [bins]", "Brier", "constant", "AUC", *more]]
     for row in rows:
         for outcome in ("success", "contact"):
             one: Json = row[outcome]
@@ -83,6 +83,7 @@ def _calibration(rows: list[Json]) -> list[list[str]]:
                         f"{100.0 * one[key]:.1f}"
                         for key in ("rate", "mean", "ece", "ece_floor")
                     ),
+                    _covered(one["bins"]),
                     f"{one['brier']:.4f}",
                     f"{one['brier_constant']:.4f}",
                     auc,
@@ -91,6 +92,12 @@ def _calibration(rows: list[Json]) -> list[list[str]]:
                 ]
             )
     return lines
+
+
+def _covered(bins: list[Json]) -> str:
+    """Return in how many bins the observed rate lies inside the mean 95 % interval."""
+    inside = [abs(one["rate"] - one["probability"]) <= one["spread"] for one in bins]
+    return f"{sum(inside)} of {len(inside)}"
 
 
 def _monitored(rows: list[Json]) -> list[list[str]]:
