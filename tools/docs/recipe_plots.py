@@ -75,6 +75,7 @@ ROWS = (
             ("thesis-sorting", f"sorting-e0-thesis, {FOUR}, until flat", GREEN),
             ("thesis-sorting", f"sorting-e0-thesis, {FOUR}, continued", GREEN),
             ("thesis-sorting", f"sorting-e0-thesis, {FOUR}, {PYTORCH}", RED),
+            ("thesis-sorting", f"sorting-e0-thesis-informed, {FOUR}", PURPLE),
             ("sorting-curves", "sorting-e0-dqn", BLUE),
         ),
         (),
