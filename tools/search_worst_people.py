@@ -1,12 +1,13 @@
 """Search the hand motions beside which the shipped pick policy succeeds least.
 
 Differential evolution over the numbers of a motion (``evaluation/pick/worst_people.py``); the
-objective is the rate of success when the critic selects among two or three targets. All
-motions of a generation are evaluated in one batch. The last generation is evaluated again on
-another seed, because the least of many noisy rates is too low by chance, and its worst motions
-are written to ``worst_people.json``, which is committed.
+objective is the rate of success when the critic selects among two or three targets. The first
+generation contains the motions of the last search, for another policy perhaps. All motions of a
+generation are evaluated in one batch. The last generation is evaluated again on another seed,
+because the least of many noisy rates is too low by chance, and its worst motions are written to
+``worst_people.json``, which is committed.
 
-Takes about five minutes on one core.
+Takes about ten minutes on one core.
 """
 
 import json
@@ -23,7 +24,7 @@ from app.policies.checkpoints import pretrained
 from app.policies.checkpoints.checkpoint import Checkpoint
 from app.policies.evaluation.pick import selection_rules
 from app.policies.evaluation.pick.episodes import PickBench
-from app.policies.evaluation.pick.worst_people import FILE, HandMotion, beside
+from app.policies.evaluation.pick.worst_people import FILE, HandMotion, beside, stored_motions
 from app.policies.evaluation.rows import EvaluationRequest
 from app.policies.inference.task_selection import HYSTERESIS
 from app.sim.core.arrays import Vec
@@ -33,7 +34,7 @@ logger = logging.getLogger(__name__)
 
 SEED = 601
 """Seed of the search; ``SEED + 1`` is that of the second evaluation."""
-N_MOTIONS, N_GENERATIONS = 48, 12
+N_MOTIONS, N_GENERATIONS = 48, 24
 PER_MOTION, PER_MOTION_AGAIN = 24, 150
 """Episodes of each motion, on average."""
 N_KEPT = 10
@@ -62,6 +63,17 @@ def hand_motion(numbers: Vec) -> HandMotion:
     )
 
 
+def numbers_of(motion: HandMotion) -> Vec:
+    """Return the numbers of a motion, the inverse of :func:`hand_motion`."""
+    low, high = np.array(BOX)
+    points = (np.array(motion.palms) - low) / (high - low)
+    speeds = np.interp(motion.speeds, SPEEDS, (0, 1))
+    pauses = np.interp(motion.pauses, PAUSES, (0, 1))
+    return np.concatenate(
+        [[0.25 if motion.hand == "r" else 0.75], points.ravel(), speeds, pauses]
+    )
+
+
 def success_beside(
     checkpoint: Checkpoint, motions: Sequence[HandMotion], per_motion: int, seed: int
 ) -> NDArray[np.float64]:
@@ -80,9 +92,20 @@ def success_beside(
 
 
 def search(
-    checkpoint: Checkpoint, n_motions: int, n_generations: int, n_kept: int
+    checkpoint: Checkpoint,
+    first: Sequence[HandMotion],
+    n_motions: int,
+    n_generations: int,
+    n_kept: int,
 ) -> list[tuple[HandMotion, float]]:
-    """Return the worst motions found, and the rate of success beside each on another seed."""
+    """Return the worst motions found, and the rate of success beside each on another seed.
+
+    Args:
+        first: Motions of the first generation; the others are random.
+        n_motions: Motions of a generation, at least five and as many as ``first``.
+        n_generations: Generations after the first.
+        n_kept: Motions returned, from the worst on.
+    """
 
     def rates(numbers: NDArray[np.float64]) -> NDArray[np.float64]:
         motions = [hand_motion(one) for one in np.atleast_2d(numbers.T)]
@@ -91,10 +114,12 @@ def search(
         return found
 
     rng = np.random.default_rng(SEED)
+    start = rng.random((n_motions, N_NUMBERS))
+    start[: len(first)] = np.reshape([numbers_of(one) for one in first], (-1, N_NUMBERS))
     result = differential_evolution(
         rates,
         [(0.0, 1.0)] * N_NUMBERS,
-        init=rng.random((n_motions, N_NUMBERS)),
+        init=start,
         maxiter=n_generations,
         tol=0.0,
         polish=False,
@@ -112,7 +137,7 @@ def main() -> None:
     logging.basicConfig(level=logging.INFO, format="%(message)s")
     torch.set_num_threads(1)
     checkpoint = pretrained.load("pick")
-    found = search(checkpoint, N_MOTIONS, N_GENERATIONS, N_KEPT)
+    found = search(checkpoint, stored_motions(), N_MOTIONS, N_GENERATIONS, N_KEPT)
     lines = ",\n  ".join(
         json.dumps(asdict(motion) | {"success": round(rate, 3)}) for motion, rate in found
     )

@@ -7,7 +7,7 @@ from tools.search_worst_people import N_NUMBERS, hand_motion, search, success_be
 
 
 def test_a_search_returns_motions_from_the_worst_on() -> None:
-    found = search(pretrained.load("pick"), n_motions=5, n_generations=1, n_kept=3)
+    found = search(pretrained.load("pick"), [], n_motions=5, n_generations=1, n_kept=3)
     rates = [rate for _, rate in found]
     assert len(found) == 3 and rates == sorted(rates)
     assert all(0.0 < rate < 1.0 for rate in rates)

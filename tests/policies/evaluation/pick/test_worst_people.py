@@ -8,7 +8,15 @@ from app.policies.evaluation.pick.worst_people import motion_of, stored_motions
 from app.policies.evaluation.registry import evaluate
 from app.sim.cells.cell import load_cell
 from app.sim.human.kernels import kinematics as body
-from tools.search_worst_people import BOX, N_NUMBERS, N_POINTS, PAUSES, SPEEDS, hand_motion
+from tools.search_worst_people import (
+    BOX,
+    N_NUMBERS,
+    N_POINTS,
+    PAUSES,
+    SPEEDS,
+    hand_motion,
+    numbers_of,
+)
 
 CELL = load_cell("pick-and-place")
 
@@ -20,6 +28,10 @@ def test_numbers_span_the_limits(end: int) -> None:
     assert motion.palms == (BOX[end],) * N_POINTS
     assert set(motion.speeds) == {SPEEDS[end]}
     assert set(motion.pauses) == {PAUSES[end]}
+
+
+def test_numbers_of_a_motion_are_those_it_was_made_of() -> None:
+    assert [hand_motion(numbers_of(one)) for one in stored_motions()] == list(stored_motions())
 
 
 def test_the_palm_rests_at_the_points_and_moves_at_the_speeds() -> None:
