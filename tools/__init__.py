@@ -9,6 +9,7 @@ demonstrations          Synthetic demonstrations: reaches of a person between tw
 distance_fields         Smooth surfaces from round cones, for the model of the person
 fit_capsules            Fit capsules that contain the UR10's collision meshes; run ``python -m
                         tools.fit_capsules``
+fit_outcomes            Fit the outcome probabilities of a shipped pick policy again
 generate_client         Writes ``app/client/operations/`` from the OpenAPI document
 import_contracts        Import-linter contract: compiled kernels import only kernels, ``core``
                         and ``geometry``
