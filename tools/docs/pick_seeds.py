@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from tools.docs.headline import percent, share
+from tools.docs.pick_tables import p_value
 from tools.docs.results import Json, read_if_measured
 
 SUFFIXES = {"1, shipped": "", "2": "-seed2", "3": "-seed3"}
@@ -60,4 +61,4 @@ def _gain(result: Json, prefix: str) -> str:
     """Return how much of the oracle's gain over the nearest target the critic has."""
     name = f"{prefix}critic - nearest"
     pair = next(one for one in result["paired"] if one["name"] == name)
-    return f"{100.0 * pair['difference'] / pair['oracle_gain']:.0f} %, {pair['p']:.1g}"
+    return f"{100.0 * pair['difference'] / pair['oracle_gain']:.0f} %, {p_value(pair['p'])}"

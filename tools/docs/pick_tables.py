@@ -6,6 +6,8 @@ from tools.docs.headline import percent, share
 from tools.docs.results import Json
 
 CASES, VARIANTS = "pick-cases", "pick-case-variants"
+LEAST_P = 1e-300
+"""Least p-value that is printed."""
 CALIBRATION, MONITORED = "risk-calibration", "pick-ssm"
 
 
@@ -161,6 +163,11 @@ def _times(rows: list[Json]) -> list[list[str]]:
     return [["", *columns.values()], *cells]
 
 
+def p_value(p: float) -> str:
+    """Return a p-value with one digit; those that no number can hold are bounded."""
+    return f"{p:.1g}" if p > LEAST_P else f"below {LEAST_P:g}"
+
+
 def pairs_of(result: Json) -> list[list[str]]:
     """Return the paired comparisons of a result as lines of cells, the header first."""
     rows: list[Json] = result["paired"]
@@ -172,7 +179,7 @@ def pairs_of(result: Json) -> list[list[str]]:
                 f"{100.0 * row['difference']:+.1f}",
                 str(row["only_first"]),
                 str(row["only_second"]),
-                f"{row['p']:.1g}",
+                p_value(row["p"]),
             ]
         )
     if any("oracle_gain" in row for row in rows):

@@ -196,7 +196,7 @@ def mcnemar(first: ArrayLike, second: ArrayLike) -> dict[str, float]:
 
     Returns:
         Episodes that only the first won, those that only the second won, and the two-sided
-        p-value of equal rates.
+        p-value of equal rates; 0 where a float cannot hold it.
     """
     a, b = np.asarray(first, dtype=bool), np.asarray(second, dtype=bool)
     gained, lost = int((a & ~b).sum()), int((~a & b).sum())

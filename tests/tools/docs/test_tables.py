@@ -3,6 +3,7 @@ from pathlib import Path
 import pytest
 
 from app.policies.evaluation.reach.ssm import DIRECTED
+from tools.docs.pick_tables import p_value
 from tools.docs.results import ROOT
 from tools.docs.tables import (
     BLOCK,
@@ -38,6 +39,13 @@ def test_rates_are_shown_in_percent_with_their_interval() -> None:
     lines = table(EVALUATION).splitlines()
     assert lines[0] == "|  | n | success | time [s] |"
     assert lines[2] == "| `policy` | 1000 | 97.1 % (95.9-98.0) | 3.25 |"
+
+
+@pytest.mark.parametrize(
+    ("p", "text"), [(1.0, "1"), (0.0312, "0.03"), (3e-9, "3e-09"), (0.0, "below 1e-300")]
+)
+def test_p_values_that_no_number_can_hold_are_bounded(p: float, text: str) -> None:
+    assert p_value(p) == text
 
 
 def test_headers_carry_the_unit_of_their_key() -> None:
