@@ -23,7 +23,8 @@ export function Values({ world, cell, history, colourOf, labelOf }) {
         <span class="tip tip-left" role="tooltip" id="values-help">The critic estimates the expected
           discounted reward of moving to each candidate now: reaching it is rewarded, delay and
           contact cost. The highest value is chosen; a small bonus for the present target prevents
-          oscillation. The percentage is the probability of success, fitted to outcomes.</span>
+          oscillation. Percentage and seconds are the probability of success and the expected time
+          to it, fitted to outcomes.</span>
       </span>
     </header>
     ${rows.length === 0
@@ -66,6 +67,7 @@ function Bar({ candidate, chosen, isChosen, colour, label, rank, scale }) {
   return html`<li class=${classes.filter(Boolean).join(" ")} tabindex="0" data-candidate=${id}
     data-chosen=${isChosen ? "true" : "false"} aria-describedby=${`tip-${id}`}>
     <span class="bar-name"><i class="swatch" style=${{ background: colour }}></i>
+      ${rank && html`<b class="bar-rank" aria-label=${`rank ${rank}`}>${rank}.</b>`}
       <span title=${label}>${label}</span></span>
     <span class="bar-track">
       <i class="bar-zero" style=${{ left: `${zero}%` }}></i>
@@ -74,7 +76,8 @@ function Bar({ candidate, chosen, isChosen, colour, label, rank, scale }) {
     <span class="bar-value">${format.value(value)}</span>
     <span class="bar-odds" data-role="success">${Number.isFinite(candidate.success)
       && format.percent(candidate.success, 0)}</span>
-    <span class="bar-rank" aria-label=${rank && `rank ${rank}`}>${rank && `${rank}.`}</span>
+    <span class="bar-odds" data-role="time">${Number.isFinite(candidate.time_s)
+      && format.seconds(candidate.time_s)}</span>
     <span class="bar-note">${note(isChosen, reachable, outside)}</span>
     <span class="tip" role="tooltip" id=${`tip-${id}`}>${explain(candidate, chosen, label)}</span>
   </li>`;
