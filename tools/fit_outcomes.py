@@ -17,6 +17,7 @@ from app.policies.checkpoints.files import write_files
 from app.policies.checkpoints.model_state import versions, weights_of
 from app.policies.inference.value_networks import pick_preset_of
 from app.policies.training.pick import outcomes_of
+from app.policies.training.train import without_denormals
 from app.provenance import describe
 from app.sim.cells.cell import load_cell
 from tools.arguments import parser_of
@@ -34,7 +35,8 @@ def with_new_outcomes(checkpoint: Checkpoint) -> Checkpoint:
         ValueError: Too few episodes ended within its number of training steps.
     """
     preset = pick_preset_of(checkpoint)
-    head = outcomes_of(checkpoint, preset, load_cell(preset.cell), lambda: False)
+    with without_denormals():
+        head = outcomes_of(checkpoint, preset, load_cell(preset.cell), lambda: False)
     if head is None:
         raise ValueError("too few episodes ended: outcomes need a longer training")
     kept = {

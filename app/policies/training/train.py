@@ -36,7 +36,7 @@ def _bfloat16_products() -> Iterator[None]:
 
 
 @contextmanager
-def _without_denormals() -> Iterator[None]:
+def without_denormals() -> Iterator[None]:
     """Round denormal numbers, into which Adam's moments of rare inputs fade, to 0: faster."""
     torch.set_flush_denormal(True)
     try:
@@ -87,7 +87,7 @@ def train(
     """
     place = cell or load_cell(preset.cell)
     calls = Callbacks(on_progress, on_checkpoint, should_stop)
-    with _without_denormals():
+    with without_denormals():
         run, reporter = start(preset, seed, place, calls)
         run.policy()  # refuses networks that no checkpoint can hold before the first step
         if memory is not None:
