@@ -82,6 +82,8 @@ def test_every_kind_of_people_has_a_row_with_both_outcomes():
     assert rows["mixture"]["success"]["rate"] != rows["two-people"]["success"]["rate"]
     short = rows["short-time"]["success"]
     assert short["brier"] < 0.7 * short["brier_constant"]
+    library = rows["library"]
+    assert abs(library["expected_time_s"] - library["time_to_success_s"]) < 1.0
     for row in rows.values():
         assert 60 <= row["predictions"] <= 120
         for what in ("success", "contact"):
