@@ -4,7 +4,8 @@
 
 Writes ``docs/img/sorting/grid-e0.png`` and ``grid-e1.png``, heat maps of success and return
 over all pairs (K_E, K_G) as in thesis fig. 3.2, and ``curves-e0.png`` and ``curves-e1.png``,
-learning curves as in thesis fig. 3.1. Pictures without results are skipped.
+learning curves as in thesis fig. 3.1, also of its recipe (``thesis-sorting.json``). Pictures
+without results are skipped.
 """
 
 from collections.abc import Sequence
@@ -172,14 +173,34 @@ def _columns(points: Sequence[Json], x: str, y: str) -> tuple[Grid, Grid]:
     return np.array([float(one[x]) for one in kept]), np.array([float(one[y]) for one in kept])
 
 
+def recipes(result: Json, task: str) -> list[Json]:
+    """Return the thesis' recipe with four attempts per update in the form of :func:`curves`.
+
+    Args:
+        result: Result file ``thesis-sorting``.
+        task: e0 or e1.
+    """
+    return [
+        {
+            **one,
+            "played": [{**point, "mean_return": point["reward"]} for point in one["played"]],
+            "pairs": [],
+        }
+        for one in result["curves"]
+        if one["name"] == f"sorting-{task}-thesis, four attempts per update"
+    ]
+
+
 def main() -> None:
     """Draw the pictures of all existing results."""
     for task in TASKS:
         if result := read_if_measured(RESULTS / f"sorting-grid-{task}.json"):
             save(heat_maps, PICTURES / f"grid-{task}.png", result)
     trained = read_if_measured(RESULTS / "sorting-curves.json") or {"curves": []}
+    thesis = read_if_measured(RESULTS / "thesis-sorting.json") or {"curves": []}
     for task in TASKS:
-        of_task = [one for one in trained["curves"] if one["task"] == f"sorting-{task}"]
+        ours = [one for one in trained["curves"] if one["task"] == f"sorting-{task}"]
+        of_task = [*ours, *recipes(thesis, task)]
         if of_task:
             save(curves, PICTURES / f"curves-{task}.png", of_task)
 

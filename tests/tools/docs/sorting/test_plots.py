@@ -11,7 +11,7 @@ from tools.docs.learning_curves import merged
 from tools.docs.sorting import curves as sorting_curves
 from tools.docs.sorting import plots as sorting_plots
 from tools.docs.sorting.curves import curve_of_run, curve_of_stock
-from tools.docs.sorting.plots import TASKS, colour_of, grids
+from tools.docs.sorting.plots import TASKS, colour_of, grids, recipes
 from tools.docs.tables import table
 from tools.docs.world.plots import BLUE, GREEN, GREY, ORANGE
 
@@ -108,6 +108,17 @@ def test_grids_hold_every_pair_and_nothing_else() -> None:
 def test_curves_have_the_colours_of_who_learned() -> None:
     names = ("sorting-e0-dqn", "sorting-e1-dqn-pure", "sorting-e1-thesis", sorting_curves.STOCK)
     assert [colour_of(name) for name in names] == [BLUE, GREEN, ORANGE, GREY]
+
+
+def test_curves_of_the_recipe_are_those_with_four_attempts_per_update() -> None:
+    point = {"step": 50_000, "cpu_s": 61.0, "success": 0.1, "reward": -4.5}
+    name = "sorting-e1-thesis, four attempts per update"
+    curve = {"name": name, "seed": 1, "played": [point]}
+    others = [{**curve, "name": f"{name}, until flat"}, {**curve, "name": "sorting-e1-thesis"}]
+    (shown,) = recipes({"curves": [*others, curve]}, "e1")
+    assert (shown["name"], shown["seed"], shown["pairs"]) == (name, 1, [])
+    assert shown["played"] == [{**point, "mean_return": -4.5}]
+    assert recipes({"curves": [curve]}, "e0") == []
 
 
 @pytest.fixture
