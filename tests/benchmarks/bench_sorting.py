@@ -36,7 +36,7 @@ from tests.benchmarks.peers.sorting_pddl import PACKAGES, Found, installed, plan
 
 BENCH = "sorting"
 SHAPES = tuple(
-    SortingShape(n_cells=k, n_colours=2 if k <= 10 else 3) for k in (5, 10, 15, 20, 30, 40)
+    SortingShape(n_slots=k, n_colours=2 if k <= 10 else 3) for k in (5, 10, 15, 20, 30, 40)
 )
 POLICIES = {(10, 2): "sorting-e0", (20, 3): "sorting-e1"}
 """Shipped checkpoints by cells and colours."""
@@ -59,7 +59,7 @@ class Size:
 
 def task(shape: SortingShape, rng: np.random.Generator, disturbed: bool) -> SortingState:
     """Return an instance: all to be sorted, or half done when a person adds an object."""
-    state, k = empty_state(shape), shape.n_cells
+    state, k = empty_state(shape), shape.n_slots
     codes = np.sort(rng.integers(1, shape.n_types + 1, k - 1))[::-1]
     rest = []
     for colour in range(shape.n_colours):
@@ -79,9 +79,9 @@ def task(shape: SortingShape, rng: np.random.Generator, disturbed: bool) -> Sort
 def sizes(seed: int, instances: int) -> Iterator[Size]:
     """Yield the instances of every size, with and without disturbance."""
     for disturbed, shape in itertools.product((False, True), SHAPES):
-        rng = np.random.default_rng((seed, shape.n_cells, disturbed))
+        rng = np.random.default_rng((seed, shape.n_slots, disturbed))
         tasks = [task(shape, rng, disturbed) for _ in range(instances)]
-        name = f"{shape.n_cells}-{shape.n_colours}" + "-disturbed" * disturbed
+        name = f"{shape.n_slots}-{shape.n_colours}" + "-disturbed" * disturbed
         fewest = [solve(one, shape).moves for one in tasks]
         yield Size(name=name, shape=shape, tasks=tasks, fewest=fewest)
 
@@ -115,7 +115,7 @@ def quick(
 
 def policies(size: Size, seconds: float) -> Row:
     """Time the shipped policy where there is one for this size."""
-    alias = POLICIES.get((size.shape.n_cells, size.shape.n_colours))
+    alias = POLICIES.get((size.shape.n_slots, size.shape.n_colours))
     name = f"policy/{size.name}"
     if alias is None:
         return row_without(name, "no policy is trained for this size")

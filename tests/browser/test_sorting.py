@@ -13,10 +13,10 @@ pytestmark = pytest.mark.browser
 
 PHONE = (390, 844)
 BLOCKS = {
-    "cell5": "red-large",
-    "cell6": "red-small",
-    "cell9": "blue-medium",
-    "cell4": "blue-large",
+    "slot5": "red-large",
+    "slot6": "red-small",
+    "slot9": "blue-medium",
+    "slot4": "blue-large",
 }
 """What lies where at first; grasps hardly fail in these cells."""
 SPEED = "8"
@@ -75,7 +75,7 @@ def test_robot_reaches_a_goal_set_by_clicks_and_then_a_longer_one(
     before = state(sorting)
     page.click('[data-goal-add="blue-large"]')
     expect(page.locator(".story .chip")).not_to_have_text("Goal reached")
-    page.click('[data-cell="cell7"]')
+    page.click('[data-cell="slot7"]')
     page.click('[data-add="red-medium"]')
     page.click('[data-goal-add="red-medium"]')
     expect_reached(page, 5)
@@ -136,13 +136,13 @@ def test_chip_names_what_the_robot_does_after_the_goal_is_reached(
 def test_focus_returns_to_the_cell_of_a_picked_block(open_page: Callable[..., Page]) -> None:
     page = open_page(scene=False)
     page.click('[data-action="pause"]')
-    cell = page.locator('[data-cell="cell5"]')
+    cell = page.locator('[data-cell="slot5"]')
     for button in ("Done", "Remove"):
         cell.press("Enter")
         page.locator(".picked-acts").get_by_role("button", name=button).press("Enter")
         expect(page.locator(".picked")).to_have_count(0)
         expect(cell).to_be_focused()
-    expect(page.locator('[data-cell="cell5"][data-block]')).to_have_count(0)
+    expect(page.locator('[data-cell="slot5"][data-block]')).to_have_count(0)
     expect(cell).to_be_focused()
 
 
@@ -164,14 +164,14 @@ def test_page_counts_the_commands_that_a_world_refuses(
     open_page: Callable[..., Page], sorting: str
 ) -> None:
     page = open_page(scene=False)
-    page.click('[data-cell="cell7"]')
+    page.click('[data-cell="slot7"]')
     page.evaluate(
         """() => [1, 2, 3].forEach(() =>
           document.querySelector('[data-add="red-medium"]').click())"""
     )
-    expect(page.locator(".banner.bad")).to_contain_text("cell7")
+    expect(page.locator(".banner.bad")).to_contain_text("slot7")
     expect(page.locator(".banner.bad")).to_contain_text("(2 commands)")
-    assert [one["place"] for one in task(sorting)["blocks"]].count("cell7") == 1
+    assert [one["place"] for one in task(sorting)["blocks"]].count("slot7") == 1
 
 
 @pytest.mark.usefixtures("sorting")

@@ -6,7 +6,7 @@ import torch
 
 from app.sim.prediction.kernels.networks import N_PAST, N_TIMES, RADIUS_MIDDLE, RADIUS_SCALE
 from app.sim.prediction.weights import new_motion_predictor
-from tools import train_motion_predictor as make_forecasts
+from tools import train_motion_predictor as predictor
 from tools.train_motion_predictor import (
     constant_motion_errors,
     disturbed,
@@ -42,10 +42,8 @@ def test_the_shipped_networks_do_much_better_than_constant_motion_errors() -> No
 
 def test_learning_makes_the_errors_small() -> None:
     torch.manual_seed(0)
-    few = make_forecasts.network_of(
-        fitted(OTHERS.radius_seen, OTHERS.radius, 0.0, 0.0, n_updates=3)
-    )
-    more = make_forecasts.network_of(
+    few = predictor.network_of(fitted(OTHERS.radius_seen, OTHERS.radius, 0.0, 0.0, n_updates=3))
+    more = predictor.network_of(
         fitted(OTHERS.radius_seen, OTHERS.radius, 0.0, 0.0, n_updates=300)
     )
     before = errors(few, OTHERS.radius_seen, OTHERS.radius)
@@ -65,4 +63,4 @@ def test_disturbed_moments_are_shorter_or_noisy_and_still_right() -> None:
     # What will be is what it was, whatever is seen of now.
     torch.testing.assert_close(noisy[0][:, :1] + noisy[1], seen[:, :1] + said)
     changed = (noisy[0][:, 0] != seen[:, 0]).float().mean()
-    assert changed == pytest.approx(make_forecasts.NOISY_SHARE, abs=0.05)
+    assert changed == pytest.approx(predictor.NOISY_SHARE, abs=0.05)

@@ -62,9 +62,9 @@ def a_view(
 ) -> SortingSnapshot:
     """Return a task of five blocks, the first of which is being fetched."""
     blocks = blocks or (
-        block(cell, "block1", "red-large", "cell2"),
-        block(cell, "block2", "red-small", "cell5"),
-        block(cell, "block3", "blue-medium", "cell3"),
+        block(cell, "block1", "red-large", "slot2"),
+        block(cell, "block2", "red-small", "slot5"),
+        block(cell, "block3", "blue-medium", "slot3"),
         block(cell, "block4", "blue-large", "blue"),
         block(cell, "block5", "red-medium", "blue", 1),
     )

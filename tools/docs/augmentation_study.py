@@ -76,7 +76,7 @@ def tests(usual: PickSettings, recorded: tuple[Motion, ...]) -> dict[str, PickSe
     found = {
         "one_target": replace(usual, n_candidates=(1, 1)),
         "2_or_3_targets": usual,
-        "people_who_roam": replace(usual, work=replace(work, off_task=1.0)),
+        "people_off_task": replace(usual, work=replace(work, off_task=1.0)),
     }
     if recorded:
         beside = replace(work, motion="recorded", recorded=recorded)

@@ -50,11 +50,11 @@ def replanned(state: SortingState, shape: SortingShape) -> list[Move]:
 def small_task(rng: np.random.Generator) -> tuple[SortingState, SortingShape]:
     """Return a random task small enough for exhaustive search."""
     shape = SortingShape(
-        n_cells=int(rng.integers(2, 6)),
+        n_slots=int(rng.integers(2, 6)),
         n_colours=int(rng.integers(1, 4)),
         n_sizes=int(rng.integers(1, 3)),
     )
-    n_objects = int(rng.integers(1, shape.n_cells + 1))
+    n_objects = int(rng.integers(1, shape.n_slots + 1))
     return random_task(shape, rng, n_objects, float(rng.choice([0.0, 0.5, 0.9]))), shape
 
 
@@ -88,7 +88,7 @@ def optimality_gap(n_tasks: int, seed: int) -> Json:
         followed = attempts_of(replanned(state, shape), state.fail)
         stated.append(plan.attempts / least - 1.0)
         done.append(followed / least - 1.0)
-        if shape.n_cells <= ALL_PLANS_CELLS:
+        if shape.n_slots <= ALL_PLANS_CELLS:
             of_all = fewest_attempts(state, shape, to_go, fewest_moves=False)
             free.append(followed / of_all - 1.0)
     return {
@@ -99,11 +99,11 @@ def optimality_gap(n_tasks: int, seed: int) -> Json:
     }
 
 
-def times(n_cells: int, n_colours: int, on_towers: float, seed: int) -> Json:
+def times(n_slots: int, n_colours: int, on_towers: float, seed: int) -> Json:
     """Return the CPU time of plans of one size [ms]."""
-    shape, rng = SortingShape(n_cells=n_cells, n_colours=n_colours), np.random.default_rng(seed)
-    n = 200 if n_cells < 40 else 10
-    states = [random_task(shape, rng, n_cells, on_towers) for _ in range(n)]
+    shape, rng = SortingShape(n_slots=n_slots, n_colours=n_colours), np.random.default_rng(seed)
+    n = 200 if n_slots < 40 else 10
+    states = [random_task(shape, rng, n_slots, on_towers) for _ in range(n)]
     goals = [(state.goal != 0).sum(axis=1) for state in states]
     clutter, towers, heights, asked, goal_heights, fail = (
         np.stack(part)
@@ -115,7 +115,7 @@ def times(n_cells: int, n_colours: int, on_towers: float, seed: int) -> Json:
             strict=True,
         )
     )
-    work = new_work(n_cells, n_colours, shape.n_sizes)
+    work = new_work(n_slots, n_colours, shape.n_sizes)
     best, fewest = np.zeros(n, dtype=np.int64), np.zeros(n, dtype=np.int64)
     batch = TaskBatch(clutter, towers, heights, asked, goal_heights, fail)
     plan_tasks(batch, work, best, fewest)
@@ -129,7 +129,7 @@ def times(n_cells: int, n_colours: int, on_towers: float, seed: int) -> Json:
         single.append(time.process_time() - began)
     arrays = (*work.paths, *work.now, *work.trial, work.at, work.first, work.actions)
     return {
-        "n_cells": n_cells,
+        "n_slots": n_slots,
         "n_colours": n_colours,
         "share_on_towers": on_towers,
         "solve_ms_mean": 1e3 * float(np.mean(single)),

@@ -39,17 +39,17 @@ PLAN: dict[str, Any] = {
     "robot": {"q": [0.99, -2.33, 2.08, -1.32, -1.57, 0.0], "qd": [0.0] * 6},
     "people": [{"keypoints": KEYPOINTS}],
     "objects": [
-        {"id": "a", "colour": "red", "size": "large", "at": "cell5"},
-        {"id": "b", "colour": "red", "size": "large", "at": "cell9"},
-        {"id": "c", "colour": "red", "size": "small", "at": "cell7"},
+        {"id": "a", "colour": "red", "size": "large", "at": "slot5"},
+        {"id": "b", "colour": "red", "size": "large", "at": "slot9"},
+        {"id": "c", "colour": "red", "size": "small", "at": "slot7"},
     ],
     "goal": {"red": ["large", "small"]},
 }
 SORTING: dict[str, Any] = {
     "cell": "sorting-e0",
     "objects": [
-        {"id": "a", "colour": "red", "size": "large", "at": "cell2"},
-        {"id": "b", "colour": "red", "size": "large", "at": "cell5"},
+        {"id": "a", "colour": "red", "size": "large", "at": "slot2"},
+        {"id": "b", "colour": "red", "size": "large", "at": "slot5"},
         {"id": "c", "colour": "blue", "size": "small", "at": "red", "level": 0},
     ],
     "goal": {"red": ["large"]},

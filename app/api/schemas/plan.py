@@ -122,7 +122,7 @@ class PlanRequest(SortingFields):
             ids = [one.id for one in self.objects if one.id is not None]
             raise InvalidInput("held", held, "must be the id of one of the objects", ids)
         place = names.stations.index(found[0].at)
-        tower = place - names.shape.n_cells
+        tower = place - names.shape.n_slots
         if tower >= 0 and found[0].level != state.heights[tower] - 1:
             raise InvalidInput("held", held, f"must be the top object of {found[0].at}")
         return place

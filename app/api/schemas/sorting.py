@@ -33,9 +33,9 @@ Key = Annotated[str, Field(pattern=r"^[0-9a-f]{16}$")]
 
 
 class SortingLayout(Body):
-    """A sorting task without a work cell: its clutter slots are ``cell0``, ``cell1``, ..."""
+    """A sorting task without a work cell: its clutter slots are ``slot0``, ``slot1``, ..."""
 
-    n_cells: int = Field(
+    n_slots: int = Field(
         ge=1, le=MAX_CELLS, description="clutter slots: most objects, and levels of a tower"
     )
     colours: list[Name] = Field(
@@ -301,20 +301,20 @@ def outside_of(
         found.append(OutsideTraining(field="cell", value=value, rule=rule))
     most = max(SortingSettings().failure_max, float(own.max()))
     for k in np.flatnonzero(state.fail > most).tolist():
-        field, value = f"failure_map.{names.cells[k]}", f"{state.fail[k]:g}"
+        field, value = f"failure_map.{names.slots[k]}", f"{state.fail[k]:g}"
         rule = f"was at most {most:g} in training"
         found.append(OutsideTraining(field=field, value=value, rule=rule))
     return found
 
 
 def _size_of(shape: SortingShape) -> str:
-    return f"{shape.n_cells} slots, {shape.n_colours} colours, {shape.n_sizes} sizes"
+    return f"{shape.n_slots} slots, {shape.n_colours} colours, {shape.n_sizes} sizes"
 
 
 def move_of(move: Move, state: SortingState, names: SortingNames, ids: Ids) -> SortingMove:
     """Return a move in the words of the task; a move back ends where it began."""
     pick = _place(move.pick, state, names, top=True)
-    tower = move.pick - names.shape.n_cells
+    tower = move.pick - names.shape.n_slots
     code = int(state.clutter[move.pick] if tower < 0 else state.towers[tower, pick.level or 0])
     return SortingMove(
         pick=pick,
@@ -329,8 +329,8 @@ def _place(
     position: int, state: SortingState, names: SortingNames, *, top: bool
 ) -> SortingPlace:
     """Return a place; on a tower the highest level, or the free one above it."""
-    tower = position - names.shape.n_cells
+    tower = position - names.shape.n_slots
     if tower < 0:
-        return SortingPlace(station=names.cells[position], level=None)
+        return SortingPlace(station=names.slots[position], level=None)
     height = int((state.towers[tower] != NULL).sum())
     return SortingPlace(station=names.towers[tower], level=height - 1 if top else height)

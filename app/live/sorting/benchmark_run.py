@@ -31,7 +31,7 @@ def random_task(shape: SortingShape, fail: Vec, seed: int, number: int) -> Sorti
         seed: Seed of the world.
         number: Number of earlier tasks.
     """
-    settings = SortingSettings(n_objects=min(N_BLOCKS, shape.n_cells))
+    settings = SortingSettings(n_objects=min(N_BLOCKS, shape.n_slots))
     batch = SortingBatch(shape, fail, 1, seed + TASK_SEED * number, settings)
     batch.reset()
     return batch.state_of(0)

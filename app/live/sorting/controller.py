@@ -166,9 +166,9 @@ class SortController:
         return best
 
 
-def has_safer_duplicate(table: SortingTable, cell: int) -> bool:
+def has_safer_duplicate(table: SortingTable, slot: int) -> bool:
     """Return whether an identical block lies in a safer clutter slot."""
-    block, least = table.clutter[cell], table.fail[cell] - ALIKE
+    block, least = table.clutter[slot], table.fail[slot] - ALIKE
     return block is not None and any(
         one is not None and one.code == block.code and fail < least
         for one, fail in zip(table.clutter, table.fail, strict=False)

@@ -34,7 +34,7 @@ class StatusMessages:
     def place(self, position: int) -> str:
         """Return a position in words."""
         label = self._labels[position]
-        return f"the {label}" if position >= self._table.shape.n_cells else label
+        return f"the {label}" if position >= self._table.shape.n_slots else label
 
     def motion(
         self,
@@ -53,7 +53,7 @@ class StatusMessages:
             text = f"{verb} {block} {'to' if phase == 'carry' else 'on'} {place}"
             return f"{text}: {self._left(controller)}.{self._fallback(controller)}"
         verb = "Moving to" if phase == "approach" else "Grasping"
-        inside = "in" if move.pick < self._table.shape.n_cells else "on"
+        inside = "in" if move.pick < self._table.shape.n_slots else "on"
         text = f"{verb} {block} {inside} {self.place(move.pick)}, to be placed on {place}: "
         text += f"{self._left(controller)}."
         why = _preference(choice, controller.order, decision) or self._risk(choice)
@@ -89,7 +89,7 @@ class StatusMessages:
     def _risk(self, choice: MoveChoice) -> str:
         """Return a comparison with an identical block that is riskier to grasp."""
         table = self._table
-        if choice.move.pick >= table.shape.n_cells:
+        if choice.move.pick >= table.shape.n_slots:
             return ""
         least = table.fail[choice.move.pick]
         risks = {

@@ -1,7 +1,7 @@
 """State of the sorting task of a live cell at one tick.
 
 Blocks have constant ids; the sorting policy knows only colour and size. Places are
-station ids: ``cell3`` is a clutter slot, ``red`` a tower. Lengths are in the robot base frame.
+station ids: ``slot3`` is a clutter slot, ``red`` a tower. Lengths are in the robot base frame.
 """
 
 from dataclasses import dataclass

@@ -2,7 +2,7 @@
 
 Blocks have constant ids; :attr:`SortingTable.state` has no ids, like the observation of the
 sorting policy. A held block counts at its former place or, if that is occupied, at the first
-free clutter slot. One is always free, since there are at most as many blocks as cells.
+free clutter slot. One is always free, since there are at most as many blocks as slots.
 
 Source: docs/method.md 1.1 and 1.2.
 """
@@ -43,9 +43,9 @@ class SortingTable:
         """Size of the task."""
         self.fail = fail_of(cell)
         """Failure probability of each clutter slot, shape (K,)."""
-        self.clutter: list[Block | None] = [None] * self.shape.n_cells
+        self.clutter: list[Block | None] = [None] * self.shape.n_slots
         self.towers: list[list[Block]] = [[] for _ in range(self.shape.n_colours)]
-        self.goal = np.zeros((self.shape.n_colours, self.shape.n_cells), dtype=np.int8)
+        self.goal = np.zeros((self.shape.n_colours, self.shape.n_slots), dtype=np.int8)
         self.held: Block | None = None
         """Held block."""
         self.version = 0
@@ -72,7 +72,7 @@ class SortingTable:
     @property
     def held_position(self) -> int:
         """Position at which the held block counts in the state."""
-        k = self.shape.n_cells
+        k = self.shape.n_slots
         if self._origin >= k or self.clutter[self._origin] is None:
             return self._origin
         return next(i for i in range(k) if self.clutter[i] is None)
@@ -95,7 +95,7 @@ class SortingTable:
 
     def top(self, position: int) -> Block | None:
         """Return the topmost block at a position, or None."""
-        k = self.shape.n_cells
+        k = self.shape.n_slots
         if position < k:
             return self.clutter[position]
         return self.towers[position - k][-1] if self.towers[position - k] else None
@@ -111,7 +111,7 @@ class SortingTable:
                 return k, 0
         for c, tower in enumerate(self.towers):
             if block in tower:
-                return self.shape.n_cells + c, tower.index(block)
+                return self.shape.n_slots + c, tower.index(block)
         raise InvalidInput("id", block.id, "is held by the gripper")
 
     def point(self, position: int, level: int) -> Vec:
@@ -120,7 +120,7 @@ class SortingTable:
 
     def point_at(self, position: int) -> Vec:
         """Return the top centre of the next block at a position [m], shape (3,)."""
-        k = self.shape.n_cells
+        k = self.shape.n_slots
         return self.point(position, 0 if position < k else len(self.towers[position - k]))
 
     def point_of(self, block: Block) -> Vec | None:
@@ -153,8 +153,8 @@ class SortingTable:
         Raises:
             InvalidInput: No free place, or as many blocks as clutter slots.
         """
-        if len(self.blocks) >= self.shape.n_cells:
-            rule = f"would be more than {self.shape.n_cells} blocks, one per clutter slot"
+        if len(self.blocks) >= self.shape.n_slots:
+            rule = f"would be more than {self.shape.n_slots} blocks, one per clutter slot"
             raise InvalidInput("blocks", len(self.blocks) + 1, rule)
         position = self._free_cell() if at is None else self._free("at", at)
         self._put(self._new(self.code(colour, size)), position)
@@ -196,8 +196,8 @@ class SortingTable:
         goal = np.zeros_like(self.goal)
         for name, sizes in towers.items():
             c, wanted = self.names.towers.index(name), list(sizes)
-            if len(wanted) > self.shape.n_cells:
-                rule = f"must have at most {self.shape.n_cells} levels"
+            if len(wanted) > self.shape.n_slots:
+                rule = f"must have at most {self.shape.n_slots} levels"
                 raise InvalidInput(f"towers.{name}", len(wanted), rule)
             for level, size in enumerate(wanted):
                 goal[c, level] = self.shape.code(c, self.names.sizes.index(size))
@@ -228,7 +228,7 @@ class SortingTable:
 
     def begin(self, state: SortingState) -> None:
         """Set a state with new blocks."""
-        self.clutter = [None] * self.shape.n_cells
+        self.clutter = [None] * self.shape.n_slots
         self.towers = [[] for _ in range(self.shape.n_colours)]
         self.adopt(state)
 
@@ -265,7 +265,7 @@ class SortingTable:
         return block
 
     def _put(self, block: Block, position: int) -> None:
-        k = self.shape.n_cells
+        k = self.shape.n_slots
         if position >= k:
             self.towers[position - k].append(block)
         else:
@@ -276,7 +276,7 @@ class SortingTable:
             self.held = None
             return
         position, _ = self.place_of(block)
-        k = self.shape.n_cells
+        k = self.shape.n_slots
         if position >= k:
             self.towers[position - k].remove(block)
         else:
@@ -303,12 +303,12 @@ class SortingTable:
 
     def _free(self, field: str, place: str, block: Block | None = None) -> int:
         position = self.names.stations.index(place)
-        if position < self.shape.n_cells:
+        if position < self.shape.n_slots:
             there = self.clutter[position]
             if there is not None:
                 own = there == block
                 rule = "is where it is already" if own else f"is taken by {there.id}"
-                free = zip(self.names.cells, self.clutter, strict=True)
+                free = zip(self.names.slots, self.clutter, strict=True)
                 known = [*(name for name, one in free if one is None), *self.names.towers]
                 raise InvalidInput(field, place, rule, known)
         elif self.top(position) == block and block is not None:

@@ -120,7 +120,7 @@ def _goal(table: SortingTable) -> tuple[GoalBlockSnapshot, ...]:
                 break
             there = table.towers[c][level].code if level < len(table.towers[c]) else NULL
             good = good and there == code
-            top = table.point(table.shape.n_cells + c, level)
+            top = table.point(table.shape.n_slots + c, level)
             found.append(
                 GoalBlockSnapshot(
                     tower=table.names.towers[c],

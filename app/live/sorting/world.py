@@ -277,8 +277,8 @@ class LiveSortingWorld(BaseWorld[LiveWorkers]):
         table, pick = self._table, choice.move.pick
         self._controller.note_attempt(table, choice.move)
         rng = np.random.default_rng((self._seed, self._n_tasks, self._counts.attempts))
-        risk = float(table.fail[pick]) if pick < table.shape.n_cells else 0.0
-        if self._test is not None and pick < table.shape.n_cells:
+        risk = float(table.fail[pick]) if pick < table.shape.n_slots else 0.0
+        if self._test is not None and pick < table.shape.n_slots:
             self._test.note_pick(riskier=has_safer_duplicate(table, pick))
         self._counts = replace(self._counts, attempts=self._counts.attempts + 1)
         if rng.random() >= risk:

@@ -211,7 +211,7 @@ def _with_encoded_set(graph: Graph, obs: str, n_obs: int) -> str:
     places = (graph.constant([k], np.int64) for k in (0, 1, 2))
     present = graph.add("Slice", blocks, *places)
     found = graph.add(
-        "Mul", graph.layers(blocks, "actor.crowd.0.block", rectified=True), present
+        "Mul", graph.layers(blocks, "actor.people_set.0.block", rectified=True), present
     )
     pooled = graph.add("ReduceMax", found, axes=[1], keepdims=0)
     return graph.add("Concat", graph.columns(obs, 0, first), pooled, axis=1)

@@ -58,7 +58,7 @@ PEOPLE_SET = PeopleSetShape(
 MAX_LAYERS = 16
 """Most layers of a network taken from a checkpoint."""
 
-ACTOR_LAYERS, SET_LAYERS = "actor.net", "actor.crowd.0.block"
+ACTOR_LAYERS, SET_LAYERS = "actor.net", "actor.people_set.0.block"
 """Prefix of the names of an actor's tensors."""
 NORMALISATION = "actor.norm"
 """Prefix of the names of the tensors that normalise observations."""

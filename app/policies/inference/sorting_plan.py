@@ -202,7 +202,7 @@ class SortingPlanner:
     def _near(self, query: PlanQuery) -> NearOptimalMoves:
         """Return the near-optimal moves; the pick of a held object has succeeded already."""
         shape, held, state = self._names.shape, query.held, query.state
-        if held is not None and held < shape.n_cells:
+        if held is not None and held < shape.n_slots:
             fail = state.fail.copy()
             fail[held] = 0.0
             near = near_optimal_moves(replace(state, fail=fail), shape, query.margin)
@@ -224,9 +224,9 @@ class SortingPlanner:
 
     def _target(self, state: SortingState, place: int, *, top: bool) -> Vec:
         """Return the target over the top object at a place, or over the next one, (3,)."""
-        n_cells, level = self._names.shape.n_cells, 0
-        if place >= n_cells:
-            level = int(state.heights[place - n_cells]) - top
+        n_slots, level = self._names.shape.n_slots, 0
+        if place >= n_slots:
+            level = int(state.heights[place - n_slots]) - top
         point = self._cell.station(self._names.stations[place]).points()[level]
         return above(point, self._policy.grasp.depth or APPROACH_M)
 

@@ -109,14 +109,14 @@ class ResidualActor(nn.Module):
         with torch.no_grad():
             last.weight.mul_(FIRST_RESIDUAL)
             last.bias.zero_()
-        self.crowd = nn.Sequential(*before)
+        self.people_set = nn.Sequential(*before)
         self.net = nn.Sequential(*hidden(n_seen, width, layers), last)
         self.n_obs, self.base, self.fade = n_obs, slice(base, base + n_act), fade
 
     def forward(self, obs: torch.Tensor) -> torch.Tensor:
         """Return actions, shape (n, n_act), for observations, shape (n, n_obs or more)."""
         base = obs[:, self.base].clamp(-1.0, 1.0)
-        residual = self.net(self.crowd(obs[:, : self.n_obs]))
+        residual = self.net(self.people_set(obs[:, : self.n_obs]))
         act = torch.tanh(residual + torch.atanh(BASE_WEIGHT * base))
         if self.fade is None:
             return act
@@ -144,7 +144,7 @@ class PlainActor(nn.Module):
         super().__init__()
         n_seen, before = _first_layer(people_set, n_obs)
         self.n_obs = n_obs
-        self.crowd = nn.Sequential(*before)
+        self.people_set = nn.Sequential(*before)
         layers_before = hidden(n_seen, width, layers, normed)
         self.net = nn.Sequential(*layers_before, nn.Linear(width, n_act))
         with torch.no_grad():
@@ -153,7 +153,7 @@ class PlainActor(nn.Module):
 
     def forward(self, obs: torch.Tensor) -> torch.Tensor:
         """Return actions, shape (n, n_act), for observations, shape (n, n_obs or more)."""
-        return torch.tanh(self.net(self.crowd(obs[:, : self.n_obs])))
+        return torch.tanh(self.net(self.people_set(obs[:, : self.n_obs])))
 
 
 def hidden(n_in: int, width: int, layers: int, normed: bool = False) -> list[nn.Module]:

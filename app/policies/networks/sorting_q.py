@@ -42,13 +42,13 @@ are only counted."""
 
 def layout_of(shape: SortingShape) -> list[list[Any]]:
     """Return names and sizes of the groups of an observation."""
-    k, c = shape.n_cells, shape.n_colours
+    k, c = shape.n_slots, shape.n_colours
     return [["clutter", k], ["towers", c * k], ["goal", c * k], ["fail", k]]
 
 
 def groups_of(shape: SortingShape, obs: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor]:
     """Return clutter (B, K), towers and goal (B, C, K), and failure probabilities (B, K)."""
-    k, c = shape.n_cells, shape.n_colours
+    k, c = shape.n_slots, shape.n_colours
     clutter, towers, goal, fail = torch.split(obs, [k, c * k, c * k, k], dim=1)
     towers, goal = (one.long().view(-1, c, k) for one in (towers, goal))
     return clutter.long(), towers, goal, fail.float() / FAILURE_SCALE
@@ -177,9 +177,9 @@ class SharedNetwork(nn.Module):
         gain, slope, back, across = torch.split(out, [n_types, n_types, 2, n_towers], dim=2)
         # (B, K, C): type of each slot's object, relative to each tower.
         kind = (self.relative.T[clutter] - 1).clamp(min=0)
-        per_cell = kind.transpose(1, 2)
-        risk = functional.softplus(slope).gather(2, per_cell) * fail[:, None]
-        place = (gain.gather(2, per_cell) - risk).transpose(1, 2)
+        per_slot = kind.transpose(1, 2)
+        risk = functional.softplus(slope).gather(2, per_slot) * fail[:, None]
+        place = (gain.gather(2, per_slot) - risk).transpose(1, 2)
         preference = BACK_SLOPE * torch.tanh(back[:, :, 1:])
         free = back[:, :, :1] + preference * fail[:, None]
         # Column j of a tower's output concerns the tower j colours further.
@@ -205,8 +205,8 @@ class PrintedNetwork(nn.Module):
 
     def __init__(self, shape: SortingShape, width: int) -> None:
         super().__init__()
-        self.n_places = shape.n_cells * (1 + 2 * shape.n_colours)
-        sizes = self.n_places, shape.n_types + 1, shape.n_cells, width
+        self.n_places = shape.n_slots * (1 + 2 * shape.n_colours)
+        sizes = self.n_places, shape.n_types + 1, shape.n_slots, width
         self.advantage_first, self.value_first = OneHotLinear(*sizes), OneHotLinear(*sizes)
         self.advantage = _second_layer(width, shape.n_actions)
         self.value = _second_layer(width, 1)

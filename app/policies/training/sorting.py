@@ -55,7 +55,7 @@ def start(preset: SortingPreset, seed: int, cell: Cell) -> tuple[TrainingRun, So
 
 def expert_of(shape: SortingShape) -> Expert:
     """Return the expert that marks the first moves of all shortest plans."""
-    k, c = shape.n_cells, shape.n_colours
+    k, c = shape.n_slots, shape.n_colours
     work = new_work(k, c, shape.n_sizes)
 
     def label(obs: NDArray[np.uint8]) -> NDArray[np.bool_]:

@@ -79,7 +79,7 @@ class SortingTask:
 def _obs_space(shape: SortingShape) -> spaces.Space[Obs]:
     """Return the space of one task's observations."""
     high = np.full(shape.obs_size, shape.n_types, dtype=np.uint8)
-    high[-shape.n_cells :] = FAILURE_SCALE
+    high[-shape.n_slots :] = FAILURE_SCALE
     box = spaces.Box(np.zeros_like(high), high, dtype=np.uint8)
     return cast("spaces.Space[Obs]", box)
 

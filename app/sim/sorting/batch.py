@@ -99,11 +99,11 @@ def shape_of(cell: Cell) -> SortingShape:
     Raises:
         InvalidInput: The cell has no clutter slots or no clusters.
     """
-    n_cells, n_colours = len(cell.stations_of("clutter")), len(cell.stations_of("cluster"))
-    if not n_cells or not n_colours:
+    n_slots, n_colours = len(cell.stations_of("clutter")), len(cell.stations_of("cluster"))
+    if not n_slots or not n_colours:
         rule = "needs stations of kind clutter and of kind cluster to sort"
         raise InvalidInput("cell", cell.name, rule)
-    return SortingShape(n_cells=n_cells, n_colours=n_colours)
+    return SortingShape(n_slots=n_slots, n_colours=n_colours)
 
 
 def fail_of(cell: Cell) -> Vec:
@@ -113,7 +113,7 @@ def fail_of(cell: Cell) -> Vec:
 
 def new_envs(shape: SortingShape, n_envs: int, fail: Vec) -> kernel.SortingEnvs:
     """Return the state of ``n_envs`` environments whose episodes have not started."""
-    k, c = shape.n_cells, shape.n_colours
+    k, c = shape.n_slots, shape.n_colours
 
     def ints(*more: int) -> NDArray[np.int64]:
         return np.zeros((n_envs, *more), dtype=np.int64)
@@ -141,9 +141,9 @@ def new_envs(shape: SortingShape, n_envs: int, fail: Vec) -> kernel.SortingEnvs:
 
 def _check_sizes(settings: SortingSettings, shape: SortingShape) -> None:
     """Raise InvalidInput if settings have more objects than exist, or fit."""
-    most = settings.n_objects or shape.n_cells
+    most = settings.n_objects or shape.n_slots
     for name, value, limit in (
-        ("n_objects", settings.n_objects, shape.n_cells),
+        ("n_objects", settings.n_objects, shape.n_slots),
         ("n_goal", settings.n_goal, most),
     ):
         if not 0 <= value <= limit:
@@ -177,8 +177,8 @@ class SortingBatch(Stateful):
         settings: SortingSettings | None = None,
         first_env: int = 0,
     ) -> None:
-        if fail.shape != (shape.n_cells,) or not ((fail >= 0.0) & (fail <= MAX_FAILURE)).all():
-            rule = f"must be {shape.n_cells} probabilities in [0, {MAX_FAILURE}]"
+        if fail.shape != (shape.n_slots,) or not ((fail >= 0.0) & (fail <= MAX_FAILURE)).all():
+            rule = f"must be {shape.n_slots} probabilities in [0, {MAX_FAILURE}]"
             raise InvalidInput("fail", fail.tolist(), rule)
         self.shape, self.n_envs, self.seed = shape, n_envs, seed
         self._first = first_env
@@ -221,7 +221,7 @@ class SortingBatch(Stateful):
     @property
     def horizon(self) -> int:
         """Attempts after which an episode is truncated."""
-        return round(self.settings.horizon_factor * self.shape.n_cells)
+        return round(self.settings.horizon_factor * self.shape.n_slots)
 
     def _rules(self) -> kernel.SortingRules:
         of = self.settings
@@ -380,7 +380,7 @@ def apply(state: SortingState, shape: SortingShape, move: Move) -> SortingState:
     if not valid_moves(state, shape)[shape.action_of(move)]:
         rule = "must pick where an object is and place where there is room"
         raise InvalidInput("move", [move.pick, move.place], rule)
-    k, heights = shape.n_cells, state.heights
+    k, heights = shape.n_slots, state.heights
     clutter, towers = state.clutter.copy(), state.towers.copy()
     if move.pick < k:
         code, clutter[move.pick] = clutter[move.pick], NULL

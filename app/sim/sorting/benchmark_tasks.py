@@ -81,12 +81,12 @@ class SortingTest:
     def fits(self, shape: SortingShape) -> bool:
         """Return whether a task is large enough for this test."""
         enough = shape.n_colours >= self.min_colours and shape.n_sizes >= self.min_sizes
-        return enough and shape.n_cells >= self.n_objects + self.n_added
+        return enough and shape.n_slots >= self.n_objects + self.n_added
 
 
 def sorted_goal(codes: Iterable[int], shape: SortingShape) -> Codes:
     """Return towers of the given objects, each on its colour's, the largest lowest."""
-    goal = np.zeros((shape.n_colours, shape.n_cells), dtype=np.int8)
+    goal = np.zeros((shape.n_colours, shape.n_slots), dtype=np.int8)
     heights = [0] * shape.n_colours
     for code in sorted((int(one) for one in codes), key=shape.size_of, reverse=True):
         colour = shape.colour_of(code)
@@ -104,8 +104,8 @@ def _scattered(
     codes: NDArray[np.int64], goal: Codes, shape: SortingShape, fail: Vec, rng: Generator
 ) -> SortingState:
     """Return a state with all objects in random clutter slots."""
-    clutter = np.zeros(shape.n_cells, dtype=np.int8)
-    clutter[rng.permutation(shape.n_cells)[: len(codes)]] = codes
+    clutter = np.zeros(shape.n_slots, dtype=np.int8)
+    clutter[rng.permutation(shape.n_slots)[: len(codes)]] = codes
     return replace(empty_state(shape), clutter=clutter, goal=goal, fail=fail.copy())
 
 
@@ -116,12 +116,12 @@ def _any(n: int, shape: SortingShape, rng: Generator) -> NDArray[np.int64]:
 def _with_duplicates(shape: SortingShape, fail: Vec, rng: Generator) -> SortingState:
     """Return five objects of the goal, each with a duplicate in a riskier slot.
 
-    The safer one of each pair is in one of the ``n_cells // 2`` slots of least risk.
+    The safer one of each pair is in one of the ``n_slots // 2`` slots of least risk.
     """
     codes = _any(5, shape, rng)
-    ranked = np.lexsort((rng.random(shape.n_cells), fail))
-    safe, risky = np.split(ranked, [shape.n_cells // 2])
-    clutter = np.zeros(shape.n_cells, dtype=np.int8)
+    ranked = np.lexsort((rng.random(shape.n_slots), fail))
+    safe, risky = np.split(ranked, [shape.n_slots // 2])
+    clutter = np.zeros(shape.n_slots, dtype=np.int8)
     clutter[rng.permutation(safe)[:5]] = codes
     clutter[rng.permutation(risky)[:5]] = codes
     goal = sorted_goal(codes, shape)

@@ -157,7 +157,7 @@ def attempts_by_action(
 
 def is_slow_decision(shape: SortingShape) -> bool:
     """Return whether a decision may need more than ``MAX_AT_ONCE`` states of the planner."""
-    return most_states(shape.n_cells, shape.n_colours) > MAX_AT_ONCE
+    return most_states(shape.n_slots, shape.n_colours) > MAX_AT_ONCE
 
 
 def valid_actions(state: SortingState, shape: SortingShape) -> list[int]:
@@ -168,7 +168,7 @@ def valid_actions(state: SortingState, shape: SortingShape) -> list[int]:
 
 def warm_up(policy: SortingValues | None = None) -> None:
     """Compile the kernels of decisions by one decision of a policy."""
-    shape = SortingShape(n_cells=2, n_colours=1) if policy is None else policy.shape
+    shape = SortingShape(n_slots=2, n_colours=1) if policy is None else policy.shape
     state = empty_state(shape)
     state.clutter[0] = state.goal[0, 0] = shape.code(0, 0)
     decide(policy, state, shape)

@@ -1,6 +1,6 @@
 """Names of colours, sizes and positions of a sorting task, and states written in them.
 
-The API uses ``red``, ``large``, ``cell3``; kernels and networks use codes and positions
+The API uses ``red``, ``large``, ``slot3``; kernels and networks use codes and positions
 (``state.py``). Errors name values in the caller's terms.
 """
 
@@ -32,7 +32,7 @@ class SortingNames:
 
     shape: SortingShape
     """Size."""
-    cells: tuple[str, ...]
+    slots: tuple[str, ...]
     """Clutter slots, in the order of their positions."""
     towers: tuple[str, ...]
     """Towers, in the order of their colours."""
@@ -44,7 +44,7 @@ class SortingNames:
     @property
     def stations(self) -> tuple[str, ...]:
         """All places, by position."""
-        return self.cells + self.towers
+        return self.slots + self.towers
 
     def kind(self, code: int) -> str:
         """Return the name of an object: ``large red``."""
@@ -80,7 +80,7 @@ def names_of(cell: Cell) -> SortingNames:
     towers = cell.stations_of("cluster")
     return SortingNames(
         shape=shape,
-        cells=tuple(one.id for one in cell.stations_of("clutter")),
+        slots=tuple(one.id for one in cell.stations_of("clutter")),
         towers=tuple(one.id for one in towers),
         colours=tuple(one.colour or one.id for one in towers),
         sizes=SIZE_NAMES[shape.n_sizes],
@@ -88,17 +88,17 @@ def names_of(cell: Cell) -> SortingNames:
 
 
 def plain_names(
-    n_cells: int, colours: Sequence[str], sizes: Sequence[str] = SIZE_NAMES[3]
+    n_slots: int, colours: Sequence[str], sizes: Sequence[str] = SIZE_NAMES[3]
 ) -> SortingNames:
-    """Return the words of a task without a work cell: ``cell0``, ...; towers go by colour.
+    """Return the words of a task without a work cell: ``slot0``, ...; towers go by colour.
 
     Raises:
         InvalidInput: Too many of something, or a name given twice.
     """
-    shape = SortingShape(n_cells=n_cells, n_colours=len(colours), n_sizes=len(sizes))
+    shape = SortingShape(n_slots=n_slots, n_colours=len(colours), n_sizes=len(sizes))
     names = SortingNames(
         shape=shape,
-        cells=tuple(f"cell{k}" for k in range(n_cells)),
+        slots=tuple(f"slot{k}" for k in range(n_slots)),
         towers=tuple(colours),
         colours=tuple(colours),
         sizes=tuple(sizes),
@@ -128,9 +128,9 @@ def state_from_names(
     Raises:
         InvalidInput: The state is impossible; the error names the field as the caller wrote it.
     """
-    n_cells = names.shape.n_cells
-    if len(objects) > n_cells:
-        rule = f"must be at most {n_cells}, as many as there are clutter slots"
+    n_slots = names.shape.n_slots
+    if len(objects) > n_slots:
+        rule = f"must be at most {n_slots}, as many as there are clutter slots"
         raise InvalidInput("objects", len(objects), rule)
     state = empty_state(names.shape)
     state.fail[:] = fail
@@ -152,14 +152,14 @@ def fail_with(names: SortingNames, own: Vec, changes: Mapping[str, float]) -> Ve
         InvalidInput: No such clutter slot, or no probability below 1.
     """
     fail = own.copy()
-    for cell, chance in changes.items():
-        field = f"failure_map.{cell}"
-        if cell not in names.cells:
-            raise InvalidInput(field, chance, "is of no clutter slot", names.cells)
+    for slot, chance in changes.items():
+        field = f"failure_map.{slot}"
+        if slot not in names.slots:
+            raise InvalidInput(field, chance, "is of no clutter slot", names.slots)
         if not 0.0 <= chance <= MAX_FAILURE:
             rule = f"must lie in [0, {MAX_FAILURE}]: a pick that always fails has no plan"
             raise InvalidInput(field, chance, rule)
-        fail[names.cells.index(cell)] = chance
+        fail[names.slots.index(slot)] = chance
     return fail
 
 
@@ -189,7 +189,7 @@ def _check_ids(objects: Sequence[NamedObject]) -> None:
 def _put(state: SortingState, names: SortingNames, one: NamedObject, place: str) -> None:
     code = _code(names, one.colour, one.size, place)
     position = _index(f"{place}.at", one.at, names.stations, "place of this task")
-    if position < names.shape.n_cells:
+    if position < names.shape.n_slots:
         if one.level is not None:
             raise InvalidInput(f"{place}.level", one.level, "must be null in a clutter slot")
         if state.clutter[position] != NULL:
@@ -197,8 +197,8 @@ def _put(state: SortingState, names: SortingNames, one: NamedObject, place: str)
             raise InvalidInput(f"{place}.at", one.at, rule)
         state.clutter[position] = code
         return
-    tower = position - names.shape.n_cells
-    n_levels = names.shape.n_cells
+    tower = position - names.shape.n_slots
+    n_levels = names.shape.n_slots
     if one.level is None or not 0 <= one.level < n_levels:
         rule = f"must lie in [0, {n_levels - 1}] on the tower {one.at}, 0 the lowest"
         raise InvalidInput(f"{place}.level", one.level, rule)
@@ -230,8 +230,8 @@ def _ask(
     wanted: Sequence[tuple[str | None, str]],
 ) -> None:
     c = _index("goal", tower, names.towers, "tower of this task")
-    if len(wanted) > names.shape.n_cells:
-        rule = f"must have at most {names.shape.n_cells} objects, one per level"
+    if len(wanted) > names.shape.n_slots:
+        rule = f"must have at most {names.shape.n_slots} objects, one per level"
         raise InvalidInput(f"goal.{tower}", len(wanted), rule)
     for level, (colour, size) in enumerate(wanted):
         place = f"goal.{tower}[{level}]"

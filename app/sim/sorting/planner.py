@@ -40,7 +40,7 @@ def planner_arguments(
     return (
         Objects(state.clutter.copy(), state.towers.copy(), state.heights),
         Task(state.goal, np.count_nonzero(state.goal, axis=1), state.fail),
-        new_work(shape.n_cells, shape.n_colours, shape.n_sizes),
+        new_work(shape.n_slots, shape.n_colours, shape.n_sizes),
     )
 
 

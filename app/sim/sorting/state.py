@@ -65,7 +65,7 @@ class SortingShape:
         InvalidInput: A number outside its bounds.
     """
 
-    n_cells: int
+    n_slots: int
     """Number ``K`` of clutter slots, of levels of a tower, and largest number of objects."""
     n_colours: int
     """Number ``C`` of colours and towers."""
@@ -74,7 +74,7 @@ class SortingShape:
 
     def __post_init__(self) -> None:
         for name, value, most in (
-            ("n_cells", self.n_cells, MAX_CELLS),
+            ("n_slots", self.n_slots, MAX_CELLS),
             ("n_colours", self.n_colours, MAX_COLOURS),
             ("n_sizes", self.n_sizes, MAX_SIZES),
         ):
@@ -89,12 +89,12 @@ class SortingShape:
     @property
     def n_actions(self) -> int:
         """Number of moves, valid or not."""
-        return self.n_colours * (2 * self.n_cells + self.n_colours)
+        return self.n_colours * (2 * self.n_slots + self.n_colours)
 
     @property
     def obs_size(self) -> int:
-        """Numbers of an observation: cells, towers, goal, failure percentages."""
-        return 2 * self.n_cells * (1 + self.n_colours)
+        """Numbers of an observation: slots, towers, goal, failure percentages."""
+        return 2 * self.n_slots * (1 + self.n_colours)
 
     def code(self, colour: int, size: int) -> int:
         """Return the code of an object."""
@@ -110,7 +110,7 @@ class SortingShape:
 
     def move_of(self, action: int) -> Move:
         """Return the move of an action."""
-        k, c = self.n_cells, self.n_colours
+        k, c = self.n_slots, self.n_colours
         if not 0 <= action < self.n_actions:
             raise InvalidInput("action", action, f"must lie in [0, {self.n_actions})")
         if action < k * c:
@@ -125,7 +125,7 @@ class SortingShape:
         Raises:
             InvalidInput: No such positions, or from one clutter slot to another.
         """
-        k, c = self.n_cells, self.n_colours
+        k, c = self.n_slots, self.n_colours
         for name, position in (("pick", move.pick), ("place", move.place)):
             if not 0 <= position < k + c:
                 raise InvalidInput(name, position, f"must lie in [0, {k + c})")
@@ -169,7 +169,7 @@ class SortingState:
 
 def empty_state(shape: SortingShape) -> SortingState:
     """Return a state without objects, goal or risk, to be filled."""
-    k, c = shape.n_cells, shape.n_colours
+    k, c = shape.n_slots, shape.n_colours
     return SortingState(
         clutter=np.zeros(k, dtype=np.int8),
         towers=np.zeros((c, k), dtype=np.int8),
@@ -198,7 +198,7 @@ def check_state(state: SortingState, shape: SortingShape) -> None:
         InvalidInput: Another shape, an unknown code, a tower with a gap, too many objects, a
             goal that the objects cannot meet, or a failure probability outside [0, 0.99].
     """
-    k, c = shape.n_cells, shape.n_colours
+    k, c = shape.n_slots, shape.n_colours
     for name, codes, wanted in (
         ("clutter", state.clutter, (k,)),
         ("towers", state.towers, (c, k)),

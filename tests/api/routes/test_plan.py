@@ -81,7 +81,7 @@ def test_no_people_are_no_error_and_each_person_is_reported(client: TestClient) 
 
 
 def test_wide_margin_offers_moves_with_more_attempts(client: TestClient) -> None:
-    other = {"id": "d", "colour": "red", "size": "large", "at": "cell2"}
+    other = {"id": "d", "colour": "red", "size": "large", "at": "slot2"}
     objects = [*PLAN["objects"], other]
     narrow, wide = (asked(client, objects=objects, margin=m) for m in (0.0, 1.0))
     assert {one["object"] for one in narrow["moves"]} == {"a", "b"}

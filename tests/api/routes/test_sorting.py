@@ -21,15 +21,15 @@ ALIAS = "untrained-sorting"
 TASK: dict[str, Any] = {
     "cell": "sorting-e0",
     "objects": [
-        {"id": "a", "colour": "red", "size": "large", "at": "cell2"},
-        {"id": "b", "colour": "red", "size": "large", "at": "cell5"},
-        {"id": "c", "colour": "red", "size": "small", "at": "cell0"},
+        {"id": "a", "colour": "red", "size": "large", "at": "slot2"},
+        {"id": "b", "colour": "red", "size": "large", "at": "slot5"},
+        {"id": "c", "colour": "red", "size": "small", "at": "slot0"},
         {"id": "d", "colour": "blue", "size": "medium", "at": "red", "level": 0},
         {"id": "e", "colour": "blue", "size": "small", "at": "red", "level": 1},
     ],
     "goal": {"red": ["large", "small"], "blue": ["medium"]},
 }
-"""Two blue objects stand in the parents; of two large red ones the one in cell5 never fails."""
+"""Two blue objects stand in the parents; of two large red ones the one in slot5 never fails."""
 
 
 @pytest.fixture(scope="module")
@@ -95,7 +95,7 @@ def test_of_two_duplicates_the_planner_takes_the_safe_one(client: TestClient) ->
 
 def test_failure_map_of_the_request_replaces_the_cells(client: TestClient) -> None:
     objects = [one for one in TASK["objects"] if one["at"] != "red"]
-    changed = {"objects": objects, "goal": {"red": ["large"]}, "failure_map": {"cell5": 0.9}}
+    changed = {"objects": objects, "goal": {"red": ["large"]}, "failure_map": {"slot5": 0.9}}
     assert asked(client, planned({**TASK, **changed}))["move"]["object"] == "a"
 
 
@@ -112,7 +112,7 @@ def test_plan_is_carried_out_in_the_fewest_moves(client: TestClient) -> None:
 
 def test_goal_and_objects_may_change_between_two_calls(client: TestClient) -> None:
     task = carried_out(TASK, asked(client, planned(TASK))["move"])
-    task["objects"].append({"colour": "blue", "size": "large", "at": "cell9"})
+    task["objects"].append({"colour": "blue", "size": "large", "at": "slot9"})
     task["goal"] = {"blue": ["large", "medium"]}
     answer = asked(client, planned(task))
     assert not answer["solved"]
@@ -185,16 +185,16 @@ def test_goal_that_no_policy_was_trained_for_is_left_to_the_planner(
 
 @pytest.mark.usefixtures("checkpoint")
 def test_failures_beyond_those_of_the_training_are_said(client: TestClient) -> None:
-    task = {**TASK, "failure_map": {"cell7": 0.75}, "checkpoint": ALIAS}
+    task = {**TASK, "failure_map": {"slot7": 0.75}, "checkpoint": ALIAS}
     assert asked(client, task)["outside"] == [
-        {"field": "failure_map.cell7", "value": "0.75", "rule": "was at most 0.4 in training"}
+        {"field": "failure_map.slot7", "value": "0.75", "rule": "was at most 0.4 in training"}
     ]
 
 
 @pytest.mark.usefixtures("checkpoint")
 def test_policy_of_another_size_of_task_leaves_it_to_the_planner(client: TestClient) -> None:
-    layout = {"n_cells": 3, "colours": ["red", "blue"]}
-    objects = [{"colour": "red", "size": "small", "at": "cell1"}]
+    layout = {"n_slots": 3, "colours": ["red", "blue"]}
+    objects = [{"colour": "red", "size": "small", "at": "slot1"}]
     task = {"layout": layout, "objects": objects, "goal": {"red": ["small"]}}
     answer = asked(client, {**task, "checkpoint": ALIAS})
     assert (answer["by"], answer["why"]) == ("planner", "other-shape")
@@ -203,7 +203,7 @@ def test_policy_of_another_size_of_task_leaves_it_to_the_planner(client: TestCli
 
 def test_task_without_a_cell_takes_its_own_colours_and_sizes(client: TestClient) -> None:
     task = {
-        "layout": {"n_cells": 4, "colours": ["amber", "violet"], "sizes": ["thin", "thick"]},
+        "layout": {"n_slots": 4, "colours": ["amber", "violet"], "sizes": ["thin", "thick"]},
         "objects": [{"colour": "amber", "size": "thick", "at": "violet", "level": 0}],
         "goal": {"amber": ["thick"]},
     }
@@ -215,12 +215,12 @@ def test_task_without_a_cell_takes_its_own_colours_and_sizes(client: TestClient)
 def test_largest_task_is_answered(client: TestClient) -> None:
     colours, sizes = ["a", "b", "c", "d", "e"], ["xs", "s", "m", "l", "xl"]
     objects = [
-        {"colour": colours[k % 5], "size": sizes[k // 8], "at": f"cell{k}"} for k in range(40)
+        {"colour": colours[k % 5], "size": sizes[k // 8], "at": f"slot{k}"} for k in range(40)
     ]
     goal = {
         c: [one["size"] for one in reversed(objects) if one["colour"] == c] for c in colours
     }
-    layout = {"n_cells": 40, "colours": colours, "sizes": sizes}
+    layout = {"n_slots": 40, "colours": colours, "sizes": sizes}
     answer = asked(client, {"layout": layout, "objects": objects, "goal": goal})
     assert answer["fewest_moves"] == 40
     assert len(answer["moves"]) == 40 * 5
@@ -243,11 +243,11 @@ def changed(path: str, value: Any) -> dict[str, Any]:
         ("cell", "kitchen", "cell"),
         ("cell", "pick-and-place", "cell"),
         ("cell", None, "cell"),
-        ("layout", {"n_cells": 4, "colours": ["red"]}, "cell"),
+        ("layout", {"n_slots": 4, "colours": ["red"]}, "cell"),
         ("objects.0.colour", "green", "objects[0].colour"),
         ("objects.0.size", "huge", "objects[0].size"),
-        ("objects.0.at", "cell10", "objects[0].at"),
-        ("objects.0.at", "cell5", "objects[1].at"),
+        ("objects.0.at", "slot10", "objects[0].at"),
+        ("objects.0.at", "slot5", "objects[1].at"),
         ("objects.0.level", 0, "objects[0].level"),
         ("objects.0.id", "b", "objects[1].id"),
         ("objects.3.level", None, "objects[3].level"),
@@ -261,8 +261,8 @@ def changed(path: str, value: Any) -> dict[str, Any]:
         ("goal.red", [{"size": "small", "colour": "pink"}], "goal.red[0].colour"),
         ("goal.red", ["small"] * 11, "goal.red"),
         ("goal.red", ["large"] * 3, "goal"),
-        ("failure_map", {"cell0": 1.0}, "failure_map.cell0"),
-        ("failure_map", {"cell0": -0.1}, "failure_map.cell0"),
+        ("failure_map", {"slot0": 1.0}, "failure_map.slot0"),
+        ("failure_map", {"slot0": -0.1}, "failure_map.slot0"),
         ("failure_map", {"red": 0.1}, "failure_map.red"),
         ("checkpoint", "best", "checkpoint"),
         ("decider", "oracle", "decider"),
@@ -288,11 +288,11 @@ def test_unknown_words_are_refused_with_those_that_are_known(client: TestClient)
     assert refused(client, changed("objects.0.colour", "green"))["choices"] == ["red", "blue"]
     sizes = refused(client, changed("objects.0.size", "huge"))["choices"]
     assert sizes == ["small", "medium", "large"]
-    assert "cell9" in refused(client, changed("objects.0.at", "cell10"))["choices"]
+    assert "slot9" in refused(client, changed("objects.0.at", "slot10"))["choices"]
 
 
 def test_more_objects_than_the_cell_has_room_for_are_refused(client: TestClient) -> None:
-    more = [{"colour": "red", "size": "small", "at": f"cell{k}"} for k in range(9)]
+    more = [{"colour": "red", "size": "small", "at": f"slot{k}"} for k in range(9)]
     problem = refused(client, {**TASK, "objects": [*TASK["objects"][3:], *more]})
     assert (problem["field"], problem["value"]) == ("objects", "11")
 
@@ -304,9 +304,9 @@ def test_endless_list_of_objects_is_refused(client: TestClient) -> None:
 
 @pytest.mark.parametrize("text", ["NaN", "Infinity", "1e999"])
 def test_failure_that_is_no_number_is_refused(client: TestClient, text: str) -> None:
-    body = json.dumps({**TASK, "failure_map": {"cell0": "X"}}).replace('"X"', text)
+    body = json.dumps({**TASK, "failure_map": {"slot0": "X"}}).replace('"X"', text)
     problem = refused(client, body)
-    assert problem["field"] == "failure_map.cell0"
+    assert problem["field"] == "failure_map.slot0"
     assert problem["rule"] == "must be a finite number"
 
 

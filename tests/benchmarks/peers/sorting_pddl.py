@@ -64,7 +64,7 @@ def problem(state: SortingState, shape: SortingShape) -> str:
     spare = code_counts(state.clutter, shape)
     there = np.flatnonzero(spare + code_counts(state.towers, shape))
     codes = [int(code) for code in there if code != NULL]
-    numbers = range(shape.n_cells + 1)
+    numbers = range(shape.n_slots + 1)
     facts = ["(free-hand)", *(f"(spare c{code} n{spare[code]})" for code in codes)]
     facts += [f"(next n{n} n{n + 1})" for n in numbers[:-1]]
     return "\n".join(

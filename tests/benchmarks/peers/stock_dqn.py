@@ -85,8 +85,8 @@ class Curve(BaseCallback):
         super().__init__()
         self._options, self._uncounted = options, 0.0
         self._begin, self._next = time.process_time(), options.every
-        n_cells = plain(options.cell).k
-        pairs = [(e, g) for e in range(1, n_cells + 1) for g in range(1, e + 1)]
+        n_slots = plain(options.cell).k
+        pairs = [(e, g) for e in range(1, n_slots + 1) for g in range(1, e + 1)]
         drawn = np.random.default_rng(options.seed).integers(len(pairs), size=EPISODES)
         self._triangular = [plain(options.cell) for _ in range(EPISODES)]
         self._even = [plain(options.cell, pairs[k]) for k in drawn]

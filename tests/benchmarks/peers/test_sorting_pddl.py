@@ -8,7 +8,7 @@ from app.sim.sorting.state import SortingShape, SortingState
 from tests.benchmarks.bench_sorting import task
 from tests.benchmarks.peers.sorting_pddl import installed, plan, problem, replayed
 
-SHAPE = SortingShape(n_cells=4, n_colours=2, n_sizes=2)
+SHAPE = SortingShape(n_slots=4, n_colours=2, n_sizes=2)
 
 
 def scene() -> SortingState:
@@ -75,6 +75,6 @@ def test_planners_need_as_many_moves_as_the_exact_planner_or_more(
 def test_a_planner_whose_time_is_over_says_so() -> None:
     if not installed("pyperplan"):
         pytest.skip("pyperplan is not installed")
-    large = SortingShape(n_cells=40, n_colours=3)
+    large = SortingShape(n_slots=40, n_colours=3)
     found = plan("pyperplan", task(large, np.random.default_rng(3), False), large, cap_s=1.0)
     assert found.moves is None and "no plan in 1 s" in found.note

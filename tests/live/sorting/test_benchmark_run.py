@@ -47,7 +47,7 @@ def test_person_whose_part_a_visitor_made_impossible_does_nothing() -> None:
 
 def test_test_that_does_not_fit_the_cell_is_refused() -> None:
     with pytest.raises(InvalidInput, match="test-2"):
-        SortingTestRun("test-2", (1,)).start(SortingShape(n_cells=8, n_colours=2), np.zeros(8))
+        SortingTestRun("test-2", (1,)).start(SortingShape(n_slots=8, n_colours=2), np.zeros(8))
 
 
 def begun(name: str) -> SortingTestRun:

@@ -14,9 +14,9 @@ RED, BLUE = 10, 11
 
 @pytest.fixture
 def table() -> SortingTable:
-    """Three large red blocks, two of them in cells that never fail; one is asked for."""
+    """Three large red blocks, two of them in slots that never fail; one is asked for."""
     table = SortingTable(load_cell("sorting-e0"))
-    for at in ("cell2", "cell5", "cell9"):
+    for at in ("slot2", "slot5", "slot9"):
         table.add("red", "large", at)
     table.set_goal({"red": ("large",)})
     return table

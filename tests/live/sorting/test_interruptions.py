@@ -26,10 +26,10 @@ class WaitingPolicy(StraightPolicy):
 def test_block_that_was_not_reached_is_offered_again_after_the_others() -> None:
     world = empty_world(WaitingPolicy(load_cell("sorting-e0")))
     world.apply(commands.RemovePerson(person=0))  # beside people at rest a planner acts
-    ids = lay(world, {"cell5": "red-large", "cell9": "red-large"}, {"red": ("large",)})
-    assert world.snapshot().chosen == ids["cell9"]
+    ids = lay(world, {"slot5": "red-large", "slot9": "red-large"}, {"red": ("large",)})
+    assert world.snapshot().chosen == ids["slot9"]
     first = until(world, lambda now: now.counters.timeouts == 1)
-    assert first.sorting.duplicates == (ids["cell5"],)
+    assert first.sorting.duplicates == (ids["slot5"],)
     second = until(world, lambda now: now.counters.timeouts == 2)
     assert set(second.sorting.duplicates) == set(ids.values())
 
@@ -56,10 +56,10 @@ def test_commands_change_the_move_while_a_person_blocks_the_robot() -> None:
 
 def test_move_names_no_block_that_was_removed() -> None:
     world = empty_world()
-    ids = lay(world, {"cell5": "red-large"}, {"red": ("large",)})
+    ids = lay(world, {"slot5": "red-large"}, {"red": ("large",)})
     until(world, lambda now: any(one.held for one in now.sorting.blocks))
-    assert world.snapshot().sorting.move.block == ids["cell5"]
-    world.apply(RemoveBlock(id=ids["cell5"]))
+    assert world.snapshot().sorting.move.block == ids["slot5"]
+    world.apply(RemoveBlock(id=ids["slot5"]))
     after = world.snapshot()
     assert after.status == "picking"
     assert (after.sorting.move.block, after.sorting.duplicates) == (None, ())
@@ -67,7 +67,7 @@ def test_move_names_no_block_that_was_removed() -> None:
 
 def test_tool_that_moves_up_again_says_why() -> None:
     world = empty_world()
-    lay(world, {"cell5": "red-large"}, {"red": ("large",)})
+    lay(world, {"slot5": "red-large"}, {"red": ("large",)})
     going_down = until(world, lambda now: now.status == "picking")
     world.apply(SetGoal(towers={}))
     world.step()
@@ -79,7 +79,7 @@ def test_tool_that_moves_up_again_says_why() -> None:
 def test_time_limit_with_a_held_block_names_its_place() -> None:
     world = empty_world()
     world.apply(commands.RemovePerson(person=0))
-    lay(world, {"cell5": "blue-large"}, {"blue": ("large",)})
+    lay(world, {"slot5": "blue-large"}, {"blue": ("large",)})
     until(world, lambda now: now.sorting.phase == "carry")
     waiting = commands.SetPolicy(checkpoint="waiting").with_loaded(WaitingPolicy(world.cell))
     world.apply(waiting)

@@ -13,9 +13,9 @@ def table() -> SortingTable:
     """Two large red blocks, a small one, and a large blue one."""
     table = SortingTable(load_cell("sorting-e0"))
     for colour, size, at in (
-        ("red", "large", "cell0"),
-        ("red", "large", "cell1"),
-        ("red", "small", "cell2"),
+        ("red", "large", "slot0"),
+        ("red", "large", "slot1"),
+        ("red", "small", "slot2"),
         ("blue", "large", "blue"),
     ):
         table.add(colour, size, at)
@@ -40,7 +40,7 @@ def test_held_block_counts_on_the_first_free_cell_once_its_own_is_taken(
     table: SortingTable,
 ) -> None:
     table.lift(0)
-    table.add("blue", "small", "cell0")
+    table.add("blue", "small", "slot0")
     assert table.held_position == 3
     check_state(table.state, table.shape)
 
@@ -99,7 +99,7 @@ def test_adopted_state_keeps_the_blocks_that_stay(table: SortingTable) -> None:
     assert (table.state.clutter == state.clutter).all()
 
 
-def test_table_holds_no_more_blocks_than_clutter_cells(table: SortingTable) -> None:
+def test_table_holds_no_more_blocks_than_clutter_slots(table: SortingTable) -> None:
     for _ in range(6):
         table.add("blue", "small", None)
     with pytest.raises(InvalidInput, match="more than 10 blocks"):
@@ -113,5 +113,5 @@ def test_goal_that_the_blocks_cannot_meet_names_what_is_missing(table: SortingTa
 
 def test_taken_cell_is_refused_with_the_free_ones(table: SortingTable) -> None:
     with pytest.raises(InvalidInput, match="taken by block2") as caught:
-        table.move("block1", "cell1")
-    assert "cell3" in caught.value.choices
+        table.move("block1", "slot1")
+    assert "slot3" in caught.value.choices

@@ -34,7 +34,7 @@ def phase(name: str):
 
 def test_shipped_policy_and_planner_reach_a_goal_beside_a_person_who_stands_back() -> None:
     world = empty_world(TaskChooser(pretrained.load("pick")))
-    lay(world, {"cell5": "red-small", "cell9": "red-large"}, {"red": ("large", "small")})
+    lay(world, {"slot5": "red-small", "slot9": "red-large"}, {"red": ("large", "small")})
     end = until(world, solved)
     assert towers(end) == {"red": ["red-large", "red-small"], "blue": []}
     counters = end.sorting.counters
@@ -45,9 +45,9 @@ def test_shipped_policy_and_planner_reach_a_goal_beside_a_person_who_stands_back
 
 def test_block_that_is_added_while_the_robot_works_reaches_the_longer_goal() -> None:
     world = empty_world()
-    lay(world, {"cell5": "red-small", "cell9": "red-medium"}, {"red": ("medium", "small")})
+    lay(world, {"slot5": "red-small", "slot9": "red-medium"}, {"red": ("medium", "small")})
     carrying = until(world, phase("carry"))
-    world.apply(AddBlock(colour="red", size="large", at="cell6"))
+    world.apply(AddBlock(colour="red", size="large", at="slot6"))
     world.apply(SetGoal(towers={"red": ("large", "medium", "small")}))
     end = until(world, solved)
     assert end.t_s > carrying.t_s
@@ -56,17 +56,17 @@ def test_block_that_is_added_while_the_robot_works_reaches_the_longer_goal() -> 
 
 def test_robot_takes_another_block_when_the_one_it_goes_for_is_removed() -> None:
     world = empty_world()
-    lay(world, {"cell5": "red-large", "cell6": "red-large"}, {"red": ("large",)})
+    lay(world, {"slot5": "red-large", "slot6": "red-large"}, {"red": ("large",)})
     going = until(world, phase("approach")).sorting.move
-    assert going.pick == "cell5"
+    assert going.pick == "slot5"
     world.apply(RemoveBlock(id=going.block))
-    assert world.snapshot().sorting.move.pick == "cell6"
+    assert world.snapshot().sorting.move.pick == "slot6"
     assert towers(until(world, solved))["red"] == ["red-large"]
 
 
 def test_block_at_the_magnet_that_is_removed_leaves_the_robot_with_a_smaller_goal() -> None:
     world = empty_world()
-    lay(world, {"cell5": "red-large", "cell9": "blue-small"}, {"red": ("large",)})
+    lay(world, {"slot5": "red-large", "slot9": "blue-small"}, {"red": ("large",)})
     held = until(world, phase("carry")).sorting.move.block
     world.apply(RemoveBlock(id=held))
     after = world.snapshot()
@@ -78,27 +78,27 @@ def test_block_at_the_magnet_that_is_removed_leaves_the_robot_with_a_smaller_goa
 
 def test_held_block_goes_back_when_the_goal_does_not_ask_for_it_any_more() -> None:
     world = empty_world()
-    lay(world, {"cell5": "red-large", "cell9": "blue-small"}, {"red": ("large",)})
+    lay(world, {"slot5": "red-large", "slot9": "blue-small"}, {"red": ("large",)})
     until(world, phase("carry"))
     world.apply(SetGoal(towers={"blue": ("small",)}))
     end = until(world, solved)
     assert towers(end) == {"red": [], "blue": ["blue-small"]}
-    assert {one.place for one in end.sorting.blocks} == {"cell5", "blue"}
+    assert {one.place for one in end.sorting.blocks} == {"slot5", "blue"}
 
 
 def test_held_block_whose_cell_was_taken_is_put_into_another() -> None:
     world = empty_world()
-    ids = lay(world, {"cell5": "red-large", "cell9": "blue-small"}, {"red": ("large",)})
+    ids = lay(world, {"slot5": "red-large", "slot9": "blue-small"}, {"red": ("large",)})
     until(world, phase("carry"))
-    world.apply(MoveBlock(id=ids["cell9"], to="cell5"))
+    world.apply(MoveBlock(id=ids["slot9"], to="slot5"))
     world.apply(SetGoal(towers={}))
     end = until(world, lambda now: now.status == "no candidates")
-    assert sorted(one.place for one in end.sorting.blocks) == ["cell0", "cell5"]
+    assert sorted(one.place for one in end.sorting.blocks) == ["slot0", "slot5"]
 
 
 def test_place_occupied_during_placement_is_not_used_twice() -> None:
     world = empty_world()
-    lay(world, {"cell5": "red-large", "cell9": "red-small"}, {"red": ("large",)})
+    lay(world, {"slot5": "red-large", "slot9": "red-small"}, {"red": ("large",)})
     until(world, phase("place"))
     world.apply(AddBlock(colour="red", size="medium", at="red"))
     end = until(world, solved)
@@ -109,10 +109,10 @@ def test_place_occupied_during_placement_is_not_used_twice() -> None:
 
 def test_goal_that_changes_while_the_tool_rises_with_a_block_is_followed() -> None:
     world = empty_world()
-    ids = lay(world, {"cell5": "red-large", "cell9": "blue-small"}, {"red": ("large",)})
+    ids = lay(world, {"slot5": "red-large", "slot9": "blue-small"}, {"red": ("large",)})
     until(world, lambda now: any(one.held for one in now.sorting.blocks))
     assert world.snapshot().sorting.phase == "grasp"
-    world.apply(MoveBlock(id=ids["cell9"], to="red"))
+    world.apply(MoveBlock(id=ids["slot9"], to="red"))
     world.apply(SetGoal(towers={"blue": ("small",), "red": ("large",)}))
     end = until(world, solved)
     assert towers(end) == {"red": ["red-large"], "blue": ["blue-small"]}
@@ -122,7 +122,7 @@ def test_grasps_fail_as_often_as_the_cell_says() -> None:
     attempts = failures = 0
     for seed in range(3):
         world = empty_world(seed=seed)
-        kinds = {f"cell{k}": "red-small" for k in (1, 2, 3)}
+        kinds = {f"slot{k}": "red-small" for k in (1, 2, 3)}
         lay(world, kinds, {"red": ("small",) * 3})
         counters = until(world, solved, 6000).sorting.counters
         attempts, failures = attempts + counters.attempts, failures + counters.failures
@@ -134,7 +134,7 @@ def test_grasps_fail_as_often_as_the_cell_says() -> None:
 def test_joint_limits_hold_along_the_whole_motion() -> None:
     world = empty_world()
     robot = world.cell.robot
-    lay(world, {"cell2": "red-large", "cell9": "blue-small"}, {"red": ("large",)})
+    lay(world, {"slot2": "red-large", "slot9": "blue-small"}, {"red": ("large",)})
     before, lowest = world.snapshot(), 1.0
     for _ in range(500):
         world.step()
@@ -179,7 +179,7 @@ def test_reset_draws_another_task_with_a_goal() -> None:
 
 def test_critic_may_take_any_duplicate_that_fails_as_rarely() -> None:
     world = empty_world()
-    ids = lay(world, {"cell5": "red-large", "cell9": "red-large"}, {"red": ("large",)})
+    ids = lay(world, {"slot5": "red-large", "slot9": "red-large"}, {"red": ("large",)})
     going = until(world, phase("approach"))
     assert set(going.sorting.duplicates) == set(ids.values())
     assert {one.id for one in going.candidates} == set(ids.values())
@@ -198,7 +198,7 @@ def test_critic_may_take_any_duplicate_that_fails_as_rarely() -> None:
 )
 def test_order_of_equal_moves_is_followed_and_named(order: Order, text: str) -> None:
     world = empty_world()
-    lay(world, {"cell5": "red-large", "cell9": "red-large"}, {"red": ("large",)})
+    lay(world, {"slot5": "red-large", "slot9": "red-large"}, {"red": ("large",)})
     world.apply(SetOrder(order=order))
     going = until(world, phase("approach"))
     assert going.sorting.order == order
@@ -209,9 +209,9 @@ def test_order_of_equal_moves_is_followed_and_named(order: Order, text: str) -> 
 
 def test_duplicate_in_a_riskier_slot_is_left_and_the_message_says_so() -> None:
     world = empty_world()
-    ids = lay(world, {"cell2": "red-large", "cell9": "red-large"}, {"red": ("large",)})
+    ids = lay(world, {"slot2": "red-large", "slot9": "red-large"}, {"red": ("large",)})
     going = until(world, phase("approach"))
-    assert going.sorting.duplicates == (ids["cell9"],)
+    assert going.sorting.duplicates == (ids["slot9"],)
     assert going.message == (
         "Moving to the large red block in slot 9, to be placed on the red tower: 1 move to go. "
         "Its duplicate in slot 2 fails more often (40 %)."
@@ -219,11 +219,11 @@ def test_duplicate_in_a_riskier_slot_is_left_and_the_message_says_so() -> None:
 
 
 def test_planner_replaces_a_policy_that_cycles() -> None:
-    shape = SortingShape(n_cells=10, n_colours=2)
+    shape = SortingShape(n_slots=10, n_colours=2)
     to_blue = [Move(k, 11) for k in range(10)]
     back = [Move(11, k) for k in range(10)]
     world = empty_world(sorting_policy=FixedValues(shape, [*to_blue, *back]))
-    lay(world, {"cell5": "red-large", "cell9": "red-small"}, {"red": ("large", "small")})
+    lay(world, {"slot5": "red-large", "slot9": "red-small"}, {"red": ("large", "small")})
     assert until(world, phase("approach")).sorting.decided_by == "policy"
     end = until(world, solved, 6000)
     assert end.sorting.counters.planner_fallbacks == 1
@@ -231,9 +231,9 @@ def test_planner_replaces_a_policy_that_cycles() -> None:
 
 
 def test_setting_the_same_goal_again_is_no_repeated_state() -> None:
-    shape = SortingShape(n_cells=10, n_colours=2)
+    shape = SortingShape(n_slots=10, n_colours=2)
     world = empty_world(sorting_policy=FixedValues(shape, [Move(5, 10)]))
-    lay(world, {"cell5": "red-large"}, {"red": ("large",)})
+    lay(world, {"slot5": "red-large"}, {"red": ("large",)})
     for _ in range(3):
         world.apply(SetGoal(towers={"red": ("large",)}))
         world.step()
@@ -262,20 +262,20 @@ def test_person_of_a_test_adds_a_larger_block_at_the_goal() -> None:
 
 def test_contact_lets_a_held_block_fall_back_where_it_came_from() -> None:
     world = empty_world()
-    lay(world, {"cell7": "red-large"}, {"red": ("large",)})
+    lay(world, {"slot7": "red-large"}, {"red": ("large",)})
     world.apply(commands.MovePerson(pelvis=(-0.7, 1.12, -1.57)))
     until(world, phase("carry"))
     world.apply(commands.SetSafety(on=False))
     world.apply(commands.MovePerson(right=(-0.5, 0.5, 0.2), left=(-0.6, 0.6, 0.2)))
     until(world, lambda now: now.status == "contact")
     after = until(world, lambda now: now.status in ("moving", "blocked"))
-    assert [one.place for one in after.sorting.blocks] == ["cell7"]
+    assert [one.place for one in after.sorting.blocks] == ["slot7"]
     assert after.sorting.counters.moves == 0
 
 
 def test_layer_holds_the_block_before_a_person_and_the_robot_goes_on_afterwards() -> None:
     world = empty_world()
-    lay(world, {"cell7": "red-large"}, {"red": ("large",)})
+    lay(world, {"slot7": "red-large"}, {"red": ("large",)})
     world.apply(commands.MovePerson(pelvis=(-0.7, 1.12, -1.57)))
     until(world, phase("carry"))
     world.apply(commands.MovePerson(right=(-0.5, 0.5, 0.2), left=(-0.6, 0.6, 0.2)))
@@ -292,7 +292,7 @@ def test_layer_holds_the_block_before_a_person_and_the_robot_goes_on_afterwards(
 
 def test_nothing_is_grasped_while_a_hand_is_near() -> None:
     world = empty_world()
-    lay(world, {"cell5": "red-large"}, {"red": ("large",)})
+    lay(world, {"slot5": "red-large"}, {"red": ("large",)})
     world.apply(commands.MovePerson(pelvis=(-0.5, 1.12, -1.57)))
     world.apply(commands.MovePerson(right=(-0.55, 0.78, 0.1), left=(-0.5, 0.85, 0.1)))
     for _ in range(200):
@@ -308,7 +308,7 @@ def test_critic_may_choose_which_tower_comes_first() -> None:
     world = empty_world()
     ids = lay(
         world,
-        {"cell5": "red-large", "cell9": "blue-large"},
+        {"slot5": "red-large", "slot9": "blue-large"},
         {"red": ("large",), "blue": ("large",)},
     )
     going = until(world, phase("approach"))
@@ -320,7 +320,7 @@ def test_critic_may_choose_which_tower_comes_first() -> None:
 
 def test_robot_goes_home_with_nothing_to_do() -> None:
     world = empty_world()
-    lay(world, {"cell5": "red-large"}, {"red": ("large",)})
+    lay(world, {"slot5": "red-large"}, {"red": ("large",)})
     until(world, solved)
     home = np.array(world.cell.robot.home_q)
     until(world, lambda now: np.abs(now.robot_q - home).max() < 0.02)
@@ -341,21 +341,21 @@ def test_robot_rests_without_a_policy() -> None:
     [
         (AddBlock(colour="green", size="small"), "colour"),
         (AddBlock(colour="red", size="huge"), "size"),
-        (AddBlock(colour="red", size="small", at="cell5"), "at"),
-        (MoveBlock(id="block99", to="cell0"), "id"),
+        (AddBlock(colour="red", size="small", at="slot5"), "at"),
+        (MoveBlock(id="block99", to="slot0"), "id"),
         (RemoveBlock(id="block99"), "id"),
         (ToggleGoal(id="blue-small"), "id"),
         (SetGoal(towers={"red": ("large", "large")}), "towers"),
         (SetGoal(towers={"green": ()}), "towers"),
         (StartTest(id="test-7"), "id"),
-        (commands.ToggleCandidate(id="cell0"), "tag"),
+        (commands.ToggleCandidate(id="slot0"), "tag"),
     ],
 )
 def test_command_that_does_not_fit_is_named_and_changes_nothing(
     command: Command, field: str
 ) -> None:
     world = empty_world()
-    lay(world, {"cell5": "red-large"}, {})
+    lay(world, {"slot5": "red-large"}, {})
     before = world.snapshot().sorting
     with pytest.raises(InvalidInput) as caught:
         world.apply(command)

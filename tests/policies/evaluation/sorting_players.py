@@ -21,7 +21,7 @@ Choice = Callable[[SortingState, SortingShape], int]
 
 def state_in(obs, shape: SortingShape) -> SortingState:
     """Return the state that an observation shows."""
-    k, c = shape.n_cells, shape.n_colours
+    k, c = shape.n_slots, shape.n_colours
     clutter, towers, goal, fail = np.split(obs, np.cumsum([k, c * k, c * k]))
     return SortingState(
         clutter=clutter.astype(np.int8),
@@ -53,11 +53,11 @@ def exactly(state: SortingState, shape: SortingShape) -> int:
 def riskily(state: SortingState, shape: SortingShape) -> int:
     """Choose as the exact planner does, but always the riskiest duplicate."""
     move = shape.move_of(exactly(state, shape))
-    if move.pick >= shape.n_cells:
+    if move.pick >= shape.n_slots:
         return shape.action_of(move)
     duplicates = np.flatnonzero(state.clutter == state.clutter[move.pick])
     cell = int(duplicates[state.fail[duplicates].argmax()])
-    return cell * shape.n_colours + move.place - shape.n_cells
+    return cell * shape.n_colours + move.place - shape.n_slots
 
 
 def in_circles(state: SortingState, shape: SortingShape) -> int:
@@ -66,7 +66,7 @@ def in_circles(state: SortingState, shape: SortingShape) -> int:
     if state.heights[c] == 0:
         return int(np.flatnonzero(state.clutter != NULL)[0]) * shape.n_colours
     other = (c + 1) % shape.n_colours
-    return 2 * shape.n_cells * shape.n_colours + c * shape.n_colours + other
+    return 2 * shape.n_slots * shape.n_colours + c * shape.n_colours + other
 
 
 def at_random(shape: SortingShape, seed: int):

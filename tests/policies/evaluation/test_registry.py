@@ -159,7 +159,7 @@ def test_a_sorting_result_states_task_policy_and_seed(name, n_rows):
     assert result["checkpoint"] == policy.sha256
     assert len(result["results"]) == n_rows
     settings = result["settings"]
-    assert (settings["cell"], settings["n_cells"], settings["horizon_attempts"]) == (
+    assert (settings["cell"], settings["n_slots"], settings["horizon_attempts"]) == (
         "sorting-e0",
         10,
         40,

@@ -28,10 +28,10 @@ LARGE, BLUE_SMALL = SHAPE.code(0, 2), SHAPE.code(1, 0)
 HOME = np.array(CELL.robot.home_q)
 
 
-def task(*cells: int) -> SortingState:
-    """Large red objects in some cells, of which one is wanted on its tower."""
+def task(*slots: int) -> SortingState:
+    """Large red objects in some slots, of which one is wanted on its tower."""
     state = empty_state(SHAPE)
-    state.clutter[list(cells)] = LARGE
+    state.clutter[list(slots)] = LARGE
     state.goal[0, 0] = LARGE
     return state
 
@@ -181,42 +181,42 @@ def test_previous_object_is_kept_within_the_hysteresis(lead: float, stays: bool)
         return replace(
             found,
             values=tuple(
-                value + gain * (name == f"cell{best}")
+                value + gain * (name == f"slot{best}")
                 for name, value in zip(ids, found.values, strict=True)
             ),
         )
 
     policy.decide = raised  # type: ignore[method-assign]
-    found = SortingPlanner(policy, CELL).plan(query(state, previous=f"cell{other}"))
+    found = SortingPlanner(policy, CELL).plan(query(state, previous=f"slot{other}"))
     assert found.chosen is not None and found.decision is not None
     assert found.chosen.move.pick == (other if stays else best)
-    assert found.decision.chosen == f"cell{found.chosen.move.pick}"
+    assert found.decision.chosen == f"slot{found.chosen.move.pick}"
 
 
 def test_object_being_lifted_stays_chosen() -> None:
     free = planner().plan(query(task(5, 9))).chosen
     assert free is not None
     far = {5, 9} - {free.move.pick}
-    lifted = f"cell{far.pop()}"
+    lifted = f"slot{far.pop()}"
     progress = PickProgress(phase=LIFT, closing_s=1.3)
     found = planner().plan(query(task(5, 9), previous=lifted, progress=progress))
     assert found.decision is not None and found.decision.chosen == lifted
 
 
-@pytest.mark.parametrize(("held", "offered"), [(None, ("cell5", "cell9")), (5, ("red",))])
+@pytest.mark.parametrize(("held", "offered"), [(None, ("slot5", "slot9")), (5, ("red",))])
 def test_lift_at_a_station_that_is_not_offered_is_refused(
     held: int | None, offered: tuple[str, ...]
 ) -> None:
     progress = PickProgress(phase=LIFT, closing_s=1.3)
-    asked = query(task(5, 9), held=held, previous="cell7", progress=progress)
+    asked = query(task(5, 9), held=held, previous="slot7", progress=progress)
     with pytest.raises(InvalidInput, match="an offered motion in the phase lift") as refused:
         planner().plan(asked)
-    assert (refused.value.field, refused.value.value) == ("previous", "cell7")
+    assert (refused.value.field, refused.value.value) == ("previous", "slot7")
     assert set(refused.value.choices) == set(offered)
 
 
 def test_previous_station_that_is_not_offered_counts_as_none() -> None:
-    fresh, stale = (planner().plan(query(task(5, 9), previous=one)) for one in (None, "cell7"))
+    fresh, stale = (planner().plan(query(task(5, 9), previous=one)) for one in (None, "slot7"))
     assert stale.chosen is not None and fresh.chosen is not None
     assert stale.chosen.move == fresh.chosen.move
 
@@ -228,16 +228,16 @@ def test_solved_task_has_neither_options_nor_segment() -> None:
 
 
 def test_object_out_of_reach_is_no_option() -> None:
-    far = {"id": "cell9", "kind": "clutter", "label": "Far", "position": (0.9, 1.4, 0.05)}
+    far = {"id": "slot9", "kind": "clutter", "label": "Far", "position": (0.9, 1.4, 0.05)}
     stations = tuple(
-        Station.model_validate(far) if one.id == "cell9" else one for one in CELL.stations
+        Station.model_validate(far) if one.id == "slot9" else one for one in CELL.stations
     )
     cell = CELL.model_copy(update={"stations": stations})
     found = planner(cell).plan(query(task(5, 9)))
     assert [one.move.pick for one in found.options] == [5]
     with pytest.raises(InvalidInput, match="robot reaches") as caught:
         planner(cell).plan(query(task(9)))
-    assert (caught.value.field, caught.value.value) == ("objects", ["cell9"])
+    assert (caught.value.field, caught.value.value) == ("objects", ["slot9"])
 
 
 def test_reason_states_the_value_of_the_choice_and_of_the_next_one() -> None:

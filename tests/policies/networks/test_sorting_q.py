@@ -9,7 +9,7 @@ from app.sim.cells.cell import load_cell
 from app.sim.sorting.batch import SortingSettings, batch_in, observe
 from app.sim.sorting.state import SortingShape, SortingState, empty_state
 
-SHAPE = SortingShape(n_cells=10, n_colours=2)
+SHAPE = SortingShape(n_slots=10, n_colours=2)
 DISTURBED = SortingSettings(disturbed_share=0.7, random_map_share=0.5)
 
 
@@ -74,7 +74,7 @@ def test_the_value_of_a_pick_is_linear_in_its_failure_probability():
 
 @pytest.mark.parametrize("n_colours", [2, 3])
 def test_turning_all_colours_turns_the_values(n_colours):
-    shape = SortingShape(n_cells=6, n_colours=n_colours)
+    shape = SortingShape(n_slots=6, n_colours=n_colours)
     rng = np.random.default_rng(3)
     state = empty_state(shape)
     state.clutter[:4] = rng.integers(1, shape.n_types + 1, 4)

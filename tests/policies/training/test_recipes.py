@@ -32,7 +32,7 @@ def moving_nothing(preset: SortingPreset) -> float:
     n = preset.learning.progress_episodes
     batch = batch_in(load_cell(preset.cell), n, CURVE_SEED, settings)
     batch.reset()
-    tower = batch.shape.n_cells
+    tower = batch.shape.n_slots
     act = np.full(n, batch.shape.action_of(Move(tower, tower)))
     returns = sum(batch.step(act, auto_reset=False).rew for _ in range(batch.horizon))
     return float(np.mean(returns))

@@ -76,7 +76,7 @@ def test_thread_of_a_training_keeps_denormal_numbers_afterwards():
 def test_networks_that_no_checkpoint_holds_are_refused_before_the_first_step():
     cell = load_cell("sorting-e0")
     slot, tower = cell.stations_of("clutter")[0], cell.stations_of("cluster")[0]
-    slots = [slot.model_copy(update={"id": f"cell{k}"}) for k in range(30)]
+    slots = [slot.model_copy(update={"id": f"slot{k}"}) for k in range(30)]
     towers = [
         tower.model_copy(update={"id": f"tower{k}", "levels": 30, "colour": None})
         for k in range(4)

@@ -29,7 +29,7 @@ def test_every_number_of_every_part_is_held_against_its_bounds() -> None:
     robot = cell.robot.model_copy(update={"qd_max": (0.5, 0.5, 3.5, 0.5, 0.5, 0.5)})
     broken = cell.model_copy(update={"stations": (far,), "robot": robot})
     assert {fault.place for fault in numbers(broken)} == {
-        "stations.cell3.position[1]",
+        "stations.slot3.position[1]",
         "robot.qd_max[2]",
     }
 

@@ -77,9 +77,9 @@ def test_shared_workspace_is_that_of_the_source() -> None:
 
 @pytest.mark.parametrize("name", SORTING)
 def test_sorting_cell_has_the_source_s_numbers(name: str) -> None:
-    n_cells, n_clusters, n_levels = SORTING[name]
+    n_slots, n_clusters, n_levels = SORTING[name]
     cell = load_cell(name)
-    assert len(cell.stations_of("clutter")) == n_cells
+    assert len(cell.stations_of("clutter")) == n_slots
     clusters = cell.stations_of("cluster")
     assert len(clusters) == n_clusters
     assert {cluster.levels for cluster in clusters} == {n_levels}

@@ -156,7 +156,7 @@ def test_plain_environment_gives_the_same_transitions_and_rewards(
     cell = load_cell(cell_name)
     shape = shape_of(cell)
     # A pick that succeeds for sure, and, as 1 is not allowed, one that fails as good as surely.
-    fail = np.full(shape.n_cells, 0.99 if fails else 0.0)
+    fail = np.full(shape.n_slots, 0.99 if fails else 0.0)
     # The plain environment has the reward of the thesis' presets.
     weights = SortingWeights(fail=0.05, back=0.05, distance=0.1)
     settings = SortingSettings(disturbed_share=0.5, weights=weights)
@@ -171,7 +171,7 @@ def test_plain_environment_gives_the_same_transitions_and_rewards(
         failures = batch.envs.failures.copy()
         result = batch.step(acts, auto_reset=False)
         for e, env in enumerate(plain):
-            if fails and acts[e] < shape.n_cells * shape.n_colours:
+            if fails and acts[e] < shape.n_slots * shape.n_colours:
                 if (
                     env.clutter[acts[e] // shape.n_colours]
                     and batch.envs.failures[e] == failures[e]

@@ -1,4 +1,4 @@
-"""Roamers: endless variety inside limits and paces, and a share of the people do it."""
+"""Off-task motion: endless variety inside limits and paces, and a share of the people do it."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ CELL = load_cell()
 SIZE = MEDIAN.vector(CELL.floor_z)
 
 
-def test_roamers_stay_inside_limits_area_and_paces() -> None:
+def test_they_stay_inside_limits_area_and_paces() -> None:
     area = CELL.human
     for motion in off_task_motions(CELL, MEDIAN, 7, 3):
         q, dt = motion.q, float(motion.times[1])
@@ -42,18 +42,18 @@ def test_hands_come_over_the_whole_reach_of_the_table() -> None:
     assert np.ptp(over[:, 0]) > 1.0 and np.ptp(over[:, 2]) > 0.3
 
 
-def test_same_seed_roams_alike_and_another_does_not() -> None:
+def test_same_seed_moves_alike_and_another_does_not() -> None:
     one, two, other = (off_task_motions(CELL, MEDIAN, seed, 1)[0].q for seed in (3, 3, 4))
     np.testing.assert_array_equal(one, two)
     assert one.shape != other.shape or not np.array_equal(one, other)
 
 
 @pytest.mark.parametrize("share", [0.0, 0.3, 1.0])
-def test_the_asked_share_of_people_roams(share: float) -> None:
+def test_the_asked_share_of_people_is_off_task(share: float) -> None:
     batch = PickBatch(CELL, 400, 5, PickSettings(work=HumanMotionConfig(off_task=share)))
     batch.reset()
-    roam = (batch.state.people.track >= 0).mean()
-    assert abs(roam - share) < 4.0 * np.sqrt(share * (1.0 - share) / 400) + 1e-9
+    found = (batch.state.people.track >= 0).mean()
+    assert abs(found - share) < 4.0 * np.sqrt(share * (1.0 - share) / 400) + 1e-9
     sizes = batch.state.people.size[batch.state.people.track >= 0]
     assert share == 0.0 or len(np.unique(sizes.round(6), axis=0)) > 1
 

@@ -14,7 +14,7 @@ from app.sim.core.arrays import Vec
 from app.sim.sorting.state import Move, SortingShape, SortingState
 
 Key = tuple[tuple[int, ...], tuple[tuple[int, ...], ...]]
-"""Objects in the cells, and on each tower without free levels."""
+"""Objects in the slots, and on each tower without free levels."""
 
 
 def key_of(state: SortingState) -> Key:
@@ -31,7 +31,7 @@ def goal_of(state: SortingState) -> tuple[tuple[int, ...], ...]:
 def moves_from(key: Key, shape: SortingShape) -> Iterator[tuple[int, Key]]:
     """Every move that changes something: its action, and what it leads to."""
     clutter, towers = key
-    k, c = shape.n_cells, shape.n_colours
+    k, c = shape.n_slots, shape.n_colours
     for i, d in itertools.product(range(k), range(c)):
         if clutter[i] and len(towers[d]) < k:
             after = [*towers]
@@ -44,8 +44,8 @@ def moves_from(key: Key, shape: SortingShape) -> Iterator[tuple[int, Key]]:
         lifted = (*towers[:source], rest, *towers[source + 1 :])
         for i in range(k):
             if not clutter[i]:
-                cells = (*clutter[:i], code, *clutter[i + 1 :])
-                yield k * c + source * k + i, (cells, lifted)
+                slots = (*clutter[:i], code, *clutter[i + 1 :])
+                yield k * c + source * k + i, (slots, lifted)
         for d in range(c):
             if d != source and len(lifted[d]) < k:
                 after = [*lifted]
@@ -69,7 +69,7 @@ def moves_to_go(state: SortingState, shape: SortingShape) -> tuple[int, dict[Key
         counts += tower
     for x in itertools.chain(*goal):
         counts.remove(x)
-    free = [0] * (shape.n_cells - len(counts))
+    free = [0] * (shape.n_slots - len(counts))
     start = _least((tuple(free + counts), goal))
     target = _least(key_of(state))
     distance, wave = {start: 0}, [start]
@@ -110,7 +110,7 @@ def fewest_attempts(
         to_go: Fewest moves of states, by ``moves_to_go``.
         fewest_moves: Look only at plans with the fewest moves.
     """
-    goal, moves = goal_of(state), shape.n_cells * shape.n_colours
+    goal, moves = goal_of(state), shape.n_slots * shape.n_colours
     cost = 1.0 / (1.0 - state.fail)
     far = max(to_go.values()) + 1
     best, done = {key_of(state): 0.0}, set()
@@ -145,7 +145,7 @@ def random_task(
         n_objects: Objects.
         on_towers: Share of them that stand on towers.
     """
-    k, c = shape.n_cells, shape.n_colours
+    k, c = shape.n_slots, shape.n_colours
     codes = rng.integers(1, shape.n_types + 1, n_objects)
     clutter, towers, goal = np.zeros(k), np.zeros((c, k)), np.zeros((c, k))
     stacks: list[list[int]] = [[] for _ in range(c)]

@@ -48,10 +48,10 @@ class _Table:
         self, task: SortingState, shape: SortingShape, weights: SortingWeights
     ) -> None:
         settings = SortingSettings(weights=weights, horizon_factor=1e6)
-        self.batch = SortingBatch(shape, np.zeros(shape.n_cells), STEP, 0, settings)
+        self.batch = SortingBatch(shape, np.zeros(shape.n_slots), STEP, 0, settings)
         self.batch.reset()
-        self._k = shape.n_cells
-        self._levels = (shape.n_colours, shape.n_cells)
+        self._k = shape.n_slots
+        self._levels = (shape.n_colours, shape.n_slots)
         envs = self.batch.envs
         envs.goal[:], envs.goal_heights[:] = task.goal, (task.goal != 0).sum(axis=1)
 
@@ -92,14 +92,14 @@ def model_of(task: SortingState, shape: SortingShape, weights: SortingWeights) -
     for action in range(shape.n_actions):
         reached, rew[:, action] = table.tried(codes, action)
         after[:, action] = [seen[row.tobytes()] for row in reached]
-        if action < shape.n_cells * shape.n_colours:
+        if action < shape.n_slots * shape.n_colours:
             cell = action // shape.n_colours
             fail[:, action] = np.where(codes[:, cell] != 0, task.fail[cell], 0.0)
     # The last action puts an object back where it was, or picks none: it costs as much.
     distance = rew[:, -1] + weights.move + weights.stuck
     assert weights.empty == weights.stuck
     failed = np.broadcast_to(distance[:, None] - weights.move - weights.fail, rew.shape)
-    solved = (codes[:, shape.n_cells :] == task.goal.ravel()).all(axis=1)
+    solved = (codes[:, shape.n_slots :] == task.goal.ravel()).all(axis=1)
     return Model(codes=codes, after=after, rew=rew, failed_rew=failed, fail=fail, solved=solved)
 
 
@@ -194,8 +194,8 @@ def _attempts_of(model: Model, policy: Ints) -> Floats:
 def _has_safer_duplicate(model: Model, shape: SortingShape, fail: Floats) -> NDArray[np.bool_]:
     """Return which actions pick an object with a duplicate in a safer slot, shape (n, A)."""
     risky = np.zeros(model.after.shape, dtype=np.bool_)
-    clutter = model.codes[:, : shape.n_cells]
-    for action in range(shape.n_cells * shape.n_colours):
+    clutter = model.codes[:, : shape.n_slots]
+    for action in range(shape.n_slots * shape.n_colours):
         cell = action // shape.n_colours
         duplicates = (clutter == clutter[:, [cell]]) & (clutter != 0)
         risky[:, action] = (duplicates & (fail < fail[cell])).any(axis=1)

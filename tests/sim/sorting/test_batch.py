@@ -20,7 +20,7 @@ from app.sim.sorting.batch import (
 )
 from app.sim.sorting.state import SortingShape, SortingState, check_state, code_counts, missing
 
-SHAPE = SortingShape(n_cells=6, n_colours=3, n_sizes=2)
+SHAPE = SortingShape(n_slots=6, n_colours=3, n_sizes=2)
 SAFE = np.zeros(6)
 RISKY = np.array([0.0, 0.1, 0.2, 0.3, 0.4, 0.25])
 LIVELY = SortingSettings(
@@ -176,7 +176,7 @@ def test_a_row_alone_equals_the_row_of_a_batch_bit_for_bit() -> None:
 
 
 def test_numbers_of_objects_follow_their_triangles() -> None:
-    n, k = 20_000, SHAPE.n_cells
+    n, k = 20_000, SHAPE.n_slots
     batch = batch_of(n)
     objects = (batch.envs.clutter > 0).sum(axis=1)
     goals = (batch.envs.goal > 0).sum(axis=(1, 2))

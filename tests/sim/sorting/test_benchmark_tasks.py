@@ -23,16 +23,16 @@ from app.sim.sorting.state import (
 )
 
 SHAPES = [
-    SortingShape(n_cells=10, n_colours=2),
-    SortingShape(n_cells=20, n_colours=3),
-    SortingShape(n_cells=40, n_colours=5, n_sizes=5),
+    SortingShape(n_slots=10, n_colours=2),
+    SortingShape(n_slots=20, n_colours=3),
+    SortingShape(n_slots=40, n_colours=5, n_sizes=5),
 ]
 DRAWN = 40
 
 
 def started(test: SortingTest, shape: SortingShape, seed: int) -> SortingState:
     rng = np.random.default_rng(seed)
-    return test.start(shape, np.linspace(0.0, 0.4, shape.n_cells), rng)
+    return test.start(shape, np.linspace(0.0, 0.4, shape.n_slots), rng)
 
 
 def sorted_now(state: SortingState, shape: SortingShape) -> SortingState:
@@ -82,10 +82,10 @@ def test_the_first_task_is_large_enough_for_all_six():
 
 
 def test_a_task_that_is_too_small_fits_no_test_it_cannot_hold():
-    assert not sorting_test("test-2").fits(SortingShape(n_cells=9, n_colours=2))
-    assert not sorting_test("test-5").fits(SortingShape(n_cells=8, n_colours=2))
-    assert not sorting_test("test-6").fits(SortingShape(n_cells=10, n_colours=1))
-    assert not sorting_test("test-4").fits(SortingShape(n_cells=10, n_colours=2, n_sizes=1))
+    assert not sorting_test("test-2").fits(SortingShape(n_slots=9, n_colours=2))
+    assert not sorting_test("test-5").fits(SortingShape(n_slots=8, n_colours=2))
+    assert not sorting_test("test-6").fits(SortingShape(n_slots=10, n_colours=1))
+    assert not sorting_test("test-4").fits(SortingShape(n_slots=10, n_colours=2, n_sizes=1))
 
 
 def test_every_object_of_the_third_test_has_a_duplicate_in_a_riskier_cell():

@@ -10,7 +10,7 @@ from app.sim.sorting.planner import solve
 from app.sim.sorting.state import Move, SortingShape, SortingState, empty_state
 from tests.support.sorting_values import FixedValues
 
-SHAPE = SortingShape(n_cells=5, n_colours=2)
+SHAPE = SortingShape(n_slots=5, n_colours=2)
 RED, BLUE = 5, 6
 SMALL, LARGE = SHAPE.code(0, 0), SHAPE.code(0, 2)
 
@@ -26,7 +26,7 @@ def start() -> SortingState:
 
 def drawn(n: int, seed: int) -> list[SortingState]:
     settings = SortingSettings(disturbed_share=0.5, random_map_share=1.0)
-    batch = SortingBatch(SHAPE, np.zeros(SHAPE.n_cells), n, seed, settings)
+    batch = SortingBatch(SHAPE, np.zeros(SHAPE.n_slots), n, seed, settings)
     batch.reset()
     return [batch.state_of(e) for e in range(n)]
 
@@ -86,7 +86,7 @@ def test_planner_decides_when_it_is_asked_for() -> None:
 
 
 def test_planner_decides_for_a_policy_of_another_shape() -> None:
-    policy = FixedValues(SortingShape(n_cells=6, n_colours=2), [])
+    policy = FixedValues(SortingShape(n_slots=6, n_colours=2), [])
     decision = decide(policy, start(), SHAPE)
     assert (decision.by, decision.why, decision.monitor) == ("planner", "other-shape", None)
 
@@ -147,7 +147,7 @@ def test_policy_is_trusted_again_after_a_person_interferes() -> None:
 
 
 def test_large_tasks_are_ranked_without_values_that_would_take_too_long() -> None:
-    shape = SortingShape(n_cells=40, n_colours=5)
+    shape = SortingShape(n_slots=40, n_colours=5)
     state = empty_state(shape)
     codes = [shape.code(c, 2 - level // 3) for c in range(5) for level in range(8)]
     state.clutter[:] = np.random.default_rng(2).permutation(codes)

@@ -39,7 +39,7 @@ def test_pick_scenario_sees_clutter_as_cubes_and_towers_as_docks() -> None:
     seen = reaching_cell(cell)
     assert lacks_for_pick(seen) is None
     assert (len(seen.stations_of("cube")), len(seen.stations_of("dock"))) == (10, 2)
-    assert seen.station("cell3").position == pytest.approx((0.18, 0.45, 0.12))
+    assert seen.station("slot3").position == pytest.approx((0.18, 0.45, 0.12))
 
 
 @pytest.mark.parametrize("name", ["sorting-e0", "sorting-e1"])

@@ -27,7 +27,7 @@ def with_levels(cell: Cell, levels: int) -> Cell:
 
 def test_words_of_a_cell_are_its_stations_and_colours() -> None:
     names = names_of(load_cell("sorting-e0"))
-    assert names.cells == tuple(f"cell{k}" for k in range(10))
+    assert names.slots == tuple(f"slot{k}" for k in range(10))
     assert names.towers == names.colours == ("red", "blue")
     assert names.sizes == ("small", "medium", "large")
     assert names.stations[10] == "red"
@@ -35,7 +35,7 @@ def test_words_of_a_cell_are_its_stations_and_colours() -> None:
 
 def test_state_holds_what_the_words_say() -> None:
     objects = [
-        NamedObject(colour="blue", size="large", at="cell3"),
+        NamedObject(colour="blue", size="large", at="slot3"),
         NamedObject(colour="red", size="small", at="blue", level=1),
         NamedObject(colour="red", size="large", at="blue", level=0),
     ]
@@ -53,7 +53,7 @@ def test_every_code_has_its_own_words() -> None:
 
 
 def test_goal_that_lacks_objects_names_how_many_of_what() -> None:
-    objects = [NamedObject(colour="red", size="small", at="cell0")]
+    objects = [NamedObject(colour="red", size="small", at="slot0")]
     goal = {"red": [(None, "large"), (None, "large"), (None, "small")]}
     with pytest.raises(InvalidInput, match="2 x large red"):
         state_from_names(NAMES, objects, goal, NO_RISK)
@@ -76,14 +76,14 @@ def test_tower_takes_no_more_levels_than_the_task_has() -> None:
 
 @pytest.mark.parametrize("chance", [1.0, 0.995, -0.1, float("nan")])
 def test_failure_probability_that_leaves_no_plan_is_refused(chance: float) -> None:
-    with pytest.raises(InvalidInput, match=r"failure_map\.cell1"):
-        fail_with(NAMES, NO_RISK, {"cell1": chance})
+    with pytest.raises(InvalidInput, match=r"failure_map\.slot1"):
+        fail_with(NAMES, NO_RISK, {"slot1": chance})
 
 
 def test_cells_that_no_failure_map_names_keep_their_own_risk() -> None:
     cell = load_cell("sorting-e0")
     own = fail_of(cell)
-    fail = fail_with(names_of(cell), own, {"cell5": 0.5})
+    fail = fail_with(names_of(cell), own, {"slot5": 0.5})
     assert np.flatnonzero(fail != own).tolist() == [5]
     assert own[5] == 0.0
 
@@ -92,7 +92,7 @@ def test_cells_that_no_failure_map_names_keep_their_own_risk() -> None:
     ("colours", "sizes", "field"),
     [
         (["red", "red"], ["small"], "colours"),
-        (["cell1"], ["small"], "colours"),
+        (["slot1"], ["small"], "colours"),
         (["red"], ["small", "small"], "sizes"),
     ],
 )

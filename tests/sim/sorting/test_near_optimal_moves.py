@@ -9,7 +9,7 @@ from app.sim.sorting.near_optimal_moves import near_optimal_moves
 from app.sim.sorting.planner import solve
 from app.sim.sorting.state import Move, SortingShape, SortingState, empty_state
 
-SHAPE = SortingShape(n_cells=5, n_colours=2)
+SHAPE = SortingShape(n_slots=5, n_colours=2)
 RED, BLUE = 5, 6
 SMALL, LARGE = SHAPE.code(0, 0), SHAPE.code(0, 2)
 
@@ -68,7 +68,7 @@ def test_moves_of_one_object_are_those_that_pick_it() -> None:
 
 
 def test_large_task_offers_the_planner_s_own_move_alone() -> None:
-    shape = SortingShape(n_cells=40, n_colours=3)
+    shape = SortingShape(n_slots=40, n_colours=3)
     settings = SortingSettings(n_objects=40, n_goal=40)
     batch = SortingBatch(shape, np.zeros(40), 1, 0, settings)
     batch.reset()

@@ -22,7 +22,7 @@ def task(
     clutter: list[int], towers: list[list[int]], goal: list[list[int]], fail: float = 0.0
 ) -> Task:
     """A task from lists; every pick from the clutter fails with the same probability."""
-    shape = SortingShape(n_cells=len(clutter), n_colours=len(towers), n_sizes=3)
+    shape = SortingShape(n_slots=len(clutter), n_colours=len(towers), n_sizes=3)
     stacks = [np.zeros((len(towers), len(clutter)), dtype=np.int8) for _ in range(2)]
     for filled, wanted in zip(stacks, (towers, goal), strict=True):
         for c, tower in enumerate(wanted):
@@ -42,11 +42,11 @@ def random_tasks(n: int, seed: int, most: int) -> list[Task]:
     tasks = []
     for _ in range(n):
         shape = SortingShape(
-            n_cells=int(rng.integers(2, most + 1)),
+            n_slots=int(rng.integers(2, most + 1)),
             n_colours=int(rng.integers(1, 4)),
             n_sizes=int(rng.integers(1, 4)),
         )
-        n_objects = int(rng.integers(1, shape.n_cells + 1))
+        n_objects = int(rng.integers(1, shape.n_slots + 1))
         on_towers = float(rng.choice([0.0, 0.5, 0.9]))
         tasks.append((random_task(shape, rng, n_objects, on_towers), shape))
     return tasks
@@ -55,7 +55,7 @@ def random_tasks(n: int, seed: int, most: int) -> list[Task]:
 def crowded_tasks(n: int, seed: int) -> list[Task]:
     """Tasks of 4 cells whose 3 or 4 towers are full of duplicates, where goals partly stand."""
     rng = np.random.default_rng(seed)
-    shapes = [SortingShape(n_cells=4, n_colours=3 + i % 2, n_sizes=1) for i in range(n)]
+    shapes = [SortingShape(n_slots=4, n_colours=3 + i % 2, n_sizes=1) for i in range(n)]
     return [(random_task(shape, rng, 4, on_towers=0.9), shape) for shape in shapes]
 
 
@@ -164,6 +164,6 @@ def test_more_objects_than_cells_are_refused() -> None:
 
 
 def test_the_largest_task_is_planned() -> None:
-    shape = SortingShape(n_cells=40, n_colours=5, n_sizes=5)
+    shape = SortingShape(n_slots=40, n_colours=5, n_sizes=5)
     state = random_task(shape, np.random.default_rng(8), 40, on_towers=0.5)
     assert len(follow(state, shape)) == solve(state, shape).moves

@@ -13,7 +13,7 @@ from app.sim.sorting.progress_monitor import (
 )
 from app.sim.sorting.state import Move, SortingShape, SortingState, empty_state
 
-SHAPE = SortingShape(n_cells=4, n_colours=2)
+SHAPE = SortingShape(n_slots=4, n_colours=2)
 POLICY = "a" * 64
 
 
@@ -32,7 +32,7 @@ def seen(
 
 
 def after_move(monitor: ProgressMonitor, state: SortingState, move: Move) -> ProgressMonitor:
-    fail = state.fail[move.pick] if move.pick < SHAPE.n_cells else 0.0
+    fail = state.fail[move.pick] if move.pick < SHAPE.n_slots else 0.0
     return expect_state(
         monitor, state_key(apply(state, SHAPE, move)), can_fail=bool(fail > 0.0)
     )

@@ -102,13 +102,13 @@ def refused_of(*places: str) -> list[tuple[int, str]]:
 
 
 def test_each_command_that_fits_no_more_when_its_turn_comes_is_named() -> None:
-    (second, taken), (fourth, also_taken) = refused_of("cell5", "cell5", "cell6", "cell6")
+    (second, taken), (fourth, also_taken) = refused_of("slot5", "slot5", "slot6", "slot6")
     assert (second, fourth) == (2, 4)
-    assert "cell5" in taken and "cell6" in also_taken
+    assert "slot5" in taken and "slot6" in also_taken
 
 
 def test_newest_refused_commands_are_kept() -> None:
-    found = refused_of(*["cell5"] * (MAX_REFUSED + 3))
+    found = refused_of(*["slot5"] * (MAX_REFUSED + 3))
     assert [number for number, _ in found] == list(range(4, MAX_REFUSED + 4))
 
 

@@ -31,7 +31,7 @@ STOCK = "stock Stable-Baselines3 DQN"
 
 def curve_episodes(shape: SortingShape) -> int:
     """Return the thesis' number of episodes per pair for one point of its curves."""
-    return 500 if shape.n_cells <= SMALL else 100
+    return 500 if shape.n_slots <= SMALL else 100
 
 
 def curve_point(

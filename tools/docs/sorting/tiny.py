@@ -36,7 +36,7 @@ from app.sim.sorting.state import SortingShape, SortingState
 from tools.docs.results import RESULTS, ROOT, Json, write_result
 
 RESULT, PAGE = RESULTS / "sorting-tiny.json", ROOT / "docs/sorting-tiny.md"
-SHAPE = SortingShape(n_cells=2, n_colours=2, n_sizes=2)
+SHAPE = SortingShape(n_slots=2, n_colours=2, n_sizes=2)
 FAIL = np.array([0.4, 0.1])
 """Failure probabilities of the two slots."""
 GAMMA = 0.95
@@ -114,12 +114,12 @@ def model_of(states: list[SortingState]) -> Model:
             move = SHAPE.move_of(int(action))
             after = apply(state, SHAPE, move)
             away = distance_cost(after.towers, after.goal, SHAPE.n_sizes, WEIGHTS)
-            back = WEIGHTS.back if move.place < SHAPE.n_cells else 0.0
+            back = WEIGHTS.back if move.place < SHAPE.n_slots else 0.0
             bonus = WEIGHTS.success if after.solved else 0.0
             model.after[i, action] = number[observe(after).tobytes()]
             model.gain[i, action] = bonus - WEIGHTS.move - back - away
             model.lost[i, action] = -WEIGHTS.move - WEIGHTS.fail - stays
-            if move.pick < SHAPE.n_cells:
+            if move.pick < SHAPE.n_slots:
                 model.chance[i, action] = 1.0 - state.fail[move.pick]
     return model
 
@@ -268,7 +268,7 @@ def example(number: dict[bytes, int]) -> int:
 
 def move_text(action: int) -> str:
     """Return a move as text."""
-    places = ("cell 1", "cell 2", "red tower", "blue tower")
+    places = ("slot 1", "slot 2", "red tower", "blue tower")
     move = SHAPE.move_of(action)
     return f"{places[move.pick]} to {places[move.place]}"
 

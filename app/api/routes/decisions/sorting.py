@@ -57,8 +57,8 @@ async def _task_of(request: SortingRequest, services: Services) -> tuple[Sorting
         rule = "must be given where `layout` is not, and only there"
         raise InvalidInput("cell", request.cell, rule)
     if layout is not None:
-        names = plain_names(layout.n_cells, layout.colours, layout.sizes)
-        return names, np.zeros(layout.n_cells)
+        names = plain_names(layout.n_slots, layout.colours, layout.sizes)
+        return names, np.zeros(layout.n_slots)
     assert request.cell is not None
     cell = await services.known_cell(request.cell)
     return names_of(cell), fail_of(cell)

@@ -89,7 +89,7 @@ def trials(values: Values, shape: SortingShape, fail: Vec, request: EvaluationRe
     n = request.episodes or DEFAULT_EPISODES
     fitting = [test for test in TESTS if test.fits(shape)]
     if not fitting:
-        raise InvalidInput("n_cells", shape.n_cells, "must be enough for one of the six tests")
+        raise InvalidInput("n_slots", shape.n_slots, "must be enough for one of the six tests")
     rows, with_fallback = request.rows(2 * len(fitting)), []
     for test in fitting:
         one, other = run_test(test, greedy(values), shape, fail, n, request.seed)

@@ -136,7 +136,7 @@ class _Run:
         n = batch.n_envs
         self._batch, self._choose, self._script = batch, choose, script
         self._fallback = fallback
-        self._horizon = round(HORIZON_FACTOR * batch.shape.n_cells)
+        self._horizon = round(HORIZON_FACTOR * batch.shape.n_slots)
         self._monitor = BatchProgressMonitor(n)
         self._since = np.zeros(n, dtype=np.int64)
         self._moves_before = np.zeros(n, dtype=np.int64)
@@ -201,16 +201,16 @@ class _Run:
     def _count_picks(self, which: Index, act: Index) -> Flags:
         """Count picks from the clutter and their risks; return which moves are picks."""
         envs, shape = self._batch.envs, self._batch.shape
-        picked = act < shape.n_cells * shape.n_colours
-        from_clutter, cells = which[picked], act[picked] // shape.n_colours
+        picked = act < shape.n_slots * shape.n_colours
+        from_clutter, slots = which[picked], act[picked] // shape.n_colours
         clutter, fail = envs.clutter[from_clutter], envs.fail[from_clutter]
-        mine = np.arange(len(cells))
-        duplicates = clutter == clutter[mine, cells][:, None]
+        mine = np.arange(len(slots))
+        duplicates = clutter == clutter[mine, slots][:, None]
         least = np.where(duplicates, fail, np.inf).min(axis=1)
         most = np.where(duplicates, fail, -np.inf).max(axis=1)
         self._counts["picks"][from_clutter] += 1
         self._counts["choices"][from_clutter] += most > least
-        self._counts["riskier"][from_clutter] += fail[mine, cells] > least
+        self._counts["riskier"][from_clutter] += fail[mine, slots] > least
         return np.asarray(picked)
 
     def _disturb(self, which: Index) -> None:

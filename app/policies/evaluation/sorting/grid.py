@@ -56,7 +56,7 @@ DECIDERS = ("", "-planner-fallback", "-planner")
 
 def pairs_of(shape: SortingShape) -> Index:
     """Return every (K_E, K_G), shape (K (K + 1) / 2, 2)."""
-    k = shape.n_cells
+    k = shape.n_slots
     return np.array([(n, g) for n in range(1, k + 1) for g in range(1, n + 1)])
 
 
@@ -94,11 +94,11 @@ def row_of(name: str, episodes: SortingEpisodes, pairs: Index, least: float) -> 
     """
     n, won = len(episodes.success), episodes.success
     each = np.arange(n).reshape(len(pairs), -1)
-    cells = [
+    found = [
         pair_of(int(n_e), int(n_g), episodes.part(each[p]), least)
         for p, (n_e, n_g) in enumerate(pairs)
     ]
-    worst = min(cells, key=lambda cell: (cell["success"]["mean"], -cell["n_objects"]))
+    worst = min(found, key=lambda one: (one["success"]["mean"], -one["n_objects"]))
     good = episodes.part(won)
     return {
         "name": name,
@@ -110,7 +110,7 @@ def row_of(name: str, episodes: SortingEpisodes, pairs: Index, least: float) -> 
             "n_objects": worst["n_objects"],
             "n_goal": worst["n_goal"],
         },
-        "pairs_below": sum(cell["below"] for cell in cells),
+        "pairs_below": sum(one["below"] for one in found),
         "moves_over_minimum": mean_of(good.moves / good.fewest),
         "exactly_minimal": rate_of(won & (episodes.moves == episodes.fewest)),
         "attempts_over_expected": mean_of(good.attempts / good.expected),
@@ -119,7 +119,7 @@ def row_of(name: str, episodes: SortingEpisodes, pairs: Index, least: float) -> 
         "planner_fallback": rate_of(episodes.planner_fallback),
         "repeated": rate_of(episodes.repeated),
         "mean_return": float(episodes.rewards.mean()),
-        "pairs": cells,
+        "pairs": found,
     }
 
 
@@ -161,9 +161,9 @@ def grid(values: Values, shape: SortingShape, fail: Vec, request: EvaluationRequ
         shape: Size of the task.
         fail: Failure probabilities of the clutter slots, shape (K,).
         request: Its episodes are those of each pair and row; by default 1000 for up to 10
-            cells and 300 for more.
+            slots and 300 for more.
     """
-    small = shape.n_cells <= SMALL
+    small = shape.n_slots <= SMALL
     per_pair, least = request.episodes or (1000 if small else 300), 0.99 if small else 0.98
     pairs, choose = pairs_of(shape), greedy(values)
     rows = request.rows(len(DECIDERS) * len(STARTS))
@@ -182,7 +182,7 @@ def settings_of(shape: SortingShape, fail: Vec) -> Json:
     """Return the settings stated with a result."""
     return {
         **asdict(shape),
-        "horizon_attempts": round(HORIZON_FACTOR * shape.n_cells),
+        "horizon_attempts": round(HORIZON_FACTOR * shape.n_slots),
         "failure_max": float(fail.max()),
         "failure_mean": float(fail.mean()),
         "weights": SortingSettings().weights._asdict(),

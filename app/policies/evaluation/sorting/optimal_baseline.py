@@ -16,7 +16,7 @@ from app.sim.sorting.state import SortingShape
 
 @cache
 def _work(shape: SortingShape) -> PlannerWork:
-    return new_work(shape.n_cells, shape.n_colours, shape.n_sizes)
+    return new_work(shape.n_slots, shape.n_colours, shape.n_sizes)
 
 
 def measure(batch: SortingBatch, which: Index) -> tuple[Index, Vec]:

@@ -37,7 +37,7 @@ class TaskStates:
         self.shape = batch.shape
         """Size of the tasks."""
         stations = [*cell.stations_of("clutter"), *cell.stations_of("cluster")]
-        points = [station.points()[: self.shape.n_cells] for station in stations]
+        points = [station.points()[: self.shape.n_slots] for station in stations]
         self.points: Vec = np.concatenate(points)
         """Points of the tcp at the objects, place by place and level by level [m], (m, 3)."""
         self._first = np.cumsum([0, *(len(one) for one in points[:-1])])
@@ -85,8 +85,8 @@ class TaskStates:
 
     def _points(self, e: int, stations: list[int], *, top: bool) -> Index:
         """Return the indices of the points of the top objects at stations, or over them."""
-        n_cells, heights = self.shape.n_cells, self._states[e].heights
-        levels = [0 if one < n_cells else int(heights[one - n_cells]) - top for one in stations]
+        n_slots, heights = self.shape.n_slots, self._states[e].heights
+        levels = [0 if one < n_slots else int(heights[one - n_slots]) - top for one in stations]
         found: Index = self._first[stations] + np.array(levels, dtype=np.int64)
         return found
 
@@ -99,12 +99,12 @@ class TaskStates:
             self.held[e] = NOTHING
             self.moves[e] += 1
         else:
-            cell, attempt = move.pick, int(self.attempts[e])
-            risk = self._states[e].fail[cell] if cell < self.shape.n_cells else 0.0
+            slot, attempt = move.pick, int(self.attempts[e])
+            risk = self._states[e].fail[slot] if slot < self.shape.n_slots else 0.0
             self.options[e] += len(self.targets[e])
             self.attempts[e] += 1
             if self._luck[e, attempt % N_DRAWS] >= risk:
-                self.held[e] = cell
+                self.held[e] = slot
         if self._states[e].solved:
             return True
         self.targets[e], self.places[e] = self._targets(e), self._places(e)

@@ -57,7 +57,7 @@ def test_choice_among_places_can_be_asked_again(client: TestClient) -> None:
 
 def test_objects_and_goal_change_while_the_robot_works(client: TestClient) -> None:
     before = client.get(WORLD).json()
-    free = {f"cell{k}" for k in range(10)} - {one["place"] for one in blocks(before).values()}
+    free = {f"slot{k}" for k in range(10)} - {one["place"] for one in blocks(before).values()}
     first, second = sorted(free)[:2]
     assert (
         send(client, tag="add-block", colour="red", size="large", at=first).status_code == 202
@@ -104,14 +104,14 @@ def test_planner_decides_alone_where_no_sorting_policy_is_set(client: TestClient
         ({"tag": "add-block", "colour": "green", "size": "small"}, "colour"),
         ({"tag": "add-block", "colour": "red", "size": "small", "at": "shelf"}, "at"),
         ({"tag": "remove-block", "id": "block999"}, "id"),
-        ({"tag": "move-block", "id": "block999", "to": "cell0"}, "id"),
+        ({"tag": "move-block", "id": "block999", "to": "slot0"}, "id"),
         ({"tag": "set-goal", "towers": {"red": ["large"] * 11}}, "towers.red"),
         ({"tag": "set-goal", "towers": {"red": ["large"] * 10}}, "towers"),
         ({"tag": "toggle-goal", "id": "purple-large"}, "id"),
         ({"tag": "start-test", "id": "test-9"}, "id"),
         ({"tag": "set-sorting-policy", "checkpoint": "nothing"}, "checkpoint"),
         ({"tag": "set-order", "order": "random"}, "order"),
-        ({"tag": "set-candidates", "ids": ["cell0"]}, "tag"),
+        ({"tag": "set-candidates", "ids": ["slot0"]}, "tag"),
     ],
 )
 def test_bad_command_is_a_problem_that_names_the_field(

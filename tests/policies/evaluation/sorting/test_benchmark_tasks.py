@@ -18,7 +18,7 @@ from app.sim.sorting.benchmark_tasks import TESTS, sorting_test
 from app.sim.sorting.state import SortingShape
 from tests.policies.evaluation.sorting_players import exactly, in_circles, riskily, values_of
 
-SHAPE = SortingShape(n_cells=10, n_colours=2)
+SHAPE = SortingShape(n_slots=10, n_colours=2)
 FAIL = np.linspace(0.0, 0.4, 10)
 
 
@@ -73,7 +73,7 @@ def test_a_move_too_many_in_any_part_is_not_the_fewest():
     def once_to_and_fro(batch, which):
         act = choose_by_planner(batch, which)
         if len(which) == 1 and batch.envs.moves[0] >= 4 and not wasted["done"]:
-            k, c = SHAPE.n_cells, SHAPE.n_colours
+            k, c = SHAPE.n_slots, SHAPE.n_colours
             tower = int(batch.envs.heights[0].argmax())
             act[0] = 2 * k * c + tower * c + 1 - tower
             wasted["done"] = True
@@ -99,10 +99,10 @@ def test_rows_are_reported_in_order_and_the_fallback_ends_cycles():
 
 
 def test_tests_that_are_too_large_are_left_out_and_named():
-    small, request = SortingShape(n_cells=6, n_colours=1), EvaluationRequest(episodes=2, seed=6)
+    small, request = SortingShape(n_slots=6, n_colours=1), EvaluationRequest(episodes=2, seed=6)
     found = trials(values_of(exactly, small), small, np.zeros(6), request)
     assert [row["name"] for row in found["results"][:2]] == ["test-1", "test-4"]
     assert found["settings"]["left_out"] == ["test-2", "test-3", "test-5", "test-6"]
-    tiny = SortingShape(n_cells=3, n_colours=1)
+    tiny = SortingShape(n_slots=3, n_colours=1)
     with pytest.raises(InvalidInput, match="must be enough"):
         trials(values_of(exactly, tiny), tiny, np.zeros(3), request)

@@ -17,7 +17,7 @@ from app.sim.sorting.batch import SortingBatch, SortingSettings
 from app.sim.sorting.state import SortingShape, empty_state
 from tests.policies.evaluation.sorting_players import exactly, in_circles, riskily, values_of
 
-SHAPE = SortingShape(n_cells=6, n_colours=2)
+SHAPE = SortingShape(n_slots=6, n_colours=2)
 FAIL = np.linspace(0.0, 0.4, 6)
 
 
@@ -86,7 +86,7 @@ def test_a_policy_in_circles_runs_out_of_attempts():
     found = played(in_circles, n=30, n_objects=4)
     lost = ~found.success
     assert lost.mean() > 0.9
-    assert (found.attempts[lost] == 4 * SHAPE.n_cells).all()
+    assert (found.attempts[lost] == 4 * SHAPE.n_slots).all()
     assert found.planner_fallback[lost].all() and found.repeated[lost].any()
 
 

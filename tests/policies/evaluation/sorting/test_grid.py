@@ -12,7 +12,7 @@ from app.sim.sorting.state import NULL, SortingShape
 from tests.policies.evaluation.sorting_players import exactly, in_circles, values_of
 from tools.docs.sorting.curves import curve_point
 
-SHAPE = SortingShape(n_cells=4, n_colours=2)
+SHAPE = SortingShape(n_slots=4, n_colours=2)
 FAIL = np.array([0.0, 0.1, 0.2, 0.4])
 PAIRS = np.array([[1, 1], [2, 1]])
 

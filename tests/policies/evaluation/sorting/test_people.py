@@ -73,7 +73,7 @@ def test_tasks_follow_shortest_plans_whatever_targets_are_chosen() -> None:
 def test_targets_are_the_objects_and_then_the_place_of_the_held_one() -> None:
     tasks = TaskStates(CELL, 1, 10, seed=5)
     picks = tasks.targets[0]
-    assert len(picks) > 1 and (picks < tasks.shape.n_cells).all()
+    assert len(picks) > 1 and (picks < tasks.shape.n_slots).all()
     while tasks.held[0] == NOTHING:
         tasks.advance(0, 0)
     assert tasks.held[0] == picks[0]

@@ -23,7 +23,7 @@ from app.sim.sorting.progress_monitor import (
 from app.sim.sorting.state import SortingShape
 from tests.policies.evaluation.sorting_players import at_random, exactly, state_in
 
-SHAPE = SortingShape(n_cells=10, n_colours=2)
+SHAPE = SortingShape(n_slots=10, n_colours=2)
 FAIL = np.array([0.0, 0.4, 0.1, 0.2, 0.0, 0.3, 0.4, 0.0, 0.1, 0.2])
 POLICY = "a" * 64
 
@@ -45,7 +45,7 @@ class Followed(SortingBatch):
             )
             self.verdicts.append((record.planner_fallback is not None, e not in self.asked))
             move = self.shape.move_of(int(act[e]))
-            risk = state.fail[move.pick] if move.pick < self.shape.n_cells else 0.0
+            risk = state.fail[move.pick] if move.pick < self.shape.n_slots else 0.0
             after = state_key(apply(state, self.shape, move))
             self.records[e] = expect_state(record, after, can_fail=bool(risk > 0.0))
         self.asked.clear()

@@ -8,7 +8,7 @@ from app.sim.sorting.kernels.planner import new_work
 from app.sim.sorting.planner import solve
 from app.sim.sorting.state import SortingShape
 
-SHAPE = SortingShape(n_cells=8, n_colours=3)
+SHAPE = SortingShape(n_slots=8, n_colours=3)
 
 
 def test_fewest_moves_and_expected_attempts_are_those_of_each_task() -> None:

@@ -17,7 +17,7 @@ from app.sim.sorting.planner import solve
 from app.sim.sorting.state import SortingShape, SortingState
 from tests.sim.sorting.sorting_search import random_task
 
-SHAPE = SortingShape(n_cells=8, n_colours=3, n_sizes=2)
+SHAPE = SortingShape(n_slots=8, n_colours=3, n_sizes=2)
 
 
 def tasks(n: int, seed: int) -> list[SortingState]:
@@ -83,9 +83,9 @@ def test_a_rough_plan_has_as_many_moves_and_no_fewer_attempts() -> None:
 
 
 def test_no_task_has_more_states_than_the_work_space_holds() -> None:
-    for n_cells, n_colours in itertools.product((1, 2, 5), (1, 2, 3)):
-        shape = SortingShape(n_cells=n_cells, n_colours=n_colours, n_sizes=1)
-        p, rng = new_shortest_paths(n_cells, n_colours, 1), np.random.default_rng(15)
+    for n_slots, n_colours in itertools.product((1, 2, 5), (1, 2, 3)):
+        shape = SortingShape(n_slots=n_slots, n_colours=n_colours, n_sizes=1)
+        p, rng = new_shortest_paths(n_slots, n_colours, 1), np.random.default_rng(15)
         for _ in range(100):
-            row = rows_of([random_task(shape, rng, n_cells)])
-            assert lay_out(*(part[0] for part in row[:5]), p) <= most_states(n_cells, n_colours)
+            row = rows_of([random_task(shape, rng, n_slots)])
+            assert lay_out(*(part[0] for part in row[:5]), p) <= most_states(n_slots, n_colours)

@@ -8,7 +8,7 @@ from app.sim.sorting.kernels import reward as terms
 from app.sim.sorting.kernels.reward import SortingWeights
 from app.sim.sorting.state import Move, SortingShape, SortingState, empty_state
 
-SHAPE = SortingShape(n_cells=4, n_colours=2, n_sizes=3)
+SHAPE = SortingShape(n_slots=4, n_colours=2, n_sizes=3)
 ODD = SortingWeights(
     move=0.01, empty=0.02, stuck=0.04, fail=0.08, back=0.16, distance=0.0, success=3.0
 )

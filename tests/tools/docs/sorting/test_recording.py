@@ -8,7 +8,7 @@ from tools.docs.sorting.recording import IMAGE, captions, recorded
 def test_recording_shows_one_solved_episode_with_a_failed_pick_and_an_added_block() -> None:
     states, shape, cell = recorded()
     said = captions(states)
-    assert (shape.n_cells, cell.name) == (10, "sorting-e0")
+    assert (shape.n_slots, cell.name) == (10, "sorting-e0")
     assert len(said) == len(states)
     assert said.count("The pick failed") == 1
     assert sum("a person adds a large block" in one for one in said) == 1

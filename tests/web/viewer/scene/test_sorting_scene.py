@@ -85,7 +85,7 @@ def test_rings_mark_the_block_and_the_top_of_its_tower(
     view = a_view(cell)
     low = block(cell, "block6", "red-large", "red")
     scene.draw(replace(still, sorting=replace(view, blocks=(*view.blocks, low))), 0.05)
-    bottom = centre(cell, "cell2", 0) - [0.0, 0.0, 0.015]
+    bottom = centre(cell, "slot2", 0) - [0.0, 0.0, 0.015]
     assert np.allclose(node(server, "/marks/pick").position, bottom)
     above = centre(cell, "red", 1) - [0.0, 0.0, 0.015]
     assert np.allclose(node(server, "/marks/place").position, above)
