@@ -163,9 +163,7 @@ def require_sorting_policy(
     """
     here, known = shape_of(cell), policy.shape
     if here != known:
-        text = "{0.n_slots} cells, {0.n_colours} colours, {0.n_sizes} sizes"
-        sizes = text.format(here), text.format(known)
-        raise CheckpointMismatch("shape", *sizes, member=member)
+        raise CheckpointMismatch("shape", str(here), str(known), member=member)
 
 
 def sorting_policy_for(cell: Cell, services: Services) -> SortingValues | None:

@@ -18,13 +18,12 @@ from app.sim.sorting.names import NamedObject, SortingNames, fail_with, state_fr
 from app.sim.sorting.progress_monitor import MAX_SEEN, FallbackReason, ProgressMonitor
 from app.sim.sorting.sorting_values import SortingValues
 from app.sim.sorting.state import (
-    MAX_CELLS,
     MAX_COLOURS,
     MAX_SIZES,
+    MAX_SLOTS,
     NULL,
     SIZE_NAMES,
     Move,
-    SortingShape,
     SortingState,
 )
 
@@ -36,7 +35,7 @@ class SortingLayout(Body):
     """A sorting task without a work cell: its clutter slots are ``slot0``, ``slot1``, ..."""
 
     n_slots: int = Field(
-        ge=1, le=MAX_CELLS, description="clutter slots: most objects, and levels of a tower"
+        ge=1, le=MAX_SLOTS, description="clutter slots: most objects, and levels of a tower"
     )
     colours: list[Name] = Field(
         min_length=1, max_length=MAX_COLOURS, description="colours; each names a tower"
@@ -56,7 +55,7 @@ class SortingObject(Body):
     size: Word = Field(description="`small`, `medium` or `large` in a work cell")
     at: Word = Field(description="id of its clutter slot or tower")
     level: int | None = Field(
-        None, ge=0, lt=MAX_CELLS, description="level on a tower from 0; null in the clutter"
+        None, ge=0, lt=MAX_SLOTS, description="level on a tower from 0; null in the clutter"
     )
     id: Word | None = Field(None, description="your name for it; returned with the move")
 
@@ -107,10 +106,10 @@ class SortingFields(Body):
     """Objects, goal and failure probabilities of a sorting task."""
 
     objects: list[SortingObject] = Field(
-        max_length=MAX_CELLS,
+        max_length=MAX_SLOTS,
         description="all objects, at most one per clutter slot of the task",
     )
-    goal: dict[str, Annotated[list[GoalEntry], Field(max_length=MAX_CELLS)]] = Field(
+    goal: dict[str, Annotated[list[GoalEntry], Field(max_length=MAX_SLOTS)]] = Field(
         max_length=MAX_COLOURS,
         description="by tower, from the bottom: a size, of the tower's own colour, or a size "
         "and a colour. Other towers are empty in the goal; all other objects belong in the "
@@ -118,7 +117,7 @@ class SortingFields(Body):
     )
     failure_map: dict[str, Finite] = Field(
         default_factory=dict,
-        max_length=MAX_CELLS,
+        max_length=MAX_SLOTS,
         description="failure probability of a pick by clutter slot, 0 to 0.99; "
         "that of the work cell, or 0, for other slots",
     )
@@ -296,7 +295,7 @@ def outside_of(
         for one in decision.outside
     ]
     if policy.shape != names.shape:
-        value, trained = _size_of(names.shape), _size_of(policy.shape)
+        value, trained = str(names.shape), str(policy.shape)
         rule = f"was {trained} in training"
         found.append(OutsideTraining(field="cell", value=value, rule=rule))
     most = max(SortingSettings().failure_max, float(own.max()))
@@ -305,10 +304,6 @@ def outside_of(
         rule = f"was at most {most:g} in training"
         found.append(OutsideTraining(field=field, value=value, rule=rule))
     return found
-
-
-def _size_of(shape: SortingShape) -> str:
-    return f"{shape.n_slots} slots, {shape.n_colours} colours, {shape.n_sizes} sizes"
 
 
 def move_of(move: Move, state: SortingState, names: SortingNames, ids: Ids) -> SortingMove:

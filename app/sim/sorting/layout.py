@@ -17,7 +17,7 @@ from app.errors import CheckpointMismatch
 from app.sim.cells.cell import Cell
 from app.sim.cells.parts import Station
 from app.sim.core.arrays import Vec
-from app.sim.sorting.state import MAX_CELLS, MAX_COLOURS
+from app.sim.sorting.state import MAX_COLOURS, MAX_SLOTS
 
 APPROACH_M = 0.07
 """Height of the pick policy's target above a grasp [m]."""
@@ -38,8 +38,8 @@ def lacks_for_tasks(cell: Cell) -> str | None:
     if not is_sorting(cell):
         return "needs at least one station of kind clutter and one of kind cluster"
     clutter, towers = cell.stations_of("clutter"), cell.stations_of("cluster")
-    if len(clutter) > MAX_CELLS or len(towers) > MAX_COLOURS:
-        return f"has more than {MAX_CELLS} clutter slots or {MAX_COLOURS} clusters"
+    if len(clutter) > MAX_SLOTS or len(towers) > MAX_COLOURS:
+        return f"has more than {MAX_SLOTS} clutter slots or {MAX_COLOURS} clusters"
     if any((one.levels or 1) < len(clutter) for one in towers):
         return f"needs at least {len(clutter)} levels for each cluster, one per clutter slot"
     return None

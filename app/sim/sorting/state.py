@@ -29,7 +29,7 @@ from app.sim.core.arrays import Vec
 Codes = NDArray[np.int8]
 """Objects by code."""
 
-MAX_CELLS = 40
+MAX_SLOTS = 40
 """Largest number of clutter slots and of objects."""
 MAX_COLOURS = 5
 """Largest number of colours and of towers."""
@@ -74,12 +74,16 @@ class SortingShape:
 
     def __post_init__(self) -> None:
         for name, value, most in (
-            ("n_slots", self.n_slots, MAX_CELLS),
+            ("n_slots", self.n_slots, MAX_SLOTS),
             ("n_colours", self.n_colours, MAX_COLOURS),
             ("n_sizes", self.n_sizes, MAX_SIZES),
         ):
             if not 1 <= value <= most:
                 raise InvalidInput(name, value, f"must lie in [1, {most}]")
+
+    def __str__(self) -> str:
+        """Return the numbers in words, for messages."""
+        return f"{self.n_slots} slots, {self.n_colours} colours, {self.n_sizes} sizes"
 
     @property
     def n_types(self) -> int:
