@@ -7,6 +7,7 @@ replaced; the id that is logged belongs into ``SHA256`` of that package.
 import logging
 from importlib import resources
 from pathlib import Path
+from typing import Any
 
 import torch
 
@@ -16,6 +17,7 @@ from app.policies.checkpoints.checkpoint import Checkpoint
 from app.policies.checkpoints.files import write_files
 from app.policies.checkpoints.model_state import versions, weights_of
 from app.policies.inference.value_networks import pick_preset_of
+from app.policies.networks.outcome import OutcomeHead
 from app.policies.training.pick import outcomes_of
 from app.policies.training.train import without_denormals
 from app.provenance import describe
@@ -39,13 +41,20 @@ def with_new_outcomes(checkpoint: Checkpoint) -> Checkpoint:
         head = outcomes_of(checkpoint, preset, load_cell(preset.cell), lambda: False)
     if head is None:
         raise ValueError("too few episodes ended: outcomes need a longer training")
+    commits = dict.fromkeys([*checkpoint.manifest["commits"], describe()["commit"]])
+    fields = {"commits": [one for one in commits if one], "versions": versions()}
+    return with_outcomes(checkpoint, head, fields)
+
+
+def with_outcomes(
+    checkpoint: Checkpoint, head: OutcomeHead, fields: dict[str, Any]
+) -> Checkpoint:
+    """Return a checkpoint with other outcome probabilities and some fields of the manifest."""
     kept = {
         name: array
         for name, array in checkpoint.arrays().items()
         if not name.startswith("outcome.")
     }
-    commits = dict.fromkeys([*checkpoint.manifest["commits"], describe()["commit"]])
-    fields = {"commits": [one for one in commits if one], "versions": versions()}
     return formats.pack(checkpoint.manifest | fields, kept | weights_of({"outcome": head}))
 
 

@@ -5,6 +5,8 @@ frame_plot          Draw the coordinate frame: robot base, axes, table, floor an
 headline            The table of headline results in the README
 learning_curves     Collect learning curves of trainings and of other learners into a result
                     file
+outcome_bounds      Measure how well the features of a pick predict its outcome beside one
+                    kind of people
 people_plots        Measure and draw the task primitives; write their section of
                     ``docs/people.md``
 pick_plots          Draw the case studies and the calibration of the pick policy

@@ -187,7 +187,7 @@ def add_outcomes(run: TrainingRun, preset: PickPreset, should_stop: Callable[[],
 def outcomes_of(
     checkpoint: Checkpoint, preset: PickPreset, cell: Cell, should_stop: Callable[[], bool]
 ) -> OutcomeHead | None:
-    """Return outcome probabilities fitted to episodes of a policy.
+    """Return outcome probabilities fitted to episodes of a policy beside its training's people.
 
     Args:
         checkpoint: Actor and critics.
@@ -201,14 +201,37 @@ def outcomes_of(
     Raises:
         FitStopped: ``should_stop`` asked for it.
     """
-    learning, arrays = preset.learning, checkpoint.arrays()
-    seed = int(checkpoint.manifest["seed"])
-    batch = batch_of(preset, cell, learning.n_envs, seed + OUTCOME_SEED)
+    seed = int(checkpoint.manifest["seed"]) + OUTCOME_SEED
+    batch = batch_of(preset, cell, preset.learning.n_envs, seed)
+    return outcomes_beside(checkpoint, preset, batch, should_stop)
+
+
+def outcomes_beside(
+    checkpoint: Checkpoint,
+    preset: PickPreset,
+    batch: PickBatch,
+    should_stop: Callable[[], bool],
+) -> OutcomeHead | None:
+    """Return outcome probabilities fitted to episodes of a policy in given environments.
+
+    Args:
+        checkpoint: Actor and critics.
+        preset: Preset of their training; a share of its steps is simulated.
+        batch: Environments.
+        should_stop: Called before every step and every pass over the data.
+
+    Returns:
+        The ensemble; None where fewer than MIN_EPISODES ended.
+
+    Raises:
+        FitStopped: ``should_stop`` asked for it.
+    """
+    arrays, seed = checkpoint.arrays(), int(checkpoint.manifest["seed"])
     actor = actor_of(preset, batch.obs_size)
     critic = critics_for(preset, batch.obs_size)
     actor.load_state_dict(tensors_under(arrays, "actor"))
     critic.load_state_dict(tensors_under(arrays, "critic"))
-    n_steps = round(OUTCOME_SHARE * learning.total_steps) // learning.n_envs
+    n_steps = round(OUTCOME_SHARE * preset.learning.total_steps) // batch.n_envs
     data = collect(batch, actor, critic, n_steps, seed, should_stop)
     if len(np.unique(data.episode)) < MIN_EPISODES:
         return None

@@ -27,7 +27,7 @@ import scipy  # loads scipy.stats where it is first used
 
 from app.errors import InvalidInput
 from app.policies.checkpoints.checkpoint import Checkpoint
-from app.policies.evaluation.pick.episodes import PickBench, SelectionInput
+from app.policies.evaluation.pick.episodes import Evaluator, PickBench, SelectionInput
 from app.policies.evaluation.pick.people import beside_recordings
 from app.policies.evaluation.pick.tasks import FASTER, PAIR, settings_of
 from app.policies.evaluation.rows import EvaluationRequest, Json
@@ -45,8 +45,8 @@ FEW = 200
 """Predictions of a recalibration by few of them."""
 LATEST_S = 4.0
 """Latest time at which a prediction is taken [s]."""
-SHORT_TIME = "short-time"
-"""Row of episodes with any time left."""
+MIXTURE, SHORT_TIME = "mixture", "short-time"
+"""Rows of the people of the training, and of episodes with any time left."""
 
 
 class _Predictions:
@@ -78,9 +78,34 @@ def run_calibration(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
     Raises:
         InvalidInput: The checkpoint predicts no outcomes, or there is too much recorded motion.
     """
+    bench = bench_of(checkpoint, request)
+    kinds = kinds_of(bench)
+    rows, stated = request.rows(len(kinds)), {}
+    for name, settings in kinds.items():
+        evaluator = bench.evaluator(settings)
+        rows.append(calibration_row(evaluator, name, request.seed))
+        stated[name] = settings_of(evaluator.batch)
+    return {"settings": stated, "results": rows}
+
+
+def bench_of(checkpoint: Checkpoint, request: EvaluationRequest) -> PickBench:
+    """Return the bench of a checkpoint, with one target per episode.
+
+    Raises:
+        InvalidInput: The checkpoint predicts no outcomes.
+    """
     bench = PickBench(checkpoint, request, (1, 1), DEFAULT_EPISODES)
     if not bench.networks.predicts:
         raise InvalidInput("checkpoint", checkpoint.sha256[:12], "must predict outcomes")
+    return bench
+
+
+def kinds_of(bench: PickBench) -> dict[str, PickSettings]:
+    """Return the settings of each kind of people, by the name of its row.
+
+    Raises:
+        InvalidInput: There is too much recorded motion.
+    """
     usual, trained_beside = bench.usual, bench.preset.people
     trained = replace(work_of(trained_beside), seed=usual.work.seed)
     kinds: dict[str, PickSettings] = {
@@ -89,32 +114,39 @@ def run_calibration(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
         "two-people": replace(usual, people=PAIR),
         "off-task": replace(usual, work=replace(usual.work, off_task=1.0)),
         "stops": replace(usual, work=replace(usual.work, at_rest=1.0)),
-        "mixture": replace(usual, people=workers_of(trained_beside), work=trained),
+        MIXTURE: replace(usual, people=workers_of(trained_beside), work=trained),
         SHORT_TIME: usual,
     }
-    if request.motions:
-        kinds["recorded"] = beside_recordings(usual, request.motions, bench.cell)
-    n, rows, stated = bench.n, request.rows(len(kinds)), {}
-    for name, settings in kinds.items():
-        evaluator = bench.evaluator(settings)
-        rule = _Predictions(n, evaluator.batch.arm.dt, request.seed)
-        start = partial(_shorten, seed=request.seed) if name == SHORT_TIME else None
-        run = evaluator.run(rule, start=start, predicts=True)
-        kept = np.concatenate(rule.rows)
-        found = np.concatenate(rule.predictions)
-        row: Json = {"name": name, "n": n, "predictions": len(kept)}
-        corrected = _recalibrated(found, run.outcome, kept, request.seed)
-        for k, (what, outcome) in enumerate((("success", SUCCESS), ("contact", COLLISION))):
-            happened = run.outcome[kept] == outcome
-            row[what] = calibration(found[:, k], found[:, 2 + k], happened, kept, request.seed)
-            row[what]["recalibrated"] = {
-                size: _errors(one[:, k], happened) for size, one in corrected.items()
-            }
-        won = run.outcome[kept] == SUCCESS
-        left_s = run.duration_s[kept] - np.concatenate(rule.times)
-        rows.append(row | times_of(found[won, 4], left_s[won]))
-        stated[name] = settings_of(evaluator.batch)
-    return {"settings": stated, "results": rows}
+    if bench.request.motions:
+        kinds["recorded"] = beside_recordings(usual, bench.request.motions, bench.cell)
+    return kinds
+
+
+def calibration_row(evaluator: Evaluator, name: str, seed: int) -> Json:
+    """Return the row of one kind of people.
+
+    Args:
+        evaluator: Episodes with one target.
+        name: Name of the row.
+        seed: Seed of the steps at which predictions are taken, and of the recalibrations.
+    """
+    batch = evaluator.batch
+    rule = _Predictions(batch.n_envs, batch.arm.dt, seed)
+    start = partial(_shorten, seed=seed) if name == SHORT_TIME else None
+    run = evaluator.run(rule, start=start, predicts=True)
+    kept = np.concatenate(rule.rows)
+    found = np.concatenate(rule.predictions)
+    row: Json = {"name": name, "n": batch.n_envs, "predictions": len(kept)}
+    corrected = _recalibrated(found, run.outcome, kept, seed)
+    for k, (what, outcome) in enumerate((("success", SUCCESS), ("contact", COLLISION))):
+        happened = run.outcome[kept] == outcome
+        row[what] = calibration(found[:, k], found[:, 2 + k], happened, kept, seed)
+        row[what]["recalibrated"] = {
+            size: _errors(one[:, k], happened) for size, one in corrected.items()
+        }
+    won = run.outcome[kept] == SUCCESS
+    left_s = run.duration_s[kept] - np.concatenate(rule.times)
+    return row | times_of(found[won, 4], left_s[won])
 
 
 def _shorten(batch: PickBatch, seed: int) -> None:
