@@ -47,6 +47,8 @@ FASTER = 1.4
 """Speed of faster people, relative to the library's."""
 MANY_TARGETS = (4, 6)
 """Fewest and most targets of a table with more objects."""
+LONGER_S = (14.0, 20.0)
+"""Longer time limits beside two people [s]; 20 s is that of thesis table 5.2."""
 
 
 def evaluators_of(bench: PickBench) -> dict[str, Evaluator]:
@@ -149,9 +151,10 @@ def run_choice(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
 
 
 def run_choice_hard(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
-    """Evaluate the selection beside two people, faster people, both, and among more targets.
+    """Evaluate the selection beside two people, faster people, and both.
 
-    The last setting is left out in a cell with fewer stations than it offers.
+    Two people are also met with longer time limits and, in a cell with enough stations, with
+    more targets.
     """
     bench = PickBench(checkpoint, request)
     usual = bench.usual
@@ -161,6 +164,9 @@ def run_choice_hard(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
         "faster": fast,
         "two-people-faster": replace(fast, people=PAIR),
     }
+    for limit_s in LONGER_S:
+        longer = replace(usual, people=PAIR, time_limit_s=limit_s)
+        settings[f"two-people-{limit_s:.0f}-s"] = longer
     if len(bench.cell.pick_stations) >= MANY_TARGETS[1]:
         more = replace(usual, people=PAIR, n_candidates=MANY_TARGETS)
         settings["two-people-4-to-6-targets"] = more

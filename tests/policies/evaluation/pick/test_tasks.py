@@ -139,8 +139,14 @@ def test_harder_choices_offer_no_more_targets_than_the_cell_has():
         "two-people",
         "faster",
         "two-people-faster",
+        "two-people-14-s",
+        "two-people-20-s",
         "hysteresis",
     }
+    limits = [
+        result["settings"][f"two-people{end}"]["time_limit_s"] for end in ("", "-14-s", "-20-s")
+    ]
+    assert limits == [12.0, 14.0, 20.0]
 
 
 def test_cases_count_each_clause_and_keep_the_values_over_time():
