@@ -24,7 +24,7 @@ from app.policies.configs.reach import ReachPreset
 from app.policies.configs.sorting import SortingPreset
 from app.policies.training import pick, reach
 from app.policies.training.curve import CURVE_SEED, play
-from app.sim.cells.cell import load_cell
+from app.sim.cells.cell import Cell, load_cell
 from app.sim.pick.batch import PickBatch
 from app.sim.reach.mixed_batch import ReachEnvironments
 from tools.docs.learning_curves import add_curves, lines
@@ -85,9 +85,14 @@ def curve_of(folder: Path, variant: str | None = None) -> Json:
     return curve
 
 
-def standing_still(preset: ReachPreset | PickPreset) -> float:
-    """Return the mean return of standing still in the episodes of the curve of a preset."""
-    cell = load_cell(preset.cell)
+def standing_still(preset: ReachPreset | PickPreset, cell: Cell | None = None) -> float:
+    """Return the mean return of standing still in the episodes of the curve of a preset.
+
+    Args:
+        preset: Training configuration.
+        cell: Cell of the training; None for that of the preset.
+    """
+    cell = cell or load_cell(preset.cell)
     if isinstance(preset, PickPreset):
         batch: PickBatch | ReachEnvironments = pick.curve_batch(preset, cell)
     else:
