@@ -18,6 +18,7 @@ Source: docs/method.md 3.4 and 4 (several people; a model whose dimensions are k
 that reacts).
 """
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
@@ -26,13 +27,20 @@ import numpy as np
 from app.errors import InvalidInput
 from app.policies.checkpoints.checkpoint import Checkpoint
 from app.policies.evaluation.pick import selection_rules
-from app.policies.evaluation.pick.episodes import Episodes, Evaluator, PickBench, Rule
+from app.policies.evaluation.pick.episodes import (
+    Episodes,
+    Evaluator,
+    PickBench,
+    Rule,
+    SelectionInput,
+)
 from app.policies.evaluation.pick.tasks import settings_of
 from app.policies.evaluation.rows import EvaluationRequest, Json
-from app.policies.evaluation.statistics import paired, rate_of, wilson
+from app.policies.evaluation.statistics import Index, paired, rate_of, wilson
 from app.policies.inference.task_selection import HYSTERESIS
 from app.sim.cells.cell import Cell
 from app.sim.collision.contact import clearance
+from app.sim.core.arrays import Vec
 from app.sim.human.anthropometry import percentile_body
 from app.sim.mocap.importer import Motion
 from app.sim.people.human_motion_config import HumanMotionConfig, at_the_table
@@ -50,6 +58,10 @@ DRAWN_S = 0.1
 """Duration of recorded motion for which a run is listed once more [s]."""
 SAMPLE_S = 0.02
 """Sampling step of motion made from scripts [s]."""
+SEEN_S = 0.1
+"""Time between two postures of people that blocked targets are judged by [s]."""
+GRASP_S = 2.0
+"""Time that descent, closing and lift take [s]."""
 STILL_PACE = 1e-6
 """Pace of people who stand still."""
 ALONE_M = 0.5
@@ -167,8 +179,9 @@ def run_rest(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
     Each kind of people once with the policy alone, and once with a planner beside people at
     rest (``pick/resting_people.py``); the last two rows beside people who work.
 
-    A timeout is *blocked* where the configuration at the object, or over it, is closer to the
-    person than a grasp permits, and *alone* where nobody is within ALONE_M of the robot.
+    A timeout is *blocked* where no robot could have picked the object: after the time that its
+    joints need to the object, people never left it free for GRASP_S. It is *alone* where nobody
+    is within ALONE_M of the robot at the end.
     """
     bench = PickBench(checkpoint, request, (1, 1))
     usual, planners = bench.usual, _planners(bench.usual)
@@ -184,28 +197,63 @@ def run_rest(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
     results = request.rows(len(rows) * len(planners))
     for name, work in rows.items():
         evaluator = bench.evaluator(replace(usual, work=work))
-        rule = selection_rules.fixed(0)
+        rule = OneTarget(evaluator.batch)
         for run, row in _runs(evaluator, rule, name, planners, differences):
-            results.append(row | _timeouts(evaluator.batch, run))
+            results.append(row | _timeouts(evaluator.batch, run, rule))
         stated[name] = settings_of(evaluator.batch)
     return {"settings": stated, "results": results} | _paired(differences)
 
 
-def _timeouts(batch: PickBatch, run: Episodes) -> dict[str, dict[str, float]]:
+class OneTarget:
+    """Selection rule of the first target that records robots at the start, and people."""
+
+    def __init__(self, batch: PickBatch) -> None:
+        self._batch, self._periods = batch, 0
+        self.start = batch.state.q.copy()
+        """Joint positions of the robots at the start [rad], shape (n, 6)."""
+        self.people: list[Vec] = []
+        """Joints of the people every SEEN_S [m, rad], shape (n, P, 18) each."""
+
+    def __call__(self, view: SelectionInput) -> Index:
+        """Return 0 for all, and record the people."""
+        state, every = self._batch.state, round(SEEN_S / self._batch.arm.dt)
+        if view.first:
+            self.start, self._periods = state.q.copy(), 0
+            self.people.clear()
+        if self._periods % every == 0:
+            self.people.append(state.people.q.copy())
+        self._periods += 1
+        return np.zeros(len(view.rows), dtype=np.int64)
+
+
+def _timeouts(batch: PickBatch, run: Episodes, seen: OneTarget) -> dict[str, dict[str, float]]:
     """Return the rates of timeouts with a blocked target and with nobody near."""
-    n, state = batch.n_envs, batch.state
-    late = np.flatnonzero(run.outcome == TIMEOUT)
-    arm, shared, people = batch.arm, batch.world.people, state.people
-    blocked = sum(
-        min(
-            clearance(arm, shared, q, people.q[e], people.cylinders[e], people.size[e]).people_m
+    n, late = batch.n_envs, np.flatnonzero(run.outcome == TIMEOUT)
+    blocked = sum(not could_be_picked(batch, seen, int(e)) for e in late)
+    alone = int((batch.state.clear[late, 0] > ALONE_M).sum())
+    return {"timeout_blocked": wilson(blocked, n), "timeout_alone": wilson(alone, n)}
+
+
+def could_be_picked(batch: PickBatch, seen: OneTarget, e: int) -> bool:
+    """Return whether a grasp fits into the time after the shortest way to the object."""
+    arm, state, grasp = batch.arm, batch.state, batch.settings.grasp
+    shared, cylinders, size = (
+        batch.world.people,
+        state.people.cylinders[e],
+        state.people.size[e],
+    )
+    way = float((np.abs(state.q_goal[e] - seen.start[e]) / arm.limits.qd_max).max())
+    n_free = 0
+    for people in seen.people[math.ceil(way / SEEN_S) :]:
+        free = min(
+            clearance(arm, shared, q, people[e], cylinders, size).people_m
             for q in (state.q_goal[e], state.q_grasp[e])
         )
-        < batch.settings.grasp.start_clearance
-        for e in late
-    )
-    alone = int((state.clear[late, 0] > ALONE_M).sum())
-    return {"timeout_blocked": wilson(blocked, n), "timeout_alone": wilson(alone, n)}
+        started = n_free > 0 and free >= grasp.abort_clearance
+        n_free = n_free + 1 if started or free >= grasp.start_clearance else 0
+        if n_free * SEEN_S >= GRASP_S:
+            return True
+    return False
 
 
 def run_yielding(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:

@@ -7,10 +7,18 @@ import pytest
 
 from app.errors import InvalidInput
 from app.policies.checkpoints import pretrained
-from app.policies.evaluation.pick.people import MAX_RECORDED_S, beside_recordings
+from app.policies.evaluation.pick.episodes import PickBench
+from app.policies.evaluation.pick.people import (
+    MAX_RECORDED_S,
+    OneTarget,
+    beside_recordings,
+    could_be_picked,
+)
 from app.policies.evaluation.registry import evaluate
+from app.policies.evaluation.rows import EvaluationRequest
 from app.sim.cells.cell import load_cell
 from app.sim.human import model as human
+from app.sim.people.reach_script import standing_reach
 from app.sim.pick.batch import PickBatch, PickSettings
 from tests.sim.recorded_person import working
 from tests.sim.working_people import run_of
@@ -124,3 +132,26 @@ def test_more_recorded_motion_than_memory_is_refused():
     long = replace(run, times=run.times * (MAX_RECORDED_S + 10.0) / run.times[-1])
     with pytest.raises(InvalidInput, match="motions = 36010 s .* at most 36000 s"):
         evaluate("pick-mocap", pretrained.load("pick"), episodes=1, motions=(long,))
+
+
+def test_a_target_is_blocked_unless_a_grasp_fits_after_the_way():
+    bench = PickBench(pretrained.load("pick"), EvaluationRequest(episodes=1, seed=5), (1, 1))
+    batch = bench.evaluator(bench.usual).batch
+    batch.reset()
+    seen, state, cell = OneTarget(batch), batch.state, bench.cell
+    (target,) = batch.world.stations[state.candidates[0, :1]]
+    batch.set_goals(np.arange(1), target[None])
+    over = target - [0.0, 0.0, 0.05]
+    at_it = standing_reach(cell, over, "r")[None, None]
+    away = human.rest_posture(cell.human.x_min, cell.human.y_max, cell.human.home[2])[
+        None, None
+    ]
+    seen.start = state.q_goal.copy()  # no way to go
+    for free, picked in ((19, False), (20, True), (21, True)):
+        seen.people[:] = [at_it] * 10 + [away] * free + [at_it] * 10
+        assert could_be_picked(batch, seen, 0) == picked
+    seen.start = state.q_goal + 0.09 * batch.arm.limits.qd_max  # 0.09 s away
+    seen.people[:] = [away] * 20 + [at_it] * 10
+    assert not could_be_picked(batch, seen, 0)
+    seen.people.insert(0, away)
+    assert could_be_picked(batch, seen, 0)
