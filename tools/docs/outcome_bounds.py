@@ -59,27 +59,38 @@ def fitted_beside(checkpoint: Checkpoint, settings: PickSettings, cell: Cell) ->
 
 
 def measured(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
-    """Return the result: per kind of people the row of the shipped fit and that of its own."""
-    bench, rows = bench_of(checkpoint, request), []
+    """Return the result, one row per kind of people and outcome."""
+    bench, rows = bench_of(checkpoint, request), list[Json]()
     for name, settings in kinds_of(bench).items():
         if name in (MIXTURE, SHORT_TIME):
             continue
         own = bench_of(fitted_beside(checkpoint, settings, bench.cell), request)
-        found = calibration_row(own.evaluator(settings), name, request.seed)
-        usual = calibration_row(bench.evaluator(settings), name, request.seed)
-        rows.append(found | {"shipped": usual})
-        for what in ("success", "contact"):
-            briers = usual[what]["brier"], found[what]["brier"]
-            logger.info(
-                "%s: Brier score of %s %.4f, fitted beside them %.4f", name, what, *briers
-            )
+        fitted = calibration_row(own.evaluator(settings), name, request.seed)
+        shipped = calibration_row(bench.evaluator(settings), name, request.seed)
+        for outcome in ("success", "contact"):
+            rows.append(_row(f"{name}, {outcome}", shipped[outcome], fitted[outcome]))
+            logger.info("%s", rows[-1])
     return {
-        "command": "python -m tools.docs.outcome_bounds",
-        "protocol": "outcome-bounds",
+        "command": "python -m tools.docs.outcome_bounds FILE ...",
         "seed": request.seed,
         "episodes": bench.n,
         "checkpoint": checkpoint.sha256,
         "results": rows,
+    }
+
+
+def _row(name: str, shipped: Json, fitted: Json) -> Json:
+    return {
+        "name": name,
+        "rate_percent": 100.0 * shipped["rate"],
+        "brier_of_the_rate": shipped["brier_constant"],
+        "brier_shipped": shipped["brier"],
+        "brier_after_half": shipped["recalibrated"]["half"]["brier"],
+        "brier_fitted_beside_them": fitted["brier"],
+        "auc_shipped": shipped["auc"],
+        "auc_fitted_beside_them": fitted["auc"],
+        "ece_fitted_beside_them_percent": 100.0 * fitted["ece"],
+        "ece_by_chance_percent": 100.0 * fitted["ece_floor"],
     }
 
 
