@@ -235,16 +235,16 @@ def _timeouts(batch: PickBatch, run: Episodes, seen: OneTarget) -> dict[str, dic
 
 
 def could_be_picked(batch: PickBatch, seen: OneTarget, e: int) -> bool:
-    """Return whether a grasp fits into the time after the shortest way to the object."""
+    """Return whether a grasp fits into the time after the fastest motion to the object."""
     arm, state, grasp = batch.arm, batch.state, batch.settings.grasp
     shared, cylinders, size = (
         batch.world.people,
         state.people.cylinders[e],
         state.people.size[e],
     )
-    way = float((np.abs(state.q_goal[e] - seen.start[e]) / arm.limits.qd_max).max())
+    travel_s = float((np.abs(state.q_goal[e] - seen.start[e]) / arm.limits.qd_max).max())
     n_free = 0
-    for people in seen.people[math.ceil(way / SEEN_S) :]:
+    for people in seen.people[math.ceil(travel_s / SEEN_S) :]:
         free = min(
             clearance(arm, shared, q, people[e], cylinders, size).people_m
             for q in (state.q_goal[e], state.q_grasp[e])

@@ -134,7 +134,7 @@ def test_more_recorded_motion_than_memory_is_refused():
         evaluate("pick-mocap", pretrained.load("pick"), episodes=1, motions=(long,))
 
 
-def test_a_target_is_blocked_unless_a_grasp_fits_after_the_way():
+def test_a_target_is_blocked_unless_a_grasp_fits_after_the_motion_to_it():
     bench = PickBench(pretrained.load("pick"), EvaluationRequest(episodes=1, seed=5), (1, 1))
     batch = bench.evaluator(bench.usual).batch
     batch.reset()
@@ -146,7 +146,7 @@ def test_a_target_is_blocked_unless_a_grasp_fits_after_the_way():
     away = human.rest_posture(cell.human.x_min, cell.human.y_max, cell.human.home[2])[
         None, None
     ]
-    seen.start = state.q_goal.copy()  # no way to go
+    seen.start = state.q_goal.copy()  # already there
     for free, picked in ((19, False), (20, True), (21, True)):
         seen.people[:] = [at_it] * 10 + [away] * free + [at_it] * 10
         assert could_be_picked(batch, seen, 0) == picked
