@@ -38,6 +38,8 @@ UNITS = {
     "m": "m",
 }
 """Suffixes of keys and the units they denote; the first that matches counts."""
+NAMES = {"brier": "Brier", "auc": "AUC", "ece": "ECE"}
+"""Words of keys that are written otherwise."""
 
 
 def render(text: str, results: Path) -> str:
@@ -98,10 +100,12 @@ def _table(lines: list[list[str]]) -> str:
 
 def header(key: str) -> str:
     """Return a column header for a key: its words, and the unit of its suffix in brackets."""
+    words = key
     for suffix, unit in UNITS.items():
         if key.endswith(f"_{suffix}"):
-            return f"{key.removesuffix(f'_{suffix}').replace('_', ' ')} [{unit}]"
-    return key.replace("_", " ")
+            words = f"{key.removesuffix(f'_{suffix}')}_[{unit}]"
+            break
+    return " ".join(NAMES.get(word, word) for word in words.split("_"))
 
 
 def cell(value: object) -> str:
