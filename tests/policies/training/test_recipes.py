@@ -101,7 +101,7 @@ def test_reach_recipe_does_not_gain_over_standing_still_at_first(name: str) -> N
 
 
 @pytest.mark.slow
-def test_reach_recipe_of_the_authors_gains_where_nothing_can_be_touched() -> None:
+def test_reach_recipe_of_the_authors_gains_where_the_arm_cannot_get_far() -> None:
     """One goal, episodes of a second, small networks, the two learning rates exchanged.
 
     Other seeds, more updates and the printed recipe: docs/notebook/reach.md.

@@ -61,7 +61,7 @@ SAMPLE_S = 0.02
 SEEN_S = 0.1
 """Time between two postures of people that blocked targets are judged by [s]."""
 GRASP_S = 2.0
-"""Time that descent, closing and lift take [s]."""
+"""Time that descent, closing and lift usually take [s]; closing alone takes 1.25 s."""
 STILL_PACE = 1e-6
 """Pace of people who stand still."""
 ALONE_M = 0.5
@@ -179,9 +179,9 @@ def run_rest(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
     Each kind of people once with the policy alone, and once with a planner beside people at
     rest (``pick/resting_people.py``); the last two rows beside people who work.
 
-    A timeout is *blocked* where no robot could have picked the object: after the time that its
-    joints need to the object, people never left it free for GRASP_S. It is *alone* where nobody
-    is within ALONE_M of the robot at the end.
+    A timeout is *blocked* where no time for a grasp was left: after the time that the joints
+    need to the object at full speed, people never left it free for GRASP_S. It is *alone* where
+    nobody is within ALONE_M of the robot at the end.
     """
     bench = PickBench(checkpoint, request, (1, 1))
     usual, planners = bench.usual, _planners(bench.usual)
@@ -235,7 +235,13 @@ def _timeouts(batch: PickBatch, run: Episodes, seen: OneTarget) -> dict[str, dic
 
 
 def could_be_picked(batch: PickBatch, seen: OneTarget, e: int) -> bool:
-    """Return whether a grasp fits into the time after the fastest motion to the object."""
+    """Return whether a grasp fits into the time after the fastest motion to the object.
+
+    Args:
+        batch: Environments after the run.
+        seen: Rule of the run, with what it recorded.
+        e: Index of the environment.
+    """
     arm, state, grasp = batch.arm, batch.state, batch.settings.grasp
     shared, cylinders, size = (
         batch.world.people,
