@@ -61,7 +61,7 @@ SAMPLE_S = 0.02
 SEEN_S = 0.1
 """Time between two postures of people that blocked targets are judged by [s]."""
 GRASP_S = 2.0
-"""Time that descent, closing and lift take at most in 95 % of picks [s]; the shortest is 1.6 s."""
+"""Time within which 95 % of grasps descend, close and lift [s]; the shortest take 1.6 s."""
 STILL_PACE = 1e-6
 """Pace of people who stand still."""
 ALONE_M = 0.5
