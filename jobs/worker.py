@@ -45,7 +45,7 @@ class JobWorker:
         self.job: JobRecord = access.job()
         self.access = access
         self._cancelled = threading.Event()
-        self._interrupted = threading.Event()
+        self._interrupted = False  # no event: a signal handler must not wait for its lock
         self._over = threading.Event()
         self._stop_seen = False
         self._waiting: str | None = None
@@ -107,13 +107,13 @@ class JobWorker:
         return self._interrupted_now() or self._early_end is not None
 
     def _interrupted_now(self) -> bool:
-        stop = self._cancelled.is_set() or self._interrupted.is_set() or self._over.is_set()
+        stop = self._cancelled.is_set() or self._interrupted or self._over.is_set()
         self._stop_seen = self._stop_seen or stop
         return stop
 
     def interrupt(self, _signal: int = 0, _frame: FrameType | None = None) -> None:
         """Stop the runner; the job resumes with the next attempt."""
-        self._interrupted.set()
+        self._interrupted = True
 
     def end_at_sigterm(self) -> None:
         """End this process at SIGTERM, for runners without ``should_stop``."""

@@ -197,9 +197,9 @@ def _stopped_by_signals() -> Iterator[Event]:
     known: dict[int, Any] = {}
 
     def ask(_signal: int, _frame: FrameType | None) -> None:
+        restore()  # first: a second signal must not wait for the lock of the event
         stop.set()
         logger.warning("stops after this step and writes its state")
-        restore()
 
     def restore() -> None:
         for number, handler in known.items():

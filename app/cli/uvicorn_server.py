@@ -42,9 +42,10 @@ class Server(uvicorn.Server):
     def handle_exit(self, sig: int, frame: FrameType | None) -> None:
         """End the streams, then stop as uvicorn does."""
         services = getattr(self._app.state, "services", None)
-        if services is not None:
-            services.stopping.set()
+        is_first = not self.should_exit
         super().handle_exit(sig, frame)
+        if services is not None and is_first:  # a second signal must not wait for its lock
+            services.stopping.set()
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
         """Stop the jobs, whose workers may write over HTTP, then stop as uvicorn does."""

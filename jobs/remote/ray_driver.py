@@ -49,12 +49,12 @@ class RayDriver:
 
     def __init__(self, settings: Settings, claim: Claim) -> None:
         self._settings, self._claim = settings, claim
-        self._stopped = threading.Event()
+        self._stopped = False  # no event: a signal handler must not wait for its lock
         self._has_started = False
 
     def stop(self, *_: object) -> None:
         """Stop the attempt at its next step."""
-        self._stopped.set()
+        self._stopped = True
 
     def run(self) -> int:
         """Run the attempt; return the exit status of its process.
@@ -111,7 +111,7 @@ class RayDriver:
                     pass  # the next one may be recorded
                 except StaleAttempt as error:
                     logger.warning("%s", error)
-                    self._stopped.set()
+                    self._stopped = True
                     return
 
     def _wait_for_start(self, node: Any) -> bool:
@@ -119,7 +119,7 @@ class RayDriver:
         found = node.about.remote()
         with self._waiting_for(NO_CPU):
             while not ray.wait([found], timeout=POLL_S)[0]:
-                if self._stopped.is_set():
+                if self._stopped:
                     return False
         name, commit = ray.get(found)
         logger.info("runs on node %s", name)
@@ -137,7 +137,7 @@ class RayDriver:
                 copy_output(output)
                 if code is not None:
                     return exit_status(code)
-            if self._stopped.is_set() and not sent:
+            if self._stopped and not sent:
                 node.stop.remote()
                 sent = True
             time.sleep(POLL_S)

@@ -4,11 +4,12 @@ Prints a JSON line before and after each post and cancel: what was acknowledged 
 if the process is killed in between.
 """
 
+import faulthandler
 import json
 import random
 import signal
 import sys
-import threading
+import time
 from pathlib import Path
 from types import FrameType
 
@@ -48,10 +49,13 @@ def cancel_one(store: Store, chance: random.Random) -> None:
 
 def main(url: str, data_dir: Path, seed: int) -> None:
     """Serve; post and cancel jobs where ``seed`` is not negative, otherwise only end them."""
-    chance, over = random.Random(seed), threading.Event()
+    chance, over = random.Random(seed), False
 
     def stop(_signal: int, _frame: FrameType | None) -> None:
-        over.set()
+        nonlocal over  # no event, whose lock the interrupted thread may hold
+        over = True
+
+    faulthandler.enable()
 
     signal.signal(signal.SIGTERM, stop)
     store = Store(url)
@@ -60,7 +64,8 @@ def main(url: str, data_dir: Path, seed: int) -> None:
     supervisor = Supervisor(store, data_dir, executor=executor, timeouts=timeouts)
     supervisor.start()
     say(ready=True)
-    while not over.wait(chance.uniform(0.01, 0.2)):
+    while not over:
+        time.sleep(chance.uniform(0.01, 0.2))
         try:
             active = [job for job in jobs.list_jobs(store).items if not job.is_final]
             if seed < 0:

@@ -100,7 +100,13 @@ class Series:
     def collect(self) -> None:
         """Wait for the end of the server and its workers; read what it acknowledged."""
         assert self.server is not None
-        self.server.wait(timeout=WAIT_S)
+        try:
+            self.server.wait(timeout=WAIT_S)
+        except subprocess.TimeoutExpired:
+            self.server.send_signal(signal.SIGABRT)  # which prints where its threads are
+            self.server.wait()
+            log = (self.folder / "server.log").read_text()[-4000:]
+            raise AssertionError(f"the server does not end: {log}") from None
         for line in self.output.read_text().splitlines():
             if not line.endswith("}"):
                 continue  # cut off by the kill

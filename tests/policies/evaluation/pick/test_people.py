@@ -147,11 +147,11 @@ def test_a_target_is_blocked_unless_a_grasp_fits_after_the_motion_to_it():
         None, None
     ]
     seen.start = state.q_goal.copy()  # already there
-    for free, picked in ((19, False), (20, True), (21, True)):
+    for free, picked in ((15, False), (16, True), (17, True)):
         seen.people[:] = [at_it] * 10 + [away] * free + [at_it] * 10
         assert could_be_picked(batch, seen, 0) == picked
     seen.start = state.q_goal + 0.09 * batch.arm.limits.qd_max  # 0.09 s away
-    seen.people[:] = [away] * 20 + [at_it] * 10
+    seen.people[:] = [away] * 16 + [at_it] * 10
     assert not could_be_picked(batch, seen, 0)
     seen.people.insert(0, away)
     assert could_be_picked(batch, seen, 0)
