@@ -6,7 +6,9 @@ from tools.docs.headline import percent, share
 from tools.docs.pick_tables import p_value
 from tools.docs.results import Json, read_if_measured
 
-SUFFIXES = {"1, shipped": "", "2": "-seed2", "3": "-seed3"}
+SHIPPED = "-seed1"
+"""Suffix of the result files of the shipped policy, but for those of the case studies."""
+SUFFIXES = {"1, shipped": SHIPPED, "2": "-seed2", "3": "-seed3"}
 """Training seeds, and the suffixes of their result files."""
 SINGLE, CHOICE, HARD, CASES = "pick-single", "pick-choice", "pick-choice-hard", "pick-cases"
 CHOICES = {
@@ -36,7 +38,8 @@ def _column(results: Path, suffix: str) -> dict[str, str] | None:
     """Return the cells of one training seed by their row."""
     found: dict[str, Json] = {}
     for name in (SINGLE, CHOICE, HARD, CASES):
-        if (result := read_if_measured(results / f"{name}{suffix}.json")) is None:
+        end = "" if name == CASES and suffix == SHIPPED else suffix
+        if (result := read_if_measured(results / f"{name}{end}.json")) is None:
             return None
         found[name] = result
     rows = {name: {row["name"]: row for row in one["results"]} for name, one in found.items()}

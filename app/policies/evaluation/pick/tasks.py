@@ -154,7 +154,7 @@ def run_choice_hard(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
     """Evaluate the selection beside two people, faster people, and both.
 
     Two people are also met with longer time limits and, in a cell with enough stations, with
-    more targets.
+    more targets under each time limit.
     """
     bench = PickBench(checkpoint, request)
     usual = bench.usual
@@ -164,12 +164,13 @@ def run_choice_hard(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
         "faster": fast,
         "two-people-faster": replace(fast, people=PAIR),
     }
-    for limit_s in LONGER_S:
-        longer = replace(usual, people=PAIR, time_limit_s=limit_s)
-        settings[f"two-people-{limit_s:.0f}-s"] = longer
     if len(bench.cell.pick_stations) >= MANY_TARGETS[1]:
         more = replace(usual, people=PAIR, n_candidates=MANY_TARGETS)
         settings["two-people-4-to-6-targets"] = more
+    for name in [name for name, one in settings.items() if one.work.pace == usual.work.pace]:
+        for limit_s in LONGER_S:
+            longer = replace(settings[name], time_limit_s=limit_s)
+            settings[f"{name}-{limit_s:.0f}-s"] = longer
     rows = request.rows(len(settings) * (len(OTHER_RULES) + 2))
     differences, stated = list[Json](), Json(hysteresis=HYSTERESIS)
     for name, one in settings.items():

@@ -9,7 +9,7 @@ from app.policies.configs.pick import THESIS
 from app.policies.evaluation.pick import selection_rules
 from app.policies.evaluation.pick.episodes import PickBench, SelectionInput, observe_exactly
 from app.policies.evaluation.registry import evaluate
-from app.policies.evaluation.rows import EvaluationRequest
+from app.policies.evaluation.rows import EvaluationRequest, Json
 from app.policies.training.pick import start
 from app.sim.cells.cell import load_cell
 from tests.policies.untrained import shipped_pick_of
@@ -130,6 +130,9 @@ def test_the_oracle_of_harder_choices_covers_every_target():
     for name, candidates in numbers.items():
         assert result["settings"][name]["candidates"] == candidates
         assert rate[f"{name} oracle"] >= rate[f"{name} random"]
+        assert time_limits(result["settings"], name) == [12.0, 14.0, 20.0]
+        longest = result["settings"][f"{name}-20-s"]
+        assert longest["candidates"] == candidates
 
 
 def test_harder_choices_offer_no_more_targets_than_the_cell_has():
@@ -143,10 +146,11 @@ def test_harder_choices_offer_no_more_targets_than_the_cell_has():
         "two-people-20-s",
         "hysteresis",
     }
-    limits = [
-        result["settings"][f"two-people{end}"]["time_limit_s"] for end in ("", "-14-s", "-20-s")
-    ]
-    assert limits == [12.0, 14.0, 20.0]
+    assert time_limits(result["settings"], "two-people") == [12.0, 14.0, 20.0]
+
+
+def time_limits(settings: Json, name: str) -> list[float]:
+    return [settings[f"{name}{end}"]["time_limit_s"] for end in ("", "-14-s", "-20-s")]
 
 
 def test_cases_count_each_clause_and_keep_the_values_over_time():
