@@ -14,7 +14,7 @@ def written(name: str) -> str:
 
 def test_commands_name_policy_recordings_numbers_and_file() -> None:
     start = "python -m app"
-    numbers = "--episodes 2000 --seed 11 --json > docs/results"
+    numbers = "--episodes 4000 --seed 21 --json > docs/results"
     assert written("pick-single") == f"{start} evaluate pick-single {numbers}/pick-single.json"
     assert written("pick-mocap").startswith(f"{start} evaluate pick-mocap FILE ... {numbers}")
     assert "pick-ssm --checkpoint pick-monitored --episodes" in written("pick-ssm-monitored")
