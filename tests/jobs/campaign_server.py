@@ -56,7 +56,6 @@ def main(url: str, data_dir: Path, seed: int) -> None:
         over = True
 
     faulthandler.enable()
-
     signal.signal(signal.SIGTERM, stop)
     store = Store(url)
     executor = LocalExecutor(store.url, data_dir, COUNTING)

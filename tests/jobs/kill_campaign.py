@@ -104,7 +104,7 @@ class Series:
             self.server.wait(timeout=WAIT_S)
         except subprocess.TimeoutExpired:
             self.server.send_signal(signal.SIGABRT)  # which prints where its threads are
-            self.server.wait()
+            self.server.wait(timeout=NATURAL_END_S)
             log = (self.folder / "server.log").read_text()[-4000:]
             raise AssertionError(f"the server does not end: {log}") from None
         for line in self.output.read_text().splitlines():

@@ -159,18 +159,21 @@ def run_choice_hard(checkpoint: Checkpoint, request: EvaluationRequest) -> Json:
     bench = PickBench(checkpoint, request)
     usual = bench.usual
     fast = replace(usual, work=replace(usual.work, pace=FASTER))
-    settings = {
-        "two-people": replace(usual, people=PAIR),
-        "faster": fast,
-        "two-people-faster": replace(fast, people=PAIR),
-    }
+    pairs = {"two-people": replace(usual, people=PAIR)}
     if len(bench.cell.pick_stations) >= MANY_TARGETS[1]:
         more = replace(usual, people=PAIR, n_candidates=MANY_TARGETS)
-        settings["two-people-4-to-6-targets"] = more
-    for name in [name for name, one in settings.items() if one.work.pace == usual.work.pace]:
-        for limit_s in LONGER_S:
-            longer = replace(settings[name], time_limit_s=limit_s)
-            settings[f"{name}-{limit_s:.0f}-s"] = longer
+        pairs["two-people-4-to-6-targets"] = more
+    settings = {
+        "two-people": pairs["two-people"],
+        "faster": fast,
+        "two-people-faster": replace(fast, people=PAIR),
+        **pairs,
+        **{
+            f"{name}-{limit_s:.0f}-s": replace(one, time_limit_s=limit_s)
+            for name, one in pairs.items()
+            for limit_s in LONGER_S
+        },
+    }
     rows = request.rows(len(settings) * (len(OTHER_RULES) + 2))
     differences, stated = list[Json](), Json(hysteresis=HYSTERESIS)
     for name, one in settings.items():
