@@ -41,7 +41,7 @@ def others(people: Sequence[Json], speeds: Json | None, trackers: Json | None) -
         for draw, one in ((_people, people), (_speeds, speeds), (_trackers, trackers))
         if one
     ]
-    figure, axes = panels(1, len(there), 3.2, width_ratios=[1.15, 0.8, 1.25][: len(there)])
+    figure, axes = panels(1, len(there), 3.2, width_ratios=[1.1, 1.0, 1.2][: len(there)])
     for axis, (draw, one) in zip(axes[0], there, strict=True):
         draw(axis, one)
     return figure
@@ -96,11 +96,12 @@ def _speeds(axis: Axes, result: Json) -> None:
         axis.bar(x, collision, color=RED, width=width)
         axis.bar(x, timeout, bottom=collision, color=GREY, width=width)
         text = f"{100.0 * row['success']['mean']:.1f}"
-        axis.text(x, collision + timeout, text, ha="center", va="bottom", fontsize="small")
+        axis.text(x, collision + timeout, text, ha="center", va="bottom", fontsize=7.5)
     most = max(1.0 - row["success"]["mean"] for row in rows)
     axis.set_xticks(range(len(speeds)), [f"{speed:g}" for speed in speeds])
     words = "[m/s]; right: rollout" if any(ahead) else "[m/s]"
-    axis.set(title="Speed of people", xlabel=words, ylim=(0.0, 1.2 * max(most, 1e-3)))
+    axis.set(title="Speed of people", xlabel=words, ylabel="collision, timeout")
+    axis.set_ylim(0.0, 1.2 * max(most, 1e-3))
     axis.grid(False, axis="x")
     axis.tick_params(axis="x", length=0)
     percent(axis.yaxis)
