@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.special import logit
 
 from app.policies.configs.pick import PICK
 from app.policies.configs.presets import PRESETS
@@ -97,10 +98,14 @@ def test_the_method_states_the_interval_of_outcome_probabilities() -> None:
     scores = np.random.default_rng(1).normal(size=(MEMBERS, 5, N_OUT)).astype(np.float32)
     shares = np.exp(scores[..., :-1])
     shares /= shares.sum(axis=-1, keepdims=True)
-    found = combine(scores, widen=1.0)
-    (stated,) = re.findall(r"interval is ([0-9.]+) standard deviations", section(METHOD, "3.6"))
-    half = float(stated) * shares.std(axis=0, ddof=1)
-    np.testing.assert_allclose(found.spread, half, rtol=1e-4)
+    between = np.array([[-0.3, 0.2], [-0.5, 0.9], [-0.7, 0.0]], dtype=np.float32)
+    found = combine(scores, 1.0, between)
+    (stated,) = re.findall(r"\\sigma = ([0-9.]+) \\frac{s}{p", section(METHOD, "3.6"))
+    mean = shares.mean(axis=0)
+    spread = float(stated) * shares.std(axis=0, ddof=1) / (mean * (1.0 - mean))
+    for end, side, offset in zip((found.low, found.high), (-1.0, 1.0), between.T, strict=True):
+        odds = logit(mean) + side * np.hypot(spread, offset)
+        np.testing.assert_allclose(logit(end), odds, rtol=1e-4, atol=1e-4)
 
 
 def test_fields_of_presets_that_pages_name_exist() -> None:

@@ -139,7 +139,7 @@ class Action(Answer):
 
 
 class Probability(Answer):
-    """A probability with its 95 % interval."""
+    """A probability, and where the rate lies in 95 % of cells with people of one kind."""
 
     mean: float
     low: float

@@ -4,7 +4,8 @@ An observation does not reveal what kind of people work in a cell, so that proba
 to a mixture of people are biased beside each kind. A slope of the log-probabilities and an
 offset of each outcome are fitted to predictions whose outcome is known. They become part of the
 last layers of the checkpoint's ensemble: actions and values of a recalibrated policy are the
-same, and code that uses it does not change.
+same, and code that uses it does not change. What the outcomes tell about the cell makes the
+intervals narrower.
 
 Source: Guo et al., *On calibration of modern neural networks* (2017); Alexandari et al.,
 *Maximum likelihood with bias-corrected calibration* (2020). Deviates: normal priors around no
@@ -30,6 +31,8 @@ SLOPE_STD, OFFSET_STD = 0.5, 1.0
 """Standard deviations of the priors of the slope, around 1, and of the offsets, around 0."""
 MIN_OUTCOMES = 20
 """Fewest outcomes of a recalibration."""
+BETWEEN = "outcome.between"
+"""Name of the offsets of log-odds between cells."""
 LAST = "outcome.members.{}.4."
 """Prefix of the names of the last layer of each member."""
 
@@ -80,6 +83,20 @@ def fit_map(probability: Float, outcome: NDArray[np.int64]) -> OutcomeMap:
     return OutcomeMap(float(x[0]), np.asarray(x[1:]))
 
 
+def narrowed(between: NDArray[np.float32], probability: Float) -> NDArray[np.float32]:
+    """Return what is left of the offsets between cells once outcomes of a cell are known.
+
+    The information of n outcomes on an offset of log-odds is the sum of ``p (1 - p)``; the ends
+    are taken to be 1.96 standard deviations of a normal distribution.
+
+    Args:
+        between: Least and greatest offset before, shape (3, 2).
+        probability: Corrected probabilities of the outcomes that were observed, shape (n, 3).
+    """
+    information = (probability * (1.0 - probability)).sum(axis=0)[:, None]
+    return np.asarray(between / np.sqrt(1.0 + (between / 1.96) ** 2 * information), dtype="f4")
+
+
 def recalibrated(
     checkpoint: Checkpoint, probability: Float, outcome: NDArray[np.int64]
 ) -> Checkpoint:
@@ -105,6 +122,8 @@ def recalibrated(
             array[:N] *= found.slope
             array[:N] += found.offset if name == "bias" else 0.0
             arrays[LAST.format(member) + name] = array
+    if BETWEEN in arrays:
+        arrays[BETWEEN] = narrowed(arrays[BETWEEN], found(probability))
     counts = np.bincount(outcome, minlength=N).tolist()
     record = {
         "from": checkpoint.sha256,

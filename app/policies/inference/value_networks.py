@@ -105,11 +105,13 @@ class ValueNetworks:
         self.predicts = "outcome.mean" in arrays
         """Whether the checkpoint predicts outcomes."""
         parts: dict[str, torch.nn.Module] = {"actor": actor, "critic": critics}
+        given = {name: tensors_under(arrays, name) for name in parts}
         if self.predicts:
-            parts["outcome"] = outcome
+            parts["outcome"] = outcome  # older checkpoints do not state the offsets
+            given["outcome"] = {"between": outcome.between, **tensors_under(arrays, "outcome")}
         for name, module in parts.items():
             try:
-                module.load_state_dict(tensors_under(arrays, name))
+                module.load_state_dict(given[name])
             except RuntimeError as error:
                 raise CheckpointMismatch("tensors", f"those of {name}", str(error)) from error
         base, fade = n, None
@@ -131,6 +133,7 @@ class ValueNetworks:
                 mean=outcome.mean.numpy(),
                 scale=outcome.scale.numpy(),
                 widen=float(outcome.widen),
+                between=outcome.between.numpy(),
             )
         )
         self._work = new_workspace(self._networks, self._n, CONTROLLED)  # kept by the GIL
@@ -239,4 +242,4 @@ class ValueNetworks:
         outputs = np.empty((len(nets.members), len(obs), N_OUT), dtype=np.float32)
         for member, output in zip(nets.members, outputs, strict=True):
             output[:] = forward_many(member, seen, one, varying[: n + 1], work).T
-        combine_members(outputs, nets.widen, outcomes)
+        combine_members(outputs, nets.widen, nets.between, outcomes)

@@ -46,6 +46,8 @@ class ActorCritic(NamedTuple):
     """Standard deviation of each, shape (n_obs + 1,)."""
     widen: float
     """Factor of the ensemble's spread."""
+    between: Floats
+    """Least and greatest offset of the log-odds of each outcome between cells, shape (3, 2)."""
 
 
 class Workspace(NamedTuple):
@@ -148,4 +150,4 @@ def evaluate_few(
     for member in networks.members:
         forward_few(member, inputs, varying[: n_obs + 1], work.units, work.outputs[m, :n])
         m += 1
-    combine_members(work.outputs, networks.widen, outcomes)
+    combine_members(work.outputs, networks.widen, networks.between, outcomes)

@@ -2,8 +2,13 @@
 
 An ensemble of small networks maps an observation, and the critic's value of it, to the
 probabilities of success, contact and timeout under the policy, and to the time to success. Its
-inputs are standardised by the data it was fitted to. The spread of the ensemble, widened by the
-factor that held on data apart, is the interval of a probability.
+inputs are standardised by the data it was fitted to.
+
+The interval of a probability is where the rate of its outcome lies in 95 % of cells. An
+observation does not show what kind of people work in a cell, so that rates differ between cells
+where the observation is the same. The log-odds of both ends differ from those of the
+probability by the offsets between cells and the spread of the ensemble, widened by the factor
+that held on data apart.
 
 Source: ours. Lakshminarayanan et al., *Simple and scalable predictive uncertainty estimation
 using deep ensembles* (2017). The thesis shows the critic's values only.
@@ -31,6 +36,8 @@ OUTCOMES = ("success", "contact", "timeout")
 """Outcomes, in the order of the probabilities."""
 CLIP = 6.0
 """Bound of a standardised input."""
+CERTAIN = 1e-4
+"""Probability that log-odds are bounded at, and one minus that at the other end."""
 N_OUT = len(OUTCOMES) + 1
 """Outputs of a network: a logit per outcome, and the time to success [s]."""
 
@@ -40,8 +47,10 @@ class OutcomePrediction(NamedTuple):
 
     probability: Floats
     """Probability of each outcome, shape (n, 3)."""
-    spread: Floats
-    """Half width of the 95 % interval of each, shape (n, 3)."""
+    low: Floats
+    """Lower end of the 95 % interval of each, shape (n, 3)."""
+    high: Floats
+    """Upper end, shape (n, 3)."""
     time_s: Floats
     """Expected time to success [s], shape (n,)."""
 
@@ -58,13 +67,16 @@ class OutcomeHead(nn.Module):
     scale: torch.Tensor
     """Standard deviation of each input, shape (n_obs + 1,)."""
     widen: torch.Tensor
-    """Factor of the spread, shape (1,)."""
+    """Factor of the spread of the ensemble, shape (1,)."""
+    between: torch.Tensor
+    """Least and greatest offset of the log-odds of each outcome between cells, shape (3, 2)."""
 
     def __init__(self, n_obs: int) -> None:
         super().__init__()
         self.register_buffer("mean", torch.zeros(n_obs + 1))
         self.register_buffer("scale", torch.ones(n_obs + 1))
         self.register_buffer("widen", torch.ones(1))
+        self.register_buffer("between", torch.zeros(len(OUTCOMES), 2))
         self.members = nn.ModuleList(
             nn.Sequential(*hidden(n_obs + 1, WIDTH, 2), nn.Linear(WIDTH, N_OUT))
             for _ in range(MEMBERS)
@@ -88,17 +100,22 @@ class OutcomeHead(nn.Module):
     def predict(self, obs: torch.Tensor, value: torch.Tensor) -> OutcomePrediction:
         """Return the prediction for observations, shape (n, n_obs), and values, shape (n,)."""
         with torch.inference_mode():
-            return combine(self(obs, value).numpy(), float(self.widen))
+            outputs = self(obs, value).numpy()
+            return combine(outputs, float(self.widen), self.between.numpy())
 
 
 @kernel(nogil=True)
-def combine_members(outputs: Floats, widen: float, to: OutcomePrediction) -> None:
+def combine_members(
+    outputs: Floats, widen: float, between: Floats, to: OutcomePrediction
+) -> None:
     """Write the prediction of an ensemble.
 
     Args:
         outputs: Outputs of the members, shape (MEMBERS, n or more, N_OUT); the logits become
             probabilities.
-        widen: Factor of the spread.
+        widen: Factor of the spread of the ensemble.
+        between: Least and greatest offset of the log-odds of each outcome between cells, shape
+            (3, 2).
         to: Filled, for n observations.
     """
     members, outcomes = outputs.shape[0], outputs.shape[2] - 1
@@ -121,20 +138,28 @@ def combine_members(outputs: Floats, widen: float, to: OutcomePrediction) -> Non
             if k == outcomes:
                 to.time_s[i] = max(mean, 0.0)
             else:
+                inside = min(max(mean, CERTAIN), 1.0 - CERTAIN)
+                spread = widen * math.sqrt(square / (members - 1)) / (inside * (1.0 - inside))
+                odds, least, most = (
+                    math.log(inside / (1.0 - inside)),
+                    between[k, 0],
+                    between[k, 1],
+                )
+                below = math.sqrt((1.96 * spread) ** 2 + least**2)
+                above = math.sqrt((1.96 * spread) ** 2 + most**2)
                 to.probability[i, k] = mean
-                to.spread[i, k] = 1.96 * widen * math.sqrt(square / (members - 1))
+                to.low[i, k] = min(mean, 1.0 / (1.0 + math.exp(below - odds)))
+                to.high[i, k] = max(mean, 1.0 / (1.0 + math.exp(-above - odds)))
 
 
 @kernel()
 def _write_estimates(found: OutcomePrediction, out: Floats) -> None:
     """See :func:`estimates_of`."""
-    zero, one = np.float32(0.0), np.float32(1.0)
     for i in range(out.shape[0]):
         for k in range(2):
-            mean, spread = found.probability[i, k], found.spread[i, k]
-            out[i, 3 * k] = mean
-            out[i, 3 * k + 1] = max(mean - spread, zero)
-            out[i, 3 * k + 2] = min(mean + spread, one)
+            out[i, 3 * k] = found.probability[i, k]
+            out[i, 3 * k + 1] = found.low[i, k]
+            out[i, 3 * k + 2] = found.high[i, k]
         out[i, 6] = found.time_s[i]
 
 
@@ -152,12 +177,12 @@ def estimates_of(predicted: OutcomePrediction) -> Floats:
 
 def new_prediction(n: int) -> OutcomePrediction:
     """Return room for the prediction of n observations."""
-    shapes = (n, len(OUTCOMES)), (n, len(OUTCOMES)), (n,)
+    shapes = *[(n, len(OUTCOMES))] * 3, (n,)
     return OutcomePrediction(*(np.empty(shape, dtype=np.float32) for shape in shapes))
 
 
-def combine(outputs: Floats, widen: float) -> OutcomePrediction:
+def combine(outputs: Floats, widen: float, between: Floats) -> OutcomePrediction:
     """Return the prediction of an ensemble; see :func:`combine_members`."""
     found = new_prediction(outputs.shape[1])
-    combine_members(outputs, widen, found)
+    combine_members(outputs, widen, between, found)
     return found

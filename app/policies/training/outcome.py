@@ -5,9 +5,13 @@ kept; when the episode ends it is labelled with the outcome and the time that it
 Half of the episodes have less time than those of the training, down to almost none. Each member
 of the ensemble learns from a bootstrap sample of the episodes: probabilities by cross-entropy,
 the time to success by its squared error, whose minimum is the expected time.
+
+People of one cell are of one kind, those of the training a mixture. How much rates differ
+between cells where the observation is the same is fitted to episodes in cells drawn from that
+mixture: the log-odds of an outcome have an offset in each cell.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -17,7 +21,7 @@ from torch import nn
 from torch.nn import functional
 
 from app.policies.networks.actor_critic import Critics
-from app.policies.networks.outcome import MEMBERS, OUTCOMES, OutcomeHead
+from app.policies.networks.outcome import CERTAIN, MEMBERS, OUTCOMES, OutcomeHead
 from app.sim.pick.batch import PickBatch
 from app.sim.scenario.kernels.episode import COLLISION, SUCCESS, TIMEOUT, UNFEASIBLE
 
@@ -35,6 +39,9 @@ LEAST_BATCHES = 16
 LEAST_SPREAD = 1e-3
 """Spread that errors are compared with where the members agree more closely: one factor widens
 all intervals, so that small errors of nearly certain outcomes would make the others useless."""
+OFFSET_STD, NEWTON_STEPS = 2.0, 12
+"""Standard deviation of the prior of the offset in a cell, which keeps it finite where an
+outcome never happens, and steps of its fit."""
 TIME_WEIGHT = 0.05
 """Weight of the squared error of the time [1/s^2], relative to the cross-entropy."""
 
@@ -71,6 +78,7 @@ def collect(
     n_steps: int,
     seed: int,
     should_stop: Callable[[], bool],
+    shortened: float = SHORTENED,
 ) -> OutcomeData:
     """Return labelled observations of episodes under a greedy policy.
 
@@ -81,6 +89,7 @@ def collect(
         n_steps: Steps of all environments in which episodes begin.
         seed: Seed of the steps that are kept.
         should_stop: Called before every step.
+        shortened: Share of the episodes whose time left at the start is drawn.
 
     Raises:
         FitStopped: ``should_stop`` asked for it.
@@ -94,8 +103,8 @@ def collect(
     while collected.any():
         _continue_unless(should_stop)
         first = batch.state.elapsed < 0.5 * dt
-        shortened = np.flatnonzero(first & (rng.random(n) < SHORTENED))
-        batch.shorten(shortened, rng.random(len(shortened)))
+        short = np.flatnonzero(first & (rng.random(n) < shortened))
+        batch.shorten(short, rng.random(len(short)))
         with torch.inference_mode():
             obs = torch.as_tensor(batch.obs)
             act = actor(obs)
@@ -195,7 +204,7 @@ def _fit_member(
 def _widen(head: OutcomeHead, data: OutcomeData, apart: NDArray[np.bool_]) -> None:
     """Widen the spread until the calibration error on other episodes lies inside it."""
     found = head.predict(torch.as_tensor(data.obs[apart]), torch.as_tensor(data.value[apart]))
-    probability, spread = found.probability[:, 0], found.spread[:, 0]
+    probability, spread = found.probability[:, 0], 0.5 * (found.high - found.low)[:, 0]
     won = data.label[apart] == 0
     order = np.argsort(probability)
     ratios = [
@@ -205,3 +214,44 @@ def _widen(head: OutcomeHead, data: OutcomeData, apart: NDArray[np.bool_]) -> No
         if len(part)
     ]
     head.widen.fill_(max(1.0, float(np.quantile(ratios, 0.9))))
+
+
+def offsets_between(head: OutcomeHead, cells: Sequence[OutcomeData]) -> NDArray[np.float32]:
+    """Return the least and the greatest offset of log-odds in a number of cells, shape (3, 2).
+
+    In each cell, the rate of an outcome is that of predictions whose log-odds have an offset.
+    In a further cell drawn alike it lies between the least and the greatest of n cells with
+    probability ``(n - 1) / (n + 1)``, whatever its distribution (order statistics).
+
+    Args:
+        head: Predictions.
+        cells: Labelled observations in each cell; every episode counts once.
+    """
+    found = [
+        head.predict(torch.as_tensor(one.obs), torch.as_tensor(one.value)) for one in cells
+    ]
+    offsets = [
+        [_offset(one.probability[:, k], data, k) for k in range(len(OUTCOMES))]
+        for one, data in zip(found, cells, strict=True)
+    ]
+    ends = np.min(offsets, axis=0).clip(max=0.0), np.max(offsets, axis=0).clip(min=0.0)
+    return np.column_stack(ends).astype(np.float32)
+
+
+def _offset(probability: NDArray[np.float32], data: OutcomeData, outcome: int) -> float:
+    """Return the most probable offset of the log-odds of an outcome in one cell.
+
+    Args:
+        probability: Predictions of the outcome, shape (n,).
+        data: What they were made for.
+        outcome: Index of the outcome.
+    """
+    inside = np.clip(probability.astype(np.float64), CERTAIN, 1.0 - CERTAIN)
+    odds, happened = np.log(inside / (1.0 - inside)), data.label == outcome
+    weight = 1.0 / np.bincount(data.episode)[data.episode]
+    offset = 0.0
+    for _ in range(NEWTON_STEPS):
+        now = 1.0 / (1.0 + np.exp(-odds - offset))
+        slope = weight @ (happened - now) - offset / OFFSET_STD**2
+        offset += slope / (weight @ (now * (1.0 - now)) + 1.0 / OFFSET_STD**2)
+    return float(offset)

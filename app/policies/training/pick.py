@@ -21,7 +21,7 @@ from app.policies.networks.actor_critic import Critics
 from app.policies.networks.outcome import OutcomeHead
 from app.policies.networks.pick import LAYOUTS, actor_of, critics_for
 from app.policies.training.curve import CURVE_SEED, outcome_rates, played_rates
-from app.policies.training.outcome import FitStopped, collect, fit
+from app.policies.training.outcome import FitStopped, collect, fit, offsets_between
 from app.policies.training.reporter import Callbacks, Reporter
 from app.policies.training.run import TrainingRun
 from app.policies.training.td3 import TrainingMonitor, start_td3
@@ -48,6 +48,9 @@ FIRST_MODE = 0.05
 """First mode and lower limit of the starts of the curriculum: "close to 0" (thesis 5.3.4)."""
 MIN_EPISODES = 100
 """Fewest ended episodes that outcomes are fitted to."""
+CELLS, CELL_SHARE = 39, 0.06
+"""Cells with people of one kind, 38 of 40 further ones like between them, and the steps in all
+of them, relative to the training."""
 
 
 def visited_states(batch: PickBatch) -> dict[str, Vec]:
@@ -196,14 +199,55 @@ def outcomes_of(
         should_stop: Called before every step and every pass over the data.
 
     Returns:
-        The ensemble; None where fewer than MIN_EPISODES ended.
+        The ensemble, with the offsets between cells; None where fewer than MIN_EPISODES ended.
 
     Raises:
         FitStopped: ``should_stop`` asked for it.
     """
     seed = int(checkpoint.manifest["seed"]) + OUTCOME_SEED
     batch = batch_of(preset, cell, preset.learning.n_envs, seed)
-    return outcomes_beside(checkpoint, preset, batch, should_stop)
+    head = outcomes_beside(checkpoint, preset, batch, should_stop)
+    if head is None:
+        return None
+    actor, critic = _networks_of(checkpoint, preset, batch.obs_size)
+    n_steps = round(CELL_SHARE * preset.learning.total_steps / CELLS) // batch.n_envs
+    cells = [
+        collect(
+            batch_of(preset.model_copy(update={"people": people}), cell, batch.n_envs, one),
+            actor,
+            critic,
+            max(1, n_steps),
+            one,
+            should_stop,
+            shortened=0.0,
+        )
+        for one, people in enumerate(people_of_cells(preset.people, CELLS, seed), seed + 1)
+    ]
+    head.between.copy_(torch.as_tensor(offsets_between(head, cells)))
+    return head
+
+
+def people_of_cells(people: PickPeople, n: int, seed: int) -> list[PickPeople]:
+    """Return the people of n cells, of one kind in each, as a preset draws them per episode.
+
+    Cells differ in the number of people, their pace, whether they are off task, and whether
+    they stand still at times.
+    """
+    rng, cells = np.random.default_rng(seed), list[PickPeople]()
+    slowest, fastest = people.human_pace, max(people.human_pace, people.human_pace_max)
+    for _ in range(n):
+        there = np.count_nonzero(rng.random(people.n_people) >= people.human_absent)
+        pace = slowest + (fastest - slowest) * rng.random() ** 2  # as a person's is drawn
+        kind = {
+            "n_people": max(1, int(there)),
+            "human_absent": 0.0,
+            "human_pace": pace,
+            "human_pace_max": pace,
+            "human_off_task": float(rng.random() < people.human_off_task),
+            "human_at_rest": float(rng.random() < people.human_at_rest),
+        }
+        cells.append(people.model_copy(update=kind))
+    return cells
 
 
 def outcomes_beside(
@@ -226,16 +270,24 @@ def outcomes_beside(
     Raises:
         FitStopped: ``should_stop`` asked for it.
     """
-    arrays, seed = checkpoint.arrays(), int(checkpoint.manifest["seed"])
-    actor = actor_of(preset, batch.obs_size)
-    critic = critics_for(preset, batch.obs_size)
-    actor.load_state_dict(tensors_under(arrays, "actor"))
-    critic.load_state_dict(tensors_under(arrays, "critic"))
+    seed = int(checkpoint.manifest["seed"])
+    actor, critic = _networks_of(checkpoint, preset, batch.obs_size)
     n_steps = round(OUTCOME_SHARE * preset.learning.total_steps) // batch.n_envs
     data = collect(batch, actor, critic, n_steps, seed, should_stop)
     if len(np.unique(data.episode)) < MIN_EPISODES:
         return None
     return fit(data, seed, should_stop)
+
+
+def _networks_of(
+    checkpoint: Checkpoint, preset: PickPreset, n_obs: int
+) -> tuple[torch.nn.Module, Critics]:
+    """Return actor and critics of a checkpoint."""
+    arrays = checkpoint.arrays()
+    actor, critic = actor_of(preset, n_obs), critics_for(preset, n_obs)
+    actor.load_state_dict(tensors_under(arrays, "actor"))
+    critic.load_state_dict(tensors_under(arrays, "critic"))
+    return actor, critic
 
 
 def collision_cost(preset: PickPreset, step: int) -> float:

@@ -10,7 +10,13 @@ from scipy.special import softmax
 from app.errors import InvalidInput
 from app.policies.checkpoints import pretrained
 from app.policies.checkpoints.checkpoint import pack
-from app.policies.inference.recalibration import fit_map, recalibrated, with_timeout
+from app.policies.inference.recalibration import (
+    BETWEEN,
+    fit_map,
+    narrowed,
+    recalibrated,
+    with_timeout,
+)
 from app.policies.inference.value_networks import ValueNetworks
 
 
@@ -76,6 +82,37 @@ def test_recalibrated_policy_predicts_the_map_and_acts_as_before():
     assert record["from"] == shipped.sha256
     assert sum(record["outcomes"].values()) == 400
     assert made.sha256 != shipped.sha256
+
+
+def test_outcomes_of_a_cell_narrow_the_offsets_between_cells():
+    """A hundred outcomes at even odds have the information 25; 0.98 is half of 1.96."""
+    half = np.tile((0.5, 0.5, 0.0), (100, 1))
+    found = narrowed(np.tile(np.float32((-0.98, 0.98)), (3, 1)), half)
+    left = 0.98 / np.sqrt(1.0 + 25.0 / 4.0)
+    np.testing.assert_allclose(found, [(-left, left), (-left, left), (-0.98, 0.98)], rtol=1e-6)
+
+
+def test_recalibrated_intervals_are_narrower_and_older_checkpoints_have_those_of_the_fit():
+    shipped = pretrained.load("pick")
+    obs = np.random.default_rng(1).normal(0.0, 0.3, (60, 199)).astype(np.float32)
+
+    def width(checkpoint):
+        _, _, found = ValueNetworks(checkpoint).evaluate(obs)
+        assert found is not None
+        return float((found.high - found.low)[:, 0].mean())
+
+    _, _, predicted = ValueNetworks(shipped).evaluate(obs)
+    assert predicted is not None
+    rng = np.random.default_rng(2)
+    outcome = np.array([rng.choice(3, p=one / one.sum()) for one in predicted.probability])
+    after = recalibrated(shipped, predicted.probability.astype(float), outcome)
+    older = pack(
+        shipped.manifest,
+        {name: one for name, one in shipped.arrays().items() if name != BETWEEN},
+    )
+    assert width(older) < width(after) < 0.8 * width(shipped)
+    again = recalibrated(older, predicted.probability.astype(float), outcome)
+    assert BETWEEN not in again.arrays()
 
 
 def test_too_few_outcomes_and_policies_without_probabilities_are_refused():

@@ -12,6 +12,7 @@ from app.policies.training.pick import (
     batch_of,
     collision_cost,
     curve_batch,
+    people_of_cells,
     settings_of,
     start,
     start_range,
@@ -73,6 +74,21 @@ def test_every_episode_that_begins_within_the_steps_is_learned_to_its_end():
     assert data.time_s.min() > 0.0 and data.time_s.max() > 1.0
     none = collect(batch, *networks, n_steps=0, seed=3, should_stop=lambda: False)
     assert len(none.obs) == 0
+
+
+def test_people_of_a_cell_are_of_one_kind_and_cells_are_drawn_as_episodes_are():
+    people = PickPreset().people
+    cells = people_of_cells(people, 2000, seed=3)
+    paces = np.array([one.human_pace for one in cells])
+    assert all(one.human_pace == one.human_pace_max and not one.human_absent for one in cells)
+    assert 0.6 <= paces.min() < 0.65 and 1.9 < paces.max() <= 2.0
+    assert paces.mean() == pytest.approx(0.6 + 1.4 / 3.0, abs=0.04)
+    for field, share in (("human_off_task", 0.3), ("human_at_rest", 0.25)):
+        drawn = [getattr(one, field) for one in cells]
+        assert set(drawn) == {0.0, 1.0} and np.mean(drawn) == pytest.approx(share, abs=0.04)
+    two = np.mean([one.n_people == 2 for one in cells])
+    assert two == pytest.approx(0.65**2, abs=0.04)
+    assert people_of_cells(people, 5, seed=3) == cells[:5]
 
 
 def test_monitored_preset_steps_under_the_layer_with_the_settings_of_the_cell():

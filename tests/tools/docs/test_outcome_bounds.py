@@ -12,6 +12,7 @@ def test_every_kind_has_a_fit_of_its_own_on_the_same_predictions(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(pick, "MIN_EPISODES", 10)
+    monkeypatch.setattr(pick, "CELLS", 2)
     checkpoint = Recorder().run(preset_of("pick-td3", TINY)).checkpoint
     result = measured(checkpoint, EvaluationRequest(episodes=30, seed=5))
     assert result["checkpoint"] == checkpoint.sha256

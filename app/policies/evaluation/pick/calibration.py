@@ -59,8 +59,8 @@ class _Predictions:
         self.times: list[Vec] = []
         """Time since the start [s], (k,)."""
         self.predictions: list[Vec] = []
-        """Probabilities of success and contact, half widths of their intervals, and expected
-        times to success [s], (k, 5)."""
+        """Probabilities of success and contact, lower and upper ends of their intervals, and
+        expected times to success [s], (k, 7)."""
 
     def __call__(self, view: SelectionInput) -> Index:
         wanted, now_s = view.first | (self._at[view.rows] == self._step), self._step * self._dt
@@ -140,13 +140,14 @@ def calibration_row(evaluator: Evaluator, name: str, seed: int) -> Json:
     corrected = _recalibrated(found, run.outcome, kept, seed)
     for k, (what, outcome) in enumerate((("success", SUCCESS), ("contact", COLLISION))):
         happened = run.outcome[kept] == outcome
-        row[what] = calibration(found[:, k], found[:, 2 + k], happened, kept, seed)
+        interval = found[:, (2 + k, 4 + k)]
+        row[what] = calibration(found[:, k], interval, happened, kept, seed)
         row[what]["recalibrated"] = {
             size: _errors(one[:, k], happened) for size, one in corrected.items()
         }
     won = run.outcome[kept] == SUCCESS
     left_s = run.duration_s[kept] - np.concatenate(rule.times)
-    return row | times_of(found[won, 4], left_s[won])
+    return row | times_of(found[won, 6], left_s[won])
 
 
 def _shorten(batch: PickBatch, seed: int) -> None:
@@ -157,7 +158,7 @@ def _shorten(batch: PickBatch, seed: int) -> None:
 
 def calibration(
     probability: Vec,
-    spread: Vec,
+    interval: Vec,
     happened: Flags,
     episode: Index,
     seed: int,
@@ -166,7 +167,7 @@ def calibration(
 
     Args:
         probability: Predictions, shape (n,).
-        spread: Half widths of their 95 % intervals, shape (n,).
+        interval: Lower and upper ends of their 95 % intervals, shape (n, 2).
         happened: Whether each event happened, shape (n,).
         episode: Number of the episode of each, shape (n,).
         seed: Seed of the chance level.
@@ -180,7 +181,8 @@ def calibration(
             "probability": float(probability[part].mean()),
             "rate": float(happened[part].mean()),
             "n": len(part),
-            "spread": float(spread[part].mean()),
+            "low": float(interval[part, 0].mean()),
+            "high": float(interval[part, 1].mean()),
         }
         for part in parts
     ]

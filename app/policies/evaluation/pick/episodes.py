@@ -62,9 +62,9 @@ class SelectionInput:
     first: bool
     """Whether this is the first step."""
     outcomes: Vec | None
-    """Probabilities of success and contact, the half widths of their intervals and the expected
-    time to success [s], 0 where there are fewer candidates, shape (n, k, 5); None where the
-    checkpoint predicts none."""
+    """Probabilities of success and contact, the lower and the upper ends of their intervals and
+    the expected time to success [s], 0 where there are fewer candidates, shape (n, k, 7); None
+    where the checkpoint predicts none."""
     rows: Index
     """Indices of the environments, shape (n,)."""
 
@@ -326,8 +326,9 @@ class Evaluator:
         clearances[owner, place] = goal_clearance(obs)
         outcomes = None
         if predicted is not None:
-            outcomes = np.zeros((len(rows), width, 5))
-            parts = predicted.probability[:, :2], predicted.spread[:, :2], predicted.time_s
+            outcomes = np.zeros((len(rows), width, 7))
+            three = predicted.probability, predicted.low, predicted.high
+            parts = *(one[:, :2] for one in three), predicted.time_s
             outcomes[owner, place] = np.column_stack(parts)
         view = SelectionInput(
             values=values,

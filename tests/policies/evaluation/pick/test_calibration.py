@@ -18,8 +18,8 @@ def drawn(n: int = 20_000):
 
 def measured(probability, happened, spread: float = 0.0):
     """Return the measures of predictions of an episode each."""
-    n = len(probability)
-    return calibration(probability, np.full(n, spread), happened, np.arange(n), 1)
+    interval = np.column_stack([probability - spread, probability + spread])
+    return calibration(probability, interval, happened, np.arange(len(probability)), 1)
 
 
 def test_calibrated_probabilities_have_an_error_at_the_level_of_chance():
@@ -33,7 +33,7 @@ def test_calibrated_probabilities_have_an_error_at_the_level_of_chance():
 def test_predictions_with_one_outcome_err_more_by_chance():
     probability, happened = drawn(1000)
     apart = measured(probability, happened)["ece_floor"]
-    pairs = np.repeat(probability, 2), np.zeros(2000), np.repeat(happened, 2)
+    pairs = np.repeat(probability, 2), np.zeros((2000, 2)), np.repeat(happened, 2)
     both = calibration(*pairs, np.repeat(np.arange(1000), 2), 1)["ece_floor"]
     assert both == pytest.approx(apart, rel=0.05)  # twice the predictions tell no more
     alone = calibration(*pairs, np.arange(2000), 1)["ece_floor"]
