@@ -38,14 +38,16 @@ def cases(result: Json) -> Figure:
 
 
 def reliability(result: Json) -> Figure:
-    """Draw observed rates over predicted probabilities, by kind of people."""
+    """Draw observed rates and intervals over predicted probabilities, by kind of people."""
     rows = result["results"]
     figure, axes = panels(2, -(-len(rows) // 2), 5.6, sharex=True, sharey=True)
     for view, row in zip(axes.flat, rows, strict=False):
         for outcome, colour in (("success", GREEN), ("contact", RED)):
             bins = row[outcome]["bins"]
-            found = [(one["probability"], one["rate"]) for one in bins]
-            view.plot(*100.0 * np.array(found).T, "o-", ms=3, color=colour, label=outcome)
+            keys = ("probability", "rate", "low", "high")
+            mean, rate, low, high = 100.0 * np.array([[one[k] for k in keys] for one in bins]).T
+            view.plot(mean, rate, "o-", ms=3, color=colour, label=outcome)
+            view.fill_between(mean, low, high, color=colour, alpha=0.12, lw=0)
         view.plot([0, 100], [0, 100], color=GREY, lw=0.9)
         view.set_title(row["name"])
     axes[0, 0].legend(loc="upper left")

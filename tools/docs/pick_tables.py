@@ -1,6 +1,7 @@
 """Tables of the pick protocols with forms of their own: cases, calibration, SSM, pairs."""
 
 from collections.abc import Callable, Mapping
+from statistics import fmean
 
 from tools.docs.headline import percent, share
 from tools.docs.results import Json
@@ -70,7 +71,8 @@ def _variants(rows: list[Json]) -> list[list[str]]:
 def _calibration(rows: list[Json]) -> list[list[str]]:
     head = ["", "outcome", "predictions", "rate [%]", "mean [%]", "ECE [%]", "by chance [%]"]
     more = ["ECE after 200 [%]", "ECE after half [%]", "Brier after half"]
-    lines = [[*head, "rate inside interval [bins]", "Brier", "constant", "AUC", *more]]
+    head += ["rate inside interval [bins]", "width [points]"]
+    lines = [[*head, "Brier", "constant", "AUC", *more]]
     for row in rows:
         for outcome in ("success", "contact"):
             one: Json = row[outcome]
@@ -86,6 +88,7 @@ def _calibration(rows: list[Json]) -> list[list[str]]:
                         for key in ("rate", "mean", "ece", "ece_floor")
                     ),
                     _covered(one["bins"]),
+                    f"{100.0 * fmean(part['high'] - part['low'] for part in one['bins']):.1f}",
                     f"{one['brier']:.4f}",
                     f"{one['brier_constant']:.4f}",
                     auc,
@@ -98,7 +101,7 @@ def _calibration(rows: list[Json]) -> list[list[str]]:
 
 def _covered(bins: list[Json]) -> str:
     """Return in how many bins the observed rate lies inside the mean 95 % interval."""
-    inside = [abs(one["rate"] - one["probability"]) <= one["spread"] for one in bins]
+    inside = [one["low"] <= one["rate"] <= one["high"] for one in bins]
     return f"{sum(inside)} of {len(inside)}"
 
 

@@ -9,12 +9,18 @@ from app.policies.checkpoints.checkpoint import Checkpoint
 
 SHA256 = {
     "pick": "056dc971847b749bfc306bf0cca70ef9a8df849a5fd31405143106037fdf0f05",
-    "pick-monitored": "a17dbf2546f79da5853fb9a92274666bc0f00108b792a71ab8057f720e34b263",
+    "pick-monitored": "1bb1ece65bea9796d8d662fa1d4c2e353c28b1bf88d0e21998452a433d716a37",
     "sorting-e0": "7f1ffee69a2a4e1ab6eda76b5b4ff158a7b35ac23c60adecb4a3b5d0cbcb9555",
     "sorting-e1": "932b690abc9780c13a1a3eb5287f4d0f0d5715c846c23ae7f89bcfb7f68d9b9a",
     "reach": "2b95d1957f4b7d51b6c5f7bb3f02a6992d64940d37505005569d532755ffa7ce",
 }
 """Names of the shipped checkpoints and their ids."""
+SAME_DECISIONS = {
+    "7569aaa1f7cafa18768f2322e93864af1f391f80ffcb0d67bf78342b6fcc91f1": "pick",
+    "a17dbf2546f79da5853fb9a92274666bc0f00108b792a71ab8057f720e34b263": "pick-monitored",
+}
+"""Ids that were shipped before, with the same actions, values and probabilities of outcomes but
+other intervals. Results that do not depend on intervals hold for what is shipped now."""
 ALIASES = tuple(SHA256)
 """Names of the shipped checkpoints."""
 
