@@ -15,6 +15,7 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
+import scipy  # loads its subpackages where they are first used
 import torch
 from numpy.typing import NDArray
 from torch import nn
@@ -39,9 +40,9 @@ LEAST_BATCHES = 16
 LEAST_SPREAD = 1e-3
 """Spread that errors are compared with where the members agree more closely: one factor widens
 all intervals, so that small errors of nearly certain outcomes would make the others useless."""
-OFFSET_STD, NEWTON_STEPS = 2.0, 12
-"""Standard deviation of the prior of the offset in a cell, which keeps it finite where an
-outcome never happens, and steps of its fit."""
+OFFSET_STD, MOST_OFFSET = 2.0, 30.0
+"""Standard deviation of the prior of an offset, which keeps it small where an outcome never
+happens, and a bound that it therefore does not reach."""
 TIME_WEIGHT = 0.05
 """Weight of the squared error of the time [1/s^2], relative to the cross-entropy."""
 
@@ -246,12 +247,11 @@ def _offset(probability: NDArray[np.float32], data: OutcomeData, outcome: int) -
         data: What they were made for.
         outcome: Index of the outcome.
     """
-    inside = np.clip(probability.astype(np.float64), CERTAIN, 1.0 - CERTAIN)
-    odds, happened = np.log(inside / (1.0 - inside)), data.label == outcome
-    weight = 1.0 / np.bincount(data.episode)[data.episode]
-    offset = 0.0
-    for _ in range(NEWTON_STEPS):
-        now = 1.0 / (1.0 + np.exp(-odds - offset))
-        slope = weight @ (happened - now) - offset / OFFSET_STD**2
-        offset += slope / (weight @ (now * (1.0 - now)) + 1.0 / OFFSET_STD**2)
-    return float(offset)
+    odds = scipy.special.logit(np.clip(probability.astype(np.float64), CERTAIN, 1.0 - CERTAIN))
+    happened, weight = data.label == outcome, 1.0 / np.bincount(data.episode)[data.episode]
+
+    def slope(offset: float) -> float:
+        missing = weight @ (happened - scipy.special.expit(odds + offset))
+        return float(missing - offset / OFFSET_STD**2)
+
+    return float(scipy.optimize.brentq(slope, -MOST_OFFSET, MOST_OFFSET))

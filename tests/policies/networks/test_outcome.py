@@ -105,6 +105,8 @@ def test_the_offset_of_a_cell_is_that_of_its_rate_and_finite_without_an_outcome(
     np.testing.assert_allclose(found[1], (0.0, 1.0), atol=0.1)
     never = offsets_between(certain_head(1.5), [cell_with(1.0, 5000, rng)])
     assert np.isfinite(never).all() and never[1, 0] < -4.0
+    unforeseen = offsets_between(certain_head(-7.0), [cell_with(0.4, 5000, rng)])
+    np.testing.assert_allclose(unforeseen[0], (0.0, 6.6), atol=0.1)
 
 
 def test_a_fit_stops_between_two_passes_over_the_data() -> None:
