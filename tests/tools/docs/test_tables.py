@@ -71,9 +71,11 @@ def test_training_seeds_are_columns_and_the_table_stays_without_them(tmp_path: P
     text = "<!-- begin pick-seeds -->\nold\n<!-- end pick-seeds -->\n"
     assert render(text, tmp_path) == text
     head, _, *lines = render(text, ROOT / "docs/results").splitlines()[1:-1]
-    assert head == "| training seed | 1, shipped | 2 | 3 |"
-    rates = [line for line in lines if line.startswith("| one target: success")]
-    assert len(rates) == 1 and rates[0].count(" % (") == 3
+    assert head == "| training seed | 1, shipped | 2 | 3 | mean |"
+    (rates,) = (line for line in lines if line.startswith("| one target: success"))
+    *seeds, mean = (float(cell.split("%")[0]) for cell in rates.split("|")[2:-1])
+    assert rates.count(" % (") == len(seeds) == 3
+    assert mean == pytest.approx(sum(seeds) / 3, abs=0.1)
 
 
 def test_line_below_a_table_says_how_it_was_measured() -> None:
