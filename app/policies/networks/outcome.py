@@ -140,13 +140,9 @@ def combine_members(
             else:
                 inside = min(max(mean, CERTAIN), 1.0 - CERTAIN)
                 spread = widen * math.sqrt(square / (members - 1)) / (inside * (1.0 - inside))
-                odds, least, most = (
-                    math.log(inside / (1.0 - inside)),
-                    between[k, 0],
-                    between[k, 1],
-                )
-                below = math.sqrt((1.96 * spread) ** 2 + least**2)
-                above = math.sqrt((1.96 * spread) ** 2 + most**2)
+                odds = math.log(inside / (1.0 - inside))
+                below = math.sqrt((1.96 * spread) ** 2 + between[k, 0] ** 2)
+                above = math.sqrt((1.96 * spread) ** 2 + between[k, 1] ** 2)
                 to.probability[i, k] = mean
                 to.low[i, k] = min(mean, 1.0 / (1.0 + math.exp(below - odds)))
                 to.high[i, k] = max(mean, 1.0 / (1.0 + math.exp(-above - odds)))
