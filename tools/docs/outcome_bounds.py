@@ -39,6 +39,8 @@ from tools.fit_outcomes import with_outcomes
 logger = logging.getLogger(__name__)
 RESULT = RESULTS / "outcome-bounds.json"
 """What the command writes."""
+SEED = 21
+"""Seed of the episodes, that of the results of ``risk-calibration``."""
 
 
 def fitted_beside(checkpoint: Checkpoint, settings: PickSettings, cell: Cell) -> Checkpoint:
@@ -102,7 +104,8 @@ def main() -> None:
     logging.basicConfig(level=logging.INFO, format="%(message)s")
     torch.set_num_threads(1)
     motions = clean_runs(files)
-    write_result(RESULT, measured(pretrained.load("pick"), EvaluationRequest(motions=motions)))
+    result = measured(pretrained.load("pick"), EvaluationRequest(seed=SEED, motions=motions))
+    write_result(RESULT, result)
 
 
 if __name__ == "__main__":
