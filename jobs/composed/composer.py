@@ -3,18 +3,14 @@
 import logging
 import time
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import replace
-from typing import Any, ClassVar
+from typing import ClassVar
 
 from app.errors import NotFound, ServiceError
 from app.storage_errors import LeaseLost, StorageFull, StorageUnavailable
 from app.store import composed_jobs
 from app.store.engine import Store
-from app.store.jobs import create_job
 from app.store.records import JobRecord
-from jobs.spec import parse_spec
 
 logger = logging.getLogger(__name__)
 
@@ -70,12 +66,3 @@ class Composer(ABC):
         logger.warning("%s", reason, extra={"job_id": job.id})
         with suppress(NotFound):  # it was deleted since
             composed_jobs.end(store, job.id, "failed", error=reason)
-
-
-def queue_part(
-    store: Store, whole: JobRecord, number: int, name: str, key: str, body: Mapping[str, Any]
-) -> None:
-    """Queue a trial or evaluation; once, however often this is repeated, with any priority."""
-    new = parse_spec(body).new_job()
-    new = replace(new, name=name, priority=whole.priority, part_of=whole.id, trial=number)
-    create_job(store, new, idempotency_key=key, submitted=new.spec)

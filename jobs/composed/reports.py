@@ -13,7 +13,8 @@ from app.provenance import describe
 from app.store import composed_jobs, jobs
 from app.store.engine import Store
 from app.store.records import EarlyEnd, JobRecord
-from jobs.composed.composer import Composer, queue_part
+from jobs.composed.composer import Composer
+from jobs.composed.parts import queue_part
 from jobs.spec import ReportSpec, parse_spec
 
 

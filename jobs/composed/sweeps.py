@@ -27,7 +27,8 @@ from app.policies.configs.fields import entries
 from app.store import composed_jobs, metrics
 from app.store.engine import Store
 from app.store.records import JobRecord, MetricRow
-from jobs.composed.composer import Composer, queue_part
+from jobs.composed.composer import Composer
+from jobs.composed.parts import queue_part
 from jobs.spec import SweepSpec, parse_spec
 
 optuna.logging.set_verbosity(optuna.logging.ERROR)
