@@ -114,6 +114,8 @@ class ValueNetworks:
                 module.load_state_dict(given[name])
             except RuntimeError as error:
                 raise CheckpointMismatch("tensors", f"those of {name}", str(error)) from error
+        self.between = outcome.between.numpy()
+        """Least and greatest offset of the log-odds of each outcome between cells, (3, 2)."""
         base, fade = n, None
         if isinstance(actor, ResidualActor):
             base, fade = actor.base.start, actor.fade
@@ -133,7 +135,7 @@ class ValueNetworks:
                 mean=outcome.mean.numpy(),
                 scale=outcome.scale.numpy(),
                 widen=float(outcome.widen),
-                between=outcome.between.numpy(),
+                between=self.between,
             )
         )
         self._work = new_workspace(self._networks, self._n, CONTROLLED)  # kept by the GIL

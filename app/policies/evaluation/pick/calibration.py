@@ -12,9 +12,9 @@ The expected time to success is compared with the time that passed in the episod
 succeeded.
 
 The probabilities were fitted to the mixture of people of the training; an observation does not
-reveal the kind of a person. ``recalibrated`` states ECE and Brier score after a recalibration
-(``recalibration.py``) by few and by many predictions beside the same kind of people, measured
-on the half of the episodes that the fit did not use.
+reveal the kind of a person. ``recalibrated`` states ECE, Brier score and the bins with their
+intervals after a recalibration (``recalibration.py``) by few and by many predictions beside the
+same kind of people, measured on the half of the episodes that the fit did not use.
 
 Source: Guo et al., *On calibration of modern neural networks* (2017); Brier (1950).
 """
@@ -32,7 +32,8 @@ from app.policies.evaluation.pick.people import beside_recordings
 from app.policies.evaluation.pick.tasks import FASTER, PAIR, settings_of
 from app.policies.evaluation.rows import EvaluationRequest, Json
 from app.policies.evaluation.statistics import Flags, Index
-from app.policies.inference.recalibration import fit_map, with_timeout
+from app.policies.inference.recalibration import OutcomeMap, fit_map, narrowed, with_timeout
+from app.policies.networks.outcome import CERTAIN, Floats
 from app.policies.training.pick import work_of, workers_of
 from app.sim.core.arrays import Vec
 from app.sim.pick.batch import PickBatch, PickSettings
@@ -137,13 +138,14 @@ def calibration_row(evaluator: Evaluator, name: str, seed: int) -> Json:
     kept = np.concatenate(rule.rows)
     found = np.concatenate(rule.predictions)
     row: Json = {"name": name, "n": batch.n_envs, "predictions": len(kept)}
-    corrected = _recalibrated(found, run.outcome, kept, seed)
+    after = _recalibrated(found, run.outcome, kept, seed, evaluator.networks.between)
     for k, (what, outcome) in enumerate((("success", SUCCESS), ("contact", COLLISION))):
         happened = run.outcome[kept] == outcome
-        interval = found[:, (2 + k, 4 + k)]
-        row[what] = calibration(found[:, k], interval, happened, kept, seed)
+        row[what] = calibration(found[:, k], found[:, (2 + k, 4 + k)], happened, kept, seed)
         row[what]["recalibrated"] = {
-            size: _errors(one[:, k], happened) for size, one in corrected.items()
+            size: _errors(one[:, k], happened)
+            | {"bins": _compared(one[:, k], one[:, (2 + k, 4 + k)], happened)}
+            for size, one in after.items()
         }
     won = run.outcome[kept] == SUCCESS
     left_s = run.duration_s[kept] - np.concatenate(rule.times)
@@ -176,16 +178,6 @@ def calibration(
     drawn = np.random.default_rng(seed).random((200, episode.max(initial=0) + 1))
     floor = [_ece(probability, one[episode] < probability, parts) for one in drawn]
     rate = happened.mean()
-    bins = [
-        {
-            "probability": float(probability[part].mean()),
-            "rate": float(happened[part].mean()),
-            "n": len(part),
-            "low": float(interval[part, 0].mean()),
-            "high": float(interval[part, 1].mean()),
-        }
-        for part in parts
-    ]
     return {
         "rate": float(rate),
         "mean": float(probability.mean()),
@@ -193,8 +185,22 @@ def calibration(
         "ece_floor": float(np.mean(floor)),
         "brier_constant": float(rate * (1.0 - rate)),
         "auc": _auc(probability, happened),
-        "bins": bins,
+        "bins": _compared(probability, interval, happened),
     }
+
+
+def _compared(probability: Vec, interval: Vec, happened: Flags) -> list[Json]:
+    """Return mean probability, rate and mean interval of each bin; see :func:`calibration`."""
+    return [
+        {
+            "probability": float(probability[part].mean()),
+            "rate": float(happened[part].mean()),
+            "n": len(part),
+            "low": float(interval[part, 0].mean()),
+            "high": float(interval[part, 1].mean()),
+        }
+        for part in _bins(probability)
+    ]
 
 
 def times_of(predicted: Vec, passed: Vec) -> Json:
@@ -219,27 +225,60 @@ def times_of(predicted: Vec, passed: Vec) -> Json:
     }
 
 
-def _recalibrated(found: Vec, outcome: Index, episode: Index, seed: int) -> dict[str, Vec]:
-    """Return probabilities after recalibrations, each half of the episodes by the other one.
+def _recalibrated(
+    found: Vec, outcome: Index, episode: Index, seed: int, between: Floats
+) -> dict[str, Vec]:
+    """Return predictions after recalibrations, each half of the episodes by the other one.
 
     Args:
-        found: Predicted probabilities of success and contact, in the first columns of n rows.
+        found: Probabilities of success and contact, lower and upper ends of their intervals,
+            in the first columns of n rows.
         outcome: Outcome of each episode, shape (n_episodes,).
         episode: Number of the episode of each prediction, shape (n,).
         seed: Seed of the halves.
+        between: The checkpoint's offsets of log-odds between cells, shape (3, 2).
 
     Returns:
-        Probabilities, shape (n, 3), after recalibration by FEW predictions and by a half.
+        Columns as in ``found``, shape (n, 6), after recalibration by FEW predictions and by a
+        half.
     """
     predicted = with_timeout(found[:, 0], found[:, 1])
     label = np.where(outcome == SUCCESS, 0, np.where(outcome == COLLISION, 1, 2))[episode]
     place = np.random.default_rng(seed).permutation(len(outcome))[episode]
     halves = np.split(np.argsort(place), [np.count_nonzero(2 * place < len(outcome))])
-    corrected = {name: np.empty((len(label), 3)) for name in ("few", "half")}
+    after = {name: np.empty((len(label), 6)) for name in ("few", "half")}
     for rows, others in (halves, halves[::-1]):
         for name, fitted in (("few", others[:FEW]), ("half", others)):
-            corrected[name][rows] = fit_map(predicted[fitted], label[fitted])(predicted[rows])
-    return corrected
+            mapped = fit_map(predicted[fitted], label[fitted])
+            left = narrowed(between, mapped(predicted[fitted]))
+            after[name][rows] = corrected(found[rows, :6], mapped, between, left)
+    return after
+
+
+def corrected(found: Vec, mapped: OutcomeMap, between: Floats, left: Floats) -> Vec:
+    """Return the predictions of a recalibrated policy from those that it made before.
+
+    Args:
+        found: Probabilities of success and contact, lower and upper ends of their intervals,
+            shape (n, 6).
+        mapped: The correction of the probabilities.
+        between: Offsets of log-odds between cells before, shape (3, 2).
+        left: What is left of them, shape (3, 2).
+    """
+    after = np.empty_like(found)
+    after[:, :2] = mapped(with_timeout(found[:, 0], found[:, 1]))[:, :2]
+    for end, at in enumerate((slice(2, 4), slice(4, 6))):
+        whole = _log_odds(found[:, at]) - _log_odds(found[:, :2])
+        spread = np.maximum(0.0, whole**2 - between[:2, end] ** 2)  # that of the ensemble
+        beyond = np.sqrt(mapped.slope**2 * spread + left[:2, end] ** 2)
+        odds = _log_odds(after[:, :2]) + np.copysign(beyond, end - 0.5)
+        after[:, at] = scipy.special.expit(odds)
+    return after
+
+
+def _log_odds(probability: Vec) -> Vec:
+    odds: Vec = scipy.special.logit(np.clip(probability, CERTAIN, 1.0 - CERTAIN))
+    return odds
 
 
 def _errors(probability: Vec, happened: Flags) -> dict[str, float]:

@@ -185,7 +185,7 @@ class Evaluator:
     """
 
     def __init__(self, networks: ValueNetworks, batch: PickBatch) -> None:
-        self._networks, self.batch = networks, batch
+        self.networks, self.batch = networks, batch
         self._workspace = observation_workspace_of(batch.cell)
         grasp, stations = batch.settings.grasp, batch.world.stations
         self._station_q, self._grasp_q, _ = target_configurations(batch.arm, grasp, stations)
@@ -303,7 +303,7 @@ class Evaluator:
         there = stations >= 0
         owner, place = np.nonzero(there)
         env, station = rows[owner], stations[owner, place]
-        obs = np.empty((len(env), self._networks.n_obs), dtype=np.float32)
+        obs = np.empty((len(env), self.networks.n_obs), dtype=np.float32)
         current = place == chosen[owner]
         phase = np.where(current, state.phase[env], APPROACH)
         states = queries(
@@ -315,7 +315,7 @@ class Evaluator:
         )
         floor_z, left = batch.world.people.floor_z, state.time_left[env]
         observe_batch(batch.arm, floor_z, states, left, self._workspace, obs)
-        act, value, predicted = self._networks.evaluate(obs, predict=predicts)
+        act, value, predicted = self.networks.evaluate(obs, predict=predicts)
         actions = np.zeros((len(rows), width, act.shape[1]), dtype=np.float32)
         values = np.full((len(rows), width), -np.inf, dtype=np.float32)
         distances = np.full((len(rows), width), np.inf)

@@ -6,8 +6,12 @@ import pytest
 from app.errors import InvalidInput
 from app.policies.checkpoints import checkpoint as formats
 from app.policies.checkpoints import pretrained
-from app.policies.evaluation.pick.calibration import calibration, times_of
+from app.policies.evaluation.pick.calibration import calibration, corrected, times_of
 from app.policies.evaluation.registry import evaluate
+from app.policies.inference.recalibration import BETWEEN, fit_map, narrowed, recalibrated
+from app.policies.inference.value_networks import ValueNetworks
+from app.sim.cells.cell import load_cell
+from app.sim.pick.batch import WHOLE_PICK, PickBatch
 
 
 def drawn(n: int = 20_000):
@@ -74,6 +78,24 @@ def test_a_checkpoint_without_probabilities_is_refused():
         evaluate("risk-calibration", formats.pack(shipped.manifest, plain), episodes=5)
 
 
+def test_predictions_after_a_recalibration_are_those_of_the_recalibrated_policy():
+    shipped, obs = pretrained.load("pick"), PickBatch(load_cell(), 300, 5, WHOLE_PICK).reset()
+
+    def predictions(checkpoint):
+        _, _, found = ValueNetworks(checkpoint).evaluate(obs)
+        columns = found.probability[:, :2], found.low[:, :2], found.high[:, :2]
+        return found.probability.astype(float), np.hstack(columns).astype(float)
+
+    probability, before = predictions(shipped)
+    outcome = np.random.default_rng(2).choice(3, 300, p=(0.7, 0.2, 0.1))
+    _, wanted = predictions(recalibrated(shipped, probability, outcome))
+    mapped, between = fit_map(probability, outcome), shipped.arrays()[BETWEEN]
+    left = narrowed(between, mapped(probability))
+    found = corrected(before, mapped, between, left)
+    assert np.abs(found - wanted).max() < 0.02 < np.abs(before - wanted).max() / 10
+    assert (np.diff(wanted[:, [2, 4]]) < np.diff(before[:, [2, 4]])).mean() > 0.9
+
+
 def test_every_kind_of_people_has_a_row_with_both_outcomes():
     result = evaluate("risk-calibration", pretrained.load("pick"), episodes=60, seed=5)
     rows = {row["name"]: row for row in result["results"]}
@@ -89,7 +111,14 @@ def test_every_kind_of_people_has_a_row_with_both_outcomes():
         for what in ("success", "contact"):
             assert sum(one["n"] for one in row[what]["bins"]) == row["predictions"]
             assert 0.0 <= row[what]["mean"] <= 1.0
-            assert row[what]["recalibrated"]["half"]["brier"] < 0.25
+            for after in row[what]["recalibrated"].values():
+                assert after["brier"] < 0.25
+                pairs = list(zip(row[what]["bins"], after["bins"], strict=True))
+                assert all(b["n"] == a["n"] and b["low"] < a["high"] for b, a in pairs)
+                assert (
+                    np.mean([a["high"] - a["low"] < b["high"] - b["low"] for b, a in pairs])
+                    > 0.7
+                )
         assert abs(row["expected_time_s"] - row["time_to_success_s"]) < 1.5, row["name"]
         assert row["time_ece_s"] <= row["time_error_s"] < row["time_error_constant_s"] + 0.5
 
