@@ -13,8 +13,9 @@ succeeded.
 
 The probabilities were fitted to the mixture of people of the training; an observation does not
 reveal the kind of a person. ``recalibrated`` states ECE, Brier score and the bins with their
-intervals after a recalibration (``recalibration.py``) by few and by many predictions beside the
-same kind of people, measured on the half of the episodes that the fit did not use.
+intervals after a recalibration (``recalibration.py``) by one prediction of each of few and of
+many episodes beside the same kind of people, measured on the half of the episodes that the fit
+did not use.
 
 Source: Guo et al., *On calibration of modern neural networks* (2017); Brier (1950).
 """
@@ -43,7 +44,7 @@ DEFAULT_EPISODES = 2000
 BINS = 10
 """Bins of equal counts."""
 FEW = 200
-"""Predictions of a recalibration by few of them."""
+"""Episodes of a recalibration by few of them."""
 LATEST_S = 4.0
 """Latest time at which a prediction is taken [s]."""
 MIXTURE, SHORT_TIME = "mixture", "short-time"
@@ -235,20 +236,25 @@ def _recalibrated(
             in the first columns of n rows.
         outcome: Outcome of each episode, shape (n_episodes,).
         episode: Number of the episode of each prediction, shape (n,).
-        seed: Seed of the halves.
+        seed: Seed of the halves, and of the prediction of each episode that is used.
         between: The checkpoint's offsets of log-odds between cells, shape (3, 2).
 
     Returns:
-        Columns as in ``found``, shape (n, 6), after recalibration by FEW predictions and by a
-        half.
+        Columns as in ``found``, shape (n, 6), after recalibration by FEW episodes and by all of
+        a half.
     """
     predicted = with_timeout(found[:, 0], found[:, 1])
     label = np.where(outcome == SUCCESS, 0, np.where(outcome == COLLISION, 1, 2))[episode]
-    place = np.random.default_rng(seed).permutation(len(outcome))[episode]
+    rng = np.random.default_rng(seed)
+    place = rng.permutation(len(outcome))[episode]
     halves = np.split(np.argsort(place), [np.count_nonzero(2 * place < len(outcome))])
+    mixed = rng.permutation(len(episode))
+    used = np.zeros(len(episode), dtype=np.bool_)
+    used[mixed[np.unique(episode[mixed], return_index=True)[1]]] = True
     after = {name: np.empty((len(label), 6)) for name in ("few", "half")}
     for rows, others in (halves, halves[::-1]):
-        for name, fitted in (("few", others[:FEW]), ("half", others)):
+        known = others[used[others]]
+        for name, fitted in (("few", known[:FEW]), ("half", known)):
             mapped = fit_map(predicted[fitted], label[fitted])
             left = narrowed(between, mapped(predicted[fitted]))
             after[name][rows] = corrected(found[rows, :6], mapped, between, left)
