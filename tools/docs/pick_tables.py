@@ -70,9 +70,10 @@ def _variants(rows: list[Json]) -> list[list[str]]:
 
 def _calibration(rows: list[Json]) -> list[list[str]]:
     head = ["", "outcome", "predictions", "rate [%]", "mean [%]", "ECE [%]", "by chance [%]"]
-    more = ["ECE after 200 [%]", "ECE after half [%]", "Brier after half"]
-    head += ["rate inside interval [bins]", "width [points]"]
-    lines = [[*head, "Brier", "constant", "AUC", *more]]
+    covered = "rate inside interval [bins], its width [points]"
+    more = ["ECE after 200 [%]", covered, "ECE after half [%]", covered]
+    head += [covered]
+    lines = [[*head, "Brier", "constant", "AUC", *more, "Brier after half"]]
     for row in rows:
         for outcome in ("success", "contact"):
             one: Json = row[outcome]
@@ -87,22 +88,26 @@ def _calibration(rows: list[Json]) -> list[list[str]]:
                         f"{100.0 * one[key]:.1f}"
                         for key in ("rate", "mean", "ece", "ece_floor")
                     ),
-                    _covered(one["bins"]),
-                    f"{100.0 * fmean(part['high'] - part['low'] for part in one['bins']):.1f}",
+                    _covered(one),
                     f"{one['brier']:.4f}",
                     f"{one['brier_constant']:.4f}",
                     auc,
-                    *(f"{100.0 * again[kind]['ece']:.1f}" for kind in ("few", "half")),
+                    f"{100.0 * again['few']['ece']:.1f}",
+                    _covered(again["few"]),
+                    f"{100.0 * again['half']['ece']:.1f}",
+                    _covered(again["half"]),
                     f"{again['half']['brier']:.4f}",
                 ]
             )
     return lines
 
 
-def _covered(bins: list[Json]) -> str:
-    """Return in how many bins the observed rate lies inside the mean 95 % interval."""
-    inside = [one["low"] <= one["rate"] <= one["high"] for one in bins]
-    return f"{sum(inside)} of {len(inside)}"
+def _covered(one: Json) -> str:
+    """Return in how many bins the rate lies inside the mean 95 % interval, and its width."""
+    bins: list[Json] = one["bins"]
+    inside = [part["low"] <= part["rate"] <= part["high"] for part in bins]
+    width = fmean(part["high"] - part["low"] for part in bins)
+    return f"{sum(inside)} of {len(inside)}, {100.0 * width:.1f}"
 
 
 def _monitored(rows: list[Json]) -> list[list[str]]:
