@@ -76,6 +76,9 @@ _NEAR_PERSON = Person(q=human.rest_posture(0.0, 1.0, -math.pi / 2.0), qd=np.zero
 """Person in front of the robot."""
 _MAX_PROBED = 32
 """Most targets by which the numbers of a policy are checked."""
+_ROWS_AT_ONCE = 1024
+"""Most rows of a map, positions times candidates, that are evaluated at once: the compiled
+functions keep the GIL, and other threads run in between."""
 
 
 def select(
@@ -219,20 +222,29 @@ class TaskChooser(TrainedPolicy):
         *,
         terms: ChoiceTerms = FRESH,
     ) -> RiskMap:
-        """Choose beside a person in several postures, in one batch."""
+        """Choose beside a person in several postures, some of them in one batch."""
         started = time.perf_counter()
         query = self._query(q, qd, candidates, terms)
         known, at = checked_people(people), query.state.measured.q
         scenes, clearance = scenes_of(self._arm, self._people, at, known, moved)
-        found = self._evaluate(query, scenes)
-        m, k = found.values.shape
-        rows = np.arange(m) * k + found.chosen
-        risk = None if found.outcomes is None else found.outcomes.probability[rows]
+        (joints, speeds, sizes), n = scenes, len(query.ids)
+        chosen, value = list[NDArray[np.int64]](), list[NDArray[np.float32]]()
+        risk = list[NDArray[np.float32]]()
+        step = max(1, _ROWS_AT_ONCE // n)
+        for k in range(0, len(joints), step):
+            part = slice(k, k + step)
+            found = self._evaluate(query, (joints[part], speeds[part], sizes[part]))
+            rows = np.arange(len(found.chosen)) * n + found.chosen
+            chosen.append(found.chosen)
+            value.append(found.values.ravel()[rows])
+            if found.outcomes is not None:
+                risk.append(found.outcomes.probability[rows])
+        probability = np.concatenate(risk).astype(np.float64) if risk else None
         return RiskMap(
-            chosen=found.chosen,
-            value=found.values.ravel()[rows].astype(np.float64),
-            success=None if risk is None else risk[:, 0].astype(np.float64),
-            contact=None if risk is None else risk[:, 1].astype(np.float64),
+            chosen=np.concatenate(chosen),
+            value=np.concatenate(value).astype(np.float64),
+            success=None if probability is None else probability[:, 0],
+            contact=None if probability is None else probability[:, 1],
             clearance_m=np.minimum(clearance, FARTHEST),
             outside=self._ranges.are_postures_outside(with_known_yaw(moved.q)),
             elapsed_ms=1e3 * (time.perf_counter() - started),
