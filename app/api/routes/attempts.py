@@ -8,6 +8,7 @@ from typing import Annotated, Any
 
 from fastapi import APIRouter, Depends, Path, Query, Request
 from fastapi.encoders import jsonable_encoder
+from pydantic import ValidationError
 from starlette.concurrency import run_in_threadpool
 from starlette.responses import Response
 
@@ -19,7 +20,9 @@ from app.api.schemas.jobs import (
     AttemptStart,
     JobPublic,
 )
+from app.api.schemas.results import EvaluationResult
 from app.api.services import ServicesDep
+from app.api.validation import BodyFault
 from app.errors import NotFound
 from app.policies.checkpoints.upload import join
 from app.policies.configs import presets
@@ -96,6 +99,8 @@ def start_attempt(body: AttemptStart, access: AccessDep) -> None:
 @router.post("/end", status_code=204, summary="End an attempt", responses=WRITE_RESPONSES)
 def end_attempt(body: AttemptEnd, access: AccessDep, services: ServicesDep) -> None:
     """Record the end of the attempt with its result or error."""
+    if body.state == "succeeded" and access.job().kind == "evaluate":
+        _require_evaluation(body.result)
     access.end(EndOfAttempt(**dict(body)))
     services.supervisor.wake()
 
@@ -200,3 +205,16 @@ async def put_attempt_file(
 def get_attempt_file(sha256: str, claim: ClaimDep, services: ServicesDep) -> Response:
     """Return a file that an attempt of the job has stored."""
     return Response(services.worker_uploads.read_file(claim, sha256), media_type=FILE)
+
+
+def _require_evaluation(result: dict[str, Any] | None) -> None:
+    """Check the result of a succeeded evaluation.
+
+    Raises:
+        BodyFault: Members are missing or of another type.
+    """
+    try:
+        EvaluationResult.model_validate(result)
+    except ValidationError as error:
+        faults = [{**one, "loc": ("result", *one["loc"])} for one in error.errors()]
+        raise BodyFault(faults, AttemptEnd) from None

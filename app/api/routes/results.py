@@ -68,15 +68,18 @@ def list_all_evaluations(
     cursor: Annotated[str | None, Query(description="next_cursor of the page before")] = None,
     limit: Annotated[int, Query(ge=1, le=200, description="length of the page")] = 50,
 ) -> EvaluationList:
-    """Return one page of the results of succeeded evaluations, newest first."""
+    """Return one page of the results of succeeded evaluations, newest first.
+
+    A damaged result is left out.
+    """
     if protocol is not None and protocol not in PROTOCOLS:
         raise InvalidInput("protocol", protocol, "is not a protocol", tuple(PROTOCOLS))
     sha256 = services.checkpoints.aliases.get(checkpoint or "", checkpoint)
     page = list_evaluations(
         services.store, protocol=protocol, checkpoint=sha256, cursor=cursor, limit=limit
     )
-    items = [EvaluationPublic.from_domain(job) for job in page.items]
-    return EvaluationList(items=items, next_cursor=page.next_cursor)
+    items = filter(None, map(EvaluationPublic.from_domain, page.items))
+    return EvaluationList(items=list(items), next_cursor=page.next_cursor)
 
 
 @router.get("/jobs/{job_id}/trials", summary="The trials of a sweep")
@@ -100,6 +103,8 @@ def get_report(job_id: str, services: ServicesDep) -> HTMLResponse:
     if job.state != "succeeded" or job.result is None:
         rule = f"of job {job.number}: its page is written at its end"
         raise WrongState("state", job.state, rule, ("succeeded",))
+    if "markdown" not in job.result:  # damaged
+        raise NotFound("report", job_id)
     content = document(str(job.result["markdown"]), f"Tandem, report {job.number}")
     return HTMLResponse(content, headers={"Content-Security-Policy": REPORT_POLICY})
 
@@ -108,6 +113,7 @@ def get_report(job_id: str, services: ServicesDep) -> HTMLResponse:
 def get_evaluation(job_id: str, services: ServicesDep) -> EvaluationPublic:
     """Return the result of a succeeded evaluation, by the id of its job."""
     job = get_job(services.store, job_id)
-    if job.kind != "evaluate" or job.result is None:
+    found = EvaluationPublic.from_domain(job) if job.kind == "evaluate" else None
+    if found is None:
         raise NotFound("evaluation", job_id)
-    return EvaluationPublic.from_domain(job)
+    return found

@@ -3,13 +3,35 @@
 from datetime import datetime
 from typing import Any, Self
 
-from pydantic import Field
+from pydantic import ConfigDict, Field, ValidationError
 
-from app.api.schemas.numbers import Answer, Counts, Sparse
+from app.api.schemas.numbers import Answer, Body, Counts, Finite, Sparse
 from app.store.records import JobRecord
 from jobs.comparison import JobComparison
 
 _OWN = ("protocol", "checkpoint", "seed", "episodes", "results", "cpu_seconds")
+
+
+class EvaluationRow(Body):
+    """A row of the result of an evaluation, with rates and quantities of any name."""
+
+    model_config = ConfigDict(extra="allow")
+
+    name: str
+    n: int
+
+
+class EvaluationResult(Body):
+    """What the result of an evaluation contains at least."""
+
+    model_config = ConfigDict(extra="allow")
+
+    protocol: str
+    checkpoint: str | None = None
+    seed: int
+    episodes: int
+    results: list[EvaluationRow] = Field(min_length=1)
+    cpu_seconds: Finite
 
 
 class EvaluationPublic(Answer):
@@ -31,11 +53,14 @@ class EvaluationPublic(Answer):
     finished_at: datetime | None
 
     @classmethod
-    def from_domain(cls, job: JobRecord) -> Self:
-        """Return the schema of a succeeded evaluation."""
+    def from_domain(cls, job: JobRecord) -> Self | None:
+        """Return the schema of a succeeded evaluation; None: its result cannot be read."""
         result = dict(job.result or {})
         own = {name: result.pop(name, None) for name in _OWN}
-        return cls.from_object(job, **own, conditions=result)
+        try:
+            return cls.from_object(job, **own, conditions=result)
+        except ValidationError:
+            return None
 
 
 class EvaluationList(Answer):

@@ -5,11 +5,37 @@ from typing import Any
 import pytest
 from fastapi.testclient import TestClient
 
+from app.store import completion, jobs
 from app.store.engine import Store
+from app.store.records import Claim, NewJob
 from jobs.checkpoints import shipped
 from tests.api.answers import problem_of
 from tests.api.conftest import ADDRESS, require_description
+from tests.support.databases import claimed
 from tests.support.idle_service import app_of, idle_service
+
+ROW = {"name": "critic", "n": 2, "success": {"mean": 0.5, "low": 0.1, "high": 0.9}}
+RESULT = {
+    "protocol": "pick-single",
+    "seed": 3,
+    "episodes": 2,
+    "results": [ROW],
+    "cpu_seconds": 0.5,
+}
+
+
+@pytest.fixture
+def idle(store: Store, tmp_path: Path) -> Iterator[TestClient]:
+    """A service without workers."""
+    with TestClient(app_of(idle_service(store, tmp_path)), base_url=ADDRESS) as one:
+        one.event_hooks = {"response": [require_description]}
+        yield one
+
+
+def started(store: Store) -> Claim:
+    """Return the attempt of a new evaluation."""
+    jobs.create_job(store, NewJob(kind="evaluate", spec={"kind": "evaluate"}))
+    return claimed(store)[0]
 
 
 @pytest.fixture(scope="module")
@@ -81,3 +107,41 @@ def test_unknown_names_are_refused(client: TestClient) -> None:
     job = client.post("/v1/jobs", json=body).json()
     client.post(f"/v1/jobs/{job['id']}/cancel")
     assert client.get(f"/v1/evaluations/{job['id']}").status_code == 404
+
+
+@pytest.mark.parametrize("result", [{}, {"results": "none"}])
+def test_damaged_result_keeps_no_other_evaluation_from_being_listed(
+    store: Store, idle: TestClient, result: dict[str, Any]
+) -> None:
+    sound, damaged = started(store), started(store)
+    completion.finish(store, sound, result=RESULT)
+    completion.finish(store, damaged, result=result)
+    items = idle.get("/v1/evaluations").json()["items"]
+    assert [(one["id"], one["results"]) for one in items] == [(sound.job_id, [ROW])]
+    problem = problem_of(idle.get(f"/v1/evaluations/{damaged.job_id}"), 404)
+    assert problem["name"] == damaged.job_id
+
+
+@pytest.mark.parametrize(
+    ("result", "field"),
+    [
+        (None, "result"),
+        ({}, "result.protocol"),
+        ({**RESULT, "results": "none"}, "result.results"),
+        ({**RESULT, "results": []}, "result.results"),
+        ({**RESULT, "results": [{"n": 2}]}, "result.results[0].name"),
+        ({**RESULT, "checkpoint": 5}, "result.checkpoint"),
+    ],
+)
+def test_end_of_an_evaluation_with_the_result_of_none_is_refused(
+    store: Store, idle: TestClient, result: object, field: str
+) -> None:
+    claim = started(store)
+    path = f"/v1/jobs/{claim.job_id}/attempts/{claim.attempt}/end"
+    refused = idle.post(path, json={"state": "succeeded", "result": result})
+    assert problem_of(refused, 422)["field"] == field
+    assert jobs.get_job(store, claim.job_id).state == "running"
+    ended = idle.post(path, json={"state": "succeeded", "result": {**RESULT, "more": [1]}})
+    assert ended.status_code == 204
+    found = idle.get(f"/v1/evaluations/{claim.job_id}").json()
+    assert (found["results"], found["conditions"]) == ([ROW], {"more": [1]})

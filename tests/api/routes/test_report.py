@@ -1,6 +1,13 @@
+from pathlib import Path
+
 from fastapi.testclient import TestClient
 
+from app.store import composed_jobs, jobs
+from app.store.engine import Store
+from app.store.records import NewJob
 from tests.api.answers import problem_of
+from tests.api.conftest import ADDRESS
+from tests.support.idle_service import app_of, idle_service
 
 
 def test_report_is_a_page_with_figures_that_loads_nothing(client: TestClient) -> None:
@@ -27,6 +34,15 @@ def test_report_without_a_page_and_other_jobs_are_refused(client: TestClient) ->
     client.post(f"/v1/jobs/{other['id']}/cancel")
     for job_id in (other["id"], "nothing"):
         assert client.get(f"/v1/jobs/{job_id}/report").status_code == 404
+
+
+def test_report_whose_result_is_damaged_has_no_page(store: Store, tmp_path: Path) -> None:
+    job = jobs.create_job(store, NewJob(kind="report", spec={"kind": "report"}))
+    composed_jobs.start(store, job.id)
+    composed_jobs.end(store, job.id, "succeeded", result={})
+    with TestClient(app_of(idle_service(store, tmp_path)), base_url=ADDRESS) as idle:
+        refused = idle.get(f"/v1/jobs/{job.id}/report")
+    assert problem_of(refused, 404)["name"] == job.id
 
 
 def test_episodes_without_measuring_are_refused(client: TestClient) -> None:
