@@ -17,6 +17,8 @@ from app.errors import InvalidInput
 
 PREFIX = "TANDEM_"
 MIN_TOKEN_LENGTH = 16
+MAX_KEPT = 2**31 - 1
+"""Greatest number of jobs or states to keep; every database takes it in a query."""
 _TOKEN = re.compile(r"[!-~]([ -~]*[!-~])?")
 """A token that arrives in a header as it was sent."""
 
@@ -53,11 +55,15 @@ class Settings(BaseSettings):
     )
     log: Literal["text", "json"] = Field("text", description="Form of the log's lines.")
     keep_jobs: int = Field(
-        1000, ge=1, description="Ended jobs to keep; older ones are deleted with their files."
+        1000,
+        ge=1,
+        le=MAX_KEPT,
+        description="Ended jobs to keep; older ones are deleted with their files.",
     )
     keep_states: int = Field(
         5,
         ge=0,
+        le=MAX_KEPT,
         description="Jobs that can be resumed, the newest that were cancelled, failed or were "
         "ended by a budget.",
     )
@@ -75,6 +81,18 @@ class Settings(BaseSettings):
         if isinstance(value, str) and (not value.strip() or value.startswith("~")):
             rule = "must be the path of a folder, without ~, which only a shell replaces"
             raise PydanticCustomError("folder", rule)
+        return value
+
+    @field_validator("data")
+    @classmethod
+    def check_path(cls, value: Path) -> Path:
+        """Refuse a folder behind a loop of links, and one whose path is no UTF-8."""
+        try:
+            str(value.resolve()).encode()
+        except RuntimeError:
+            raise PydanticCustomError("folder", "must not be a link to itself") from None
+        except UnicodeEncodeError:
+            raise PydanticCustomError("folder", "must be a path in UTF-8") from None
         return value
 
     @property

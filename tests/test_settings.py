@@ -1,3 +1,4 @@
+import os
 from pathlib import Path
 
 import pytest
@@ -20,6 +21,8 @@ def no_settings(monkeypatch: pytest.MonkeyPatch) -> None:
         "ROOT_PATH",
         "RAY",
         "WORKER_URL",
+        "KEEP_JOBS",
+        "KEEP_STATES",
     ):
         monkeypatch.delenv(f"TANDEM_{name}", raising=False)
 
@@ -36,6 +39,20 @@ def test_database_lies_in_the_data_folder_whatever_its_name(tmp_path: Path, name
     data.mkdir()
     store = Store(load_settings(data=data).database)
     assert store.sqlite_path == Store(store.url).sqlite_path == data.resolve() / "tandem.db"
+
+
+def test_data_folder_that_is_a_link_to_itself_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "loop").symlink_to(tmp_path / "loop")
+    with pytest.raises(InvalidInput, match="TANDEM_DATA = .*loop' .* must not be a link to"):
+        load_settings(data=str(tmp_path / "loop"))
+
+
+def test_data_folder_behind_a_link_whose_name_is_no_text_is_refused(tmp_path: Path) -> None:
+    folder = os.fsdecode(os.fsencode(tmp_path) + b"/data-\xff")
+    os.mkdir(folder)
+    (tmp_path / "link").symlink_to(folder)
+    with pytest.raises(InvalidInput, match="TANDEM_DATA = .*link' .* must be a path in UTF-8"):
+        load_settings(data=str(tmp_path / "link"))
 
 
 def test_variables_are_read(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
@@ -56,7 +73,9 @@ def test_command_line_wins_over_the_environment(monkeypatch: pytest.MonkeyPatch)
     ("name", "values", "named"),
     [
         ("TANDEM_PORT", ("abc", "-1", "65536", ""), "TANDEM_PORT"),
-        ("TANDEM_DATA", ("", " ", "~/tandem"), "TANDEM_DATA"),
+        ("TANDEM_DATA", ("", " ", "~/tandem", "data-\udcff"), "TANDEM_DATA"),
+        ("TANDEM_KEEP_JOBS", ("0", "1e3", str(2**31), str(10**30)), "TANDEM_KEEP_JOBS"),
+        ("TANDEM_KEEP_STATES", ("-1", str(2**31), str(10**30)), "TANDEM_KEEP_STATES"),
         ("TANDEM_RAY", ("", " ", "10.0.0.5:6379 "), "TANDEM_RAY"),
         ("TANDEM_PROT", ("8130",), "TANDEM_PORT"),  # misspelt: the message has the choices
         (
