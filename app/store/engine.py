@@ -10,6 +10,7 @@ import copy
 import json
 import logging
 import math
+import os
 import sqlite3
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -44,6 +45,9 @@ The query ``?timeout=SECONDS`` of the URL sets another one. Requests end with a 
 workers and the supervisor repeat their writes for as long as it takes."""
 MAX_TIMEOUT_S = 3600.0
 """Greatest such time [s]."""
+
+MAX_PATH_BYTES = 504
+"""Longest path of a file that SQLite opens: 512 with the ending of its journal [bytes]."""
 
 WAL_SIZE_LIMIT = 64 * 1024 * 1024
 """Size to which the write-ahead log is cut after a large blob [bytes]."""
@@ -205,6 +209,8 @@ class Store:
             if explained is None:
                 raise
             raise explained from error
+        except UnicodeEncodeError as error:  # of a command line; requests are checked before
+            raise InvalidInput("text", error.object, "must be text in UTF-8") from error
 
     def _explained(self, error: DatabaseError) -> ServiceError | None:
         """Return the storage error of a driver's error; None for another kind of error."""
@@ -261,6 +267,9 @@ def _checked_url(database_url: str) -> sa.URL:
         path = Path(url.database).absolute()
         if not path.parent.is_dir():
             rule = f"must lie in a folder that exists; there is no {path.parent}"
+            raise InvalidInput("database_url", database_url, rule)
+        if (length := len(os.fsencode(path))) > MAX_PATH_BYTES:
+            rule = f"must name a file by at most {MAX_PATH_BYTES} bytes, not {length}"
             raise InvalidInput("database_url", database_url, rule)
         unknown = sorted(set(url.query) - {"timeout"})
         if unknown:

@@ -14,7 +14,7 @@ from app.store import attempts, completion, jobs, metrics
 from app.store.database.migrate import migrate
 from app.store.database.reserve import fill_reserve
 from app.store.database.size import size_of
-from app.store.engine import Store
+from app.store.engine import MAX_PATH_BYTES, Store
 from app.store.records import Claim, NewJob
 from tests.store.test_attempts import policy, resume
 from tests.support.databases import POSTGRESQL_ONLY, SQLITE_ONLY
@@ -109,6 +109,20 @@ def test_password_is_hidden_in_messages(url: str) -> None:
 def test_password_is_hidden_in_the_shown_url() -> None:
     store = Store("postgresql://me@host/x?sslmode=require&password=secret&sslpassword=secret")
     assert store.shown_url == "postgresql://me@host/x?sslmode=require"
+
+
+def test_longer_path_than_sqlite_opens_is_refused(tmp_path: Path) -> None:
+    folder = tmp_path
+    while len(str(folder)) < MAX_PATH_BYTES - 205:
+        folder /= "a" * 100
+    folder /= "b" * (MAX_PATH_BYTES - len(f"{folder}//x.db"))
+    folder.mkdir(parents=True)
+    longest = Store(f"sqlite:///{folder / 'x.db'}")
+    with longest.reading() as connection:
+        assert connection.execute(sa.text("SELECT 1")).scalar_one() == 1
+    longest.close()
+    with pytest.raises(InvalidInput, match="at most 504 bytes, not 505"):
+        Store(f"sqlite:///{folder / 'xy.db'}")
 
 
 def test_relative_path_is_made_absolute_for_workers(
@@ -275,6 +289,12 @@ def test_user_without_rights_is_named(store: Store, postgresql: PostgresqlServer
 def test_nul_is_refused_by_name(store: Store) -> None:
     with pytest.raises(InvalidInput, match="must not contain the character NUL"):
         jobs.get_job(store, "a\0b")
+
+
+def test_text_that_is_no_utf8_is_refused_by_name(store: Store) -> None:
+    """As bytes of a command line are that Python could not decode."""
+    with pytest.raises(InvalidInput, match=r"text = 'a\\udcff' must be text in UTF-8"):
+        jobs.get_job(store, "a\udcff")
 
 
 def test_error_with_a_nul_is_stored(store: Store, claim: Claim) -> None:
