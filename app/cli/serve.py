@@ -1,5 +1,8 @@
 """The commands ``serve`` and ``setup``."""
 
+import logging
+import os
+import sys
 import time
 from contextlib import closing
 from typing import Annotated
@@ -7,6 +10,8 @@ from typing import Annotated
 import typer
 
 from app.cli.options import check_kernels_kept, prepared_settings
+
+logger = logging.getLogger(__name__)
 
 
 def serve(
@@ -28,7 +33,16 @@ def serve(
 
     from app.cli.uvicorn_server import run
 
-    run(settings, sock, report=lambda line: print(line, flush=True))
+    run(settings, sock, report=print_start)
+
+
+def print_start(line: str) -> None:
+    """Print a line about the start; the service goes on where standard output takes none."""
+    try:
+        print(line, flush=True)
+    except OSError as error:  # as after `serve | head -1`
+        logger.warning("standard output takes no lines: %s", error.strerror)
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def setup() -> None:
