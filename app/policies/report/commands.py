@@ -1,10 +1,10 @@
 """Commands that measure result files."""
 
-from app.policies.checkpoints.pretrained import SAME_DECISIONS, SHA256
+from app.policies.checkpoints.pretrained import SHA256
 from app.policies.evaluation.registry import default_checkpoint
 from app.policies.evaluation.rows import Json
 
-_ALIASES = SAME_DECISIONS | {sha256: alias for alias, sha256 in SHA256.items()}
+_ALIASES = {sha256: alias for alias, sha256 in SHA256.items()}
 
 
 def command_of(result: Json) -> str:

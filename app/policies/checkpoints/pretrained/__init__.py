@@ -15,12 +15,6 @@ SHA256 = {
     "reach": "2b95d1957f4b7d51b6c5f7bb3f02a6992d64940d37505005569d532755ffa7ce",
 }
 """Names of the shipped checkpoints and their ids."""
-SAME_DECISIONS = {
-    "7569aaa1f7cafa18768f2322e93864af1f391f80ffcb0d67bf78342b6fcc91f1": "pick",
-    "a17dbf2546f79da5853fb9a92274666bc0f00108b792a71ab8057f720e34b263": "pick-monitored",
-}
-"""Ids that were shipped before, with the same actions, values and probabilities of outcomes but
-other intervals. Results that do not depend on intervals hold for what is shipped now."""
 ALIASES = tuple(SHA256)
 """Names of the shipped checkpoints."""
 
