@@ -1,5 +1,6 @@
 """Every cell's page fits its window, can be read, and obeys the keyboard."""
 
+import re
 from collections.abc import Callable, Iterator
 
 import pytest
@@ -36,6 +37,28 @@ BEYOND_THE_DOCK = """() => {
   }).map((one) => one.ariaLabel ?? one.innerText);
 }"""
 """Controls beside the scene's dock; scenarios are scrolled to on a phone."""
+
+
+TAGGED = """(() => {
+  const parse = JSON.parse;
+  const far = { field: "position.x", value: 3, low: 0, high: 1 };
+  JSON.parse = (...all) => {
+    const found = parse(...all);
+    (found?.candidates ?? []).forEach((one, i) => {
+      Object.assign(one, i % 2 ? { reachable: false } : { outside: [far] });
+    });
+    if (found?.candidates) found.chosen = null;
+    return found;
+  };
+})()"""
+"""Makes every candidate of the snapshots one that is out of reach or out of distribution."""
+
+CUT_TAGS = """() => [...document.querySelectorAll(".bar-note .tag")].filter((one) => {
+  const { right } = one.closest(".bars").getBoundingClientRect();
+  const box = one.getBoundingClientRect();
+  return box.right > right || one.scrollWidth > one.clientWidth || box.height > 28;
+}).map((one) => one.innerText)"""
+"""Tags beside the values that leave their row."""
 
 
 @pytest.fixture(params=cell_names())
@@ -96,6 +119,16 @@ def test_buttons_without_a_text_have_a_name_and_a_hint(open_page: Callable[..., 
     bare = page.evaluate(BARE_BUTTONS)
     assert bare["icons"] > 6
     assert bare["faults"] == []
+
+
+def test_tags_of_candidates_stay_in_their_rows(open_page: Callable[..., Page]) -> None:
+    page = open_page(DESKTOPS[0], scene=False)
+    page.evaluate(TAGGED)
+    expect(page.locator(".tag-warn").first).to_be_visible()
+    expect(page.locator(".bar-head")).to_have_text(re.compile("Q *success *time"))
+    for width in (1440, 1024, PHONE[0]):
+        page.set_viewport_size({"width": width, "height": 800})
+        assert page.evaluate(CUT_TAGS) == [], width
 
 
 @pytest.mark.usefixtures("shown")

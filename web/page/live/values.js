@@ -30,6 +30,8 @@ export function Values({ world, cell, history, colourOf, labelOf }) {
     ${rows.length === 0
       ? html`<p class="empty">No candidates. Choose at least one goal below the scene.</p>`
       : html`<ul class="bars">
+          <li class="bar-head" aria-hidden="true"><span>Q</span>
+            ${rows.some((c) => Number.isFinite(c.success)) && html`<span>success</span><span>time</span>`}</li>
           ${rows.map((c) => html`<${Bar} key=${c.id} candidate=${c} chosen=${chosen}
             isChosen=${c.id === world.chosen} colour=${colourOf(c.id)} label=${labelOf(c.id)}
             rank=${rankOf(c, rows)} scale=${scale} />`)}
@@ -73,11 +75,11 @@ function Bar({ candidate, chosen, isChosen, colour, label, rank, scale }) {
       <i class="bar-zero" style=${{ left: `${zero}%` }}></i>
       <i class="bar-fill" style=${bar}></i>
     </span>
-    <span class="bar-value">${format.value(value)}</span>
+    <span class="bar-value"><span class="sr">Q </span>${format.value(value)}</span>
     <span class="bar-odds" data-role="success">${Number.isFinite(candidate.success)
-      && format.percent(candidate.success, 0)}</span>
+      && html`<span class="sr">success </span>${format.percent(candidate.success, 0)}`}</span>
     <span class="bar-odds" data-role="time">${Number.isFinite(candidate.time_s)
-      && format.seconds(candidate.time_s)}</span>
+      && html`<span class="sr">expected time </span>${format.seconds(candidate.time_s)}`}</span>
     <span class="bar-note">${note(isChosen, reachable, outside)}</span>
     <span class="tip" role="tooltip" id=${`tip-${id}`}>${explain(candidate, chosen, label)}</span>
   </li>`;
