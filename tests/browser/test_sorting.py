@@ -199,6 +199,19 @@ def test_row_of_benchmark_tasks_counts_those_of_the_cell(
     expect(row).to_have_count(0)
 
 
+def test_moves_stay_in_the_panel_at_every_width(
+    open_page: Callable[..., Page], sorting: str
+) -> None:
+    tell(sorting, {"tag": "set-goal", "towers": {"red": ["large", "small"]}})
+    page = open_page(scene=False)
+    page.wait_for_selector(".rank")
+    for width in (1440, 1180, 1024, 900):
+        page.set_viewport_size({"width": width, "height": 700})
+        wider = "(({scrollWidth: all, clientWidth: seen}) => all - seen)"
+        panel = "(document.querySelector('#panel-cell'))"
+        assert page.evaluate(wider + panel) == 0, width
+
+
 def test_sorting_page_fits_a_phone(open_page: Callable[..., Page], sorting: str) -> None:
     page = open_page(PHONE, scene=False)
     assert state(sorting)["cell"] == "sorting-e0"
