@@ -99,4 +99,10 @@ def test_visitor_adds_a_person_changes_its_size_and_plays_a_recording(
         server, lambda world: (world["people"][0]["motion"] or {}).get("t_s", 0) > 0.3
     )
     assert [one["mode"] for one in playing["people"]] == ["recorded", "auto"]
+    page.set_viewport_size({"width": 1024, "height": 560})
+    heights = "[...document.querySelectorAll('.viewer, .hero')].map((one) => one.clientHeight)"
+    whole, scene = page.evaluate(heights)
+    assert 200 < scene < whole, "the open controls scroll below the scene"
+    page.locator("[data-case]").last.scroll_into_view_if_needed()
+    expect(page.locator("[data-case]").last).to_be_in_viewport()
     assert page.problems == []  # type: ignore[attr-defined]

@@ -148,7 +148,7 @@ function Progress({ person, motion }) {
       : `${motion.t_s.toFixed(1)} of ${format.seconds(motion.duration_s)}`}</span>
     ${notes.length > 0 && html`<span class="hint" tabindex="0" data-role="motion-notes">
       ${person.outside_area ? "outside the area" : "notes"}
-      <span class="tip tip-up" role="tooltip">${notes.join(" ")}</span></span>`}`;
+      <span class="tip" role="tooltip">${notes.join(" ")}</span></span>`}`;
 }
 
 /** Sliders in percentiles of adults, with the centimetres they come to. */
