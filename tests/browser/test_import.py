@@ -1,5 +1,6 @@
 """A visitor imports a recording and states what its file does not tell."""
 
+import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from urllib.parse import parse_qs, urlsplit
@@ -51,6 +52,7 @@ def test_visitor_states_the_unit_that_a_file_leaves_open(
     expect(result).to_contain_text(
         "mixed read as: cm, y up, root's path in m, 50 frames/s, 1.7"
     )
+    expect(result).to_have_text(re.compile(r"\. [A-Z][^.]+\.$"))
     expect(page.locator('[data-role="motion"]')).to_contain_text("mixed")
     expect(page.locator('[data-role="import-error"]')).to_have_count(0)
 

@@ -92,5 +92,5 @@ function summary({ name, reading, n_runs: runs, n_artifacts: n, artifacts }) {
     reading.stature !== null && `${format.length(reading.stature)} tall`,
     `${format.count(runs, "clean run")}, ${n} cut out${n ? ` (${cutOut(artifacts)})` : ""}`,
   ].filter(Boolean);
-  return [`${name} read as: ${parts.join(", ")}.`, ...reading.notes].join(" ");
+  return [`${name} read as: ${parts.join(", ")}.`, ...reading.notes.map(format.sentence)].join(" ");
 }
