@@ -61,6 +61,9 @@ CUT_TAGS = """() => [...document.querySelectorAll(".bar-note .tag")].filter((one
 """Tags beside the values that leave their row."""
 
 
+BACKGROUND = "one => getComputedStyle(one).backgroundColor"
+
+
 @pytest.fixture(params=cell_names())
 def shown(request: pytest.FixtureRequest, server: str) -> Iterator[str]:
     """The server with one of the shipped cells."""
@@ -197,3 +200,21 @@ def test_drawn_fields_keep_the_focus_when_one_is_changed_or_removed(
     page.locator(".drawn").first.get_by_role("button").press("Enter")
     expect(page.locator(".drawn")).to_have_count(1)
     expect(page.locator(".drawn select")).to_be_focused()
+
+
+@pytest.mark.usefixtures("shown")
+def test_forced_colours_keep_what_is_chosen_apart(open_page: Callable[..., Page]) -> None:
+    page = open_page(DESKTOPS[0], scene=False)
+    page.wait_for_selector(".sentence")
+    page.emulate_media(forced_colors="active")
+    plain = page.locator('[data-action="reset"]').evaluate(BACKGROUND)
+    for chosen in (".segmented [aria-checked=true]", ".who[aria-pressed=true]"):
+        for one in page.locator(chosen).all():
+            assert one.evaluate(BACKGROUND) != plain
+    edges = page.locator("[role=tab]").evaluate_all(
+        "all => all.map((one) => getComputedStyle(one).borderBottomColor)"
+    )
+    assert len(set(edges)) == len(edges)
+    for coloured in (".who .swatch", ".shelf .block", ".meter-fill"):
+        for one in page.locator(coloured).all()[:1]:
+            assert one.evaluate(BACKGROUND) != plain
