@@ -121,6 +121,10 @@ def test_list_of_jobs_says_that_it_is_old_or_not_complete(
     expect(page.locator(".training")).to_contain_text(
         "The newest 50 are shown, and older ones that have not ended."
     )
+    for _ in range(5):
+        page.click('[data-action="older-jobs"]')
+    expect(page.locator(".job")).to_have_count(260)
+    expect(page.locator('[data-action="older-jobs"]')).to_have_count(0)
     page.unroute("**/v1/jobs?*")
     page.route("**/v1/jobs?*", lambda route: route.fulfill(status=500, body=""))
     alert = page.locator(".training .notice.bad").first

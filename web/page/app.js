@@ -34,7 +34,7 @@ const LINKS = {
 function App() {
   const cell = useCell();
   const { link, world } = cell;
-  const { jobs, error, waiting, refresh } = useJobs(link);
+  const { jobs, error, waiting, older, refresh } = useJobs(link);
   const active = (jobs ?? []).filter(isActive).length;
   const checkpoints = useCheckpoints(link, `${world?.checkpoint}:${stamp(jobs)}`, world?.cell);
   const [tab, setTab] = useState("cell");
@@ -47,9 +47,9 @@ function App() {
     const act = ({ purpose, sha256 }) =>
       cell.send({ tag: purpose === "sorting" ? "set-sorting-policy" : "set-policy", checkpoint: sha256 });
     return html`<${Guard}><${Training} link=${link} jobs=${jobs} error=${error} waiting=${waiting}
-      refresh=${refresh} cell=${cell.cell?.name} presets=${checkpoints.presets}
+      older=${older} refresh=${refresh} cell=${cell.cell?.name} presets=${checkpoints.presets}
       acting=${[acting, sortingPolicy]} onAct=${act} /></${Guard}>`;
-  }, [link, jobs, error, waiting, acting, sortingPolicy, cell.cell?.name, checkpoints.presets]);
+  }, [link, jobs, error, waiting, older, acting, sortingPolicy, cell.cell?.name, checkpoints.presets]);
   if (link === "signin") return html`<${SignIn} />`;
   return html`<div class="frame" data-link=${link}>
     <header class="topbar">

@@ -40,7 +40,7 @@ export function CheckpointCards({ link, jobs, acting, presets, protocols }) {
     <ul class="jobs">${(list ?? []).map((one) => html`<${Card} key=${one.sha256} one=${one}
       open=${open === one.sha256} chosen=${pair.includes(one.sha256)} ...${{ acting, jobs, presets, protocols }}
       onOpen=${setOpen} onChoose=${choose} onChanged=${refresh} />`)}</ul>
-    ${list?.length >= PAGE && html`<p class="faint">The newest ${PAGE} and those with an alias are
+    ${list?.length >= PAGE && html`<p class="faint list-end">The newest ${PAGE} and those with an alias are
       shown.</p>`}
   </section>`;
 }

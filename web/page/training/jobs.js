@@ -36,25 +36,34 @@ const SHA_256 = 64; // characters; a shorter name is an alias
 const TURN = "Waiting for its turn.";
 const REWARD = [{ key: "reward", label: "mean reward of an episode", colour: "accent" }];
 
-/** Newest jobs, asked for again every two seconds while the server is there; parts of others, too. */
+/**
+ * Newest jobs, asked for again every two seconds while the server is there; parts of others, too. `older`, where
+ * ended ones are left out, says how many are shown and has `more`, which adds a page of them.
+ */
 export function useJobs(link) {
-  const [state, setState] = useState({ jobs: null, error: null, waiting: null });
+  const [state, setState] = useState({ jobs: null, error: null, waiting: null, older: null });
   const refresh = useRef(() => {});
+  const pages = useRef(1);
   useEffect(() => {
     if (!answers(link)) return undefined;
     let over = false;
     const ask = inTurn(async () => {
       if (over) return;
       try {
-        const [own, all] = await Promise.all([get(`v1/jobs?part_of=none&limit=${PAGE}`), get("v1/jobs")]);
-        const older = own.next_cursor ? await Promise.all(ACTIVE.map(inState)) : [];
-        const found = [...own.items, ...all.items.filter((one) => one.part_of), ...older.flat()];
+        const [own, all] = await Promise.all([listed("", PAGE, pages.current), get("v1/jobs")]);
+        const active = own.isWhole ? [] : await Promise.all(ACTIVE.map(inState));
+        const found = [...own.items, ...all.items.filter((one) => one.part_of), ...active.flat()];
         const items = [...new Map(found.map((one) => [one.id, one])).values()];
-        if (!over) setState({ jobs: items.sort(byNumber), error: null, waiting: own.waiting });
+        const older = own.isWhole ? null : { shown: own.items.length, more };
+        if (!over) setState({ jobs: items.sort(byNumber), error: null, waiting: own.waiting, older });
       } catch (error) {
         if (!over) setState((now) => ({ ...now, error }));
       }
     });
+    const more = () => {
+      pages.current += 1;
+      return ask.run();
+    };
     refresh.current = ask.run;
     ask.run();
     const timer = setInterval(() => document.hidden || ask.isAsking() || ask.run(), POLL_MS);
@@ -68,15 +77,21 @@ export function useJobs(link) {
 
 /** The jobs of a state that are part of none, up to MOST of them. */
 async function inState(state) {
-  const found = [];
-  let cursor = "";
-  for (let n = 0; n < MAX_PAGES && cursor !== null; n += 1) {
+  return (await listed(`&state=${state}`, LONGEST_PAGE, MAX_PAGES)).items;
+}
+
+/** The first `n` pages of jobs that are part of none, whether these are all, and why none of them runs. */
+async function listed(query, limit, n) {
+  const items = [];
+  let [cursor, waiting] = ["", null];
+  for (let k = 0; k < n && cursor !== null; k += 1) {
     const after = cursor && `&cursor=${encodeURIComponent(cursor)}`;
-    const page = await get(`v1/jobs?part_of=none&state=${state}&limit=${LONGEST_PAGE}${after}`);
-    found.push(...page.items);
-    cursor = page.next_cursor;
+    const page = await get(`v1/jobs?part_of=none${query}&limit=${limit}${after}`);
+    items.push(...page.items);
+    cursor = page.next_cursor || null;
+    waiting = page.waiting;
   }
-  return found;
+  return { items, isWhole: cursor === null, waiting };
 }
 
 /** The jobs with the open one, which may be older than they are; `onGone` if it was deleted. */
@@ -120,7 +135,7 @@ export function QueueWaits({ waiting }) {
       : `Jobs are waiting: ${waiting}.`}</b> ${REMEDIES[waiting]}</span></p>`;
 }
 
-export function JobList({ jobs, error, onNew, ...rest }) {
+export function JobList({ jobs, error, older, onNew, ...rest }) {
   const fault = error
     && html`<${Alert}>${format.sentence(`The jobs could not be loaded: ${error.message}`)} Trying
       again every ${POLL_MS / 1000} s.</${Alert}>`;
@@ -138,9 +153,11 @@ export function JobList({ jobs, error, onNew, ...rest }) {
     ${listed.map((job) => html`<${Job} key=${job.id} job=${job} jobs=${jobs} ...${rest}
       open=${rest.open === job.id} />`)}
   </ul>
-  ${own >= PAGE && html`<p class="faint">
-    ${`The newest ${PAGE} are shown, and older ones that have not ended${
-      own >= MOST ? `, up to ${MOST} of a state` : ""}.`}</p>`}`;
+  ${older && html`<p class="faint list-end">
+    ${`The newest ${older.shown} are shown, and older ones that have not ended${
+      own >= MOST ? `, up to ${MOST} of a state` : ""}.`}
+    ${" "}<button type="button" class="text-button" data-action="older-jobs"
+      onClick=${older.more}>Show ${PAGE} more</button></p>`}`;
 }
 
 function Job({ job, jobs, open, chosen, onChoose, ...rest }) {

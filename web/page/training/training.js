@@ -16,7 +16,7 @@ import { TrainForm } from "./trainform.js";
 const KINDS = { train: ["Training", TrainForm], evaluate: ["Evaluation", EvaluateForm],
   sweep: ["Sweep", SweepForm], report: ["Report", ReportForm] };
 
-export function Training({ link, cell, presets, jobs: newest, error, waiting, refresh, acting, onAct }) {
+export function Training({ link, cell, presets, jobs: newest, error, waiting, older, refresh, acting, onAct }) {
   const protocols = useItems(link, "v1/protocols");
   const section = useListFocus();
   const [form, setForm] = useState(null);
@@ -61,7 +61,7 @@ export function Training({ link, cell, presets, jobs: newest, error, waiting, re
       ${compared && html`<${Comparison} ids=${compared} presets=${presets}
         onClose=${() => setCompared(null)} />`}
       <${QueueWaits} waiting=${waiting} />
-      <${JobList} ...${{ jobs, presets, protocols }} error=${error} open=${open ?? null} onOpen=${setOpen}
+      <${JobList} ...${{ jobs, older, presets, protocols }} error=${error} open=${open ?? null} onOpen=${setOpen}
         onChanged=${refresh} onAct=${onAct} acting=${acting}
         chosen=${chosen} onChoose=${choose}
         onClone=${(job) => setForm({ from: job })}
