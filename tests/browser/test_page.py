@@ -172,6 +172,19 @@ def test_tabs_obey_the_arrow_keys(open_page: Callable[..., Page]) -> None:
     expect(page.locator("#panel-training")).to_be_visible()
 
 
+def test_address_names_the_open_tab(open_page: Callable[..., Page]) -> None:
+    page = open_page(scene=False)
+    page.click("#tab-training")
+    page.reload()
+    training = page.locator("#tab-training")
+    expect(training).to_have_attribute("aria-selected", "true")
+    expect(page.locator("#panel-training .card").first).to_be_visible()
+    page.go_back()
+    expect(training).to_have_attribute("aria-selected", "false")
+    page.go_forward()
+    expect(training).to_have_attribute("aria-selected", "true")
+
+
 def test_page_fits_a_phone(open_page: Callable[..., Page]) -> None:
     page = open_page(PHONE, scene=False)
     wide = page.evaluate("document.documentElement.scrollWidth")

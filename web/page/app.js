@@ -37,7 +37,7 @@ function App() {
   const { jobs, error, waiting, older, refresh } = useJobs(link);
   const active = (jobs ?? []).filter(isActive).length;
   const checkpoints = useCheckpoints(link, `${world?.checkpoint}:${stamp(jobs)}`, world?.cell);
-  const [tab, setTab] = useState("cell");
+  const [tab, setTab] = useTab();
   const roomy = useMedia("(min-width: 1760px)");
   const visited = useRef(false);
   visited.current ||= roomy || tab === "training";
@@ -160,6 +160,23 @@ function useLate(on) {
     return () => clearTimeout(timer);
   }, [on]);
   return on && late;
+}
+
+const ADDRESSES = { cell: "#decision", training: "#training" };
+
+/** The open tab, which the address names: it stays when the page is loaded again, and the browser goes back to it. */
+function useTab() {
+  const named = () => (location.hash === ADDRESSES.training ? "training" : "cell");
+  const [tab, setTab] = useState(named);
+  useEffect(() => {
+    const look = () => setTab(named());
+    addEventListener("hashchange", look);
+    return () => removeEventListener("hashchange", look);
+  }, []);
+  return [tab, (next) => {
+    if (next !== tab) location.hash = ADDRESSES[next];
+    setTab(next);
+  }];
 }
 
 function Tabs({ tab, onTab, active }) {
