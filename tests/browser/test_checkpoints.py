@@ -54,6 +54,14 @@ def test_alias_is_added_and_removed(open_page: Callable[..., Page], server: str)
     assert patient_http.get(f"{server}/v1/aliases/{NAME}").status_code == 404
 
 
+def test_alias_that_has_no_route_is_refused_by_its_rule(open_page: Callable[..., Page]) -> None:
+    page = opened(open_page, "reach")
+    page.fill("[data-role=alias]", "line 3/left")
+    page.click("[data-action=alias]")
+    fault = page.locator(f"{card('reach')} .field-error")
+    expect(fault).to_contain_text("An alias has 1 to 64 of the characters a-z 0-9 . _ -")
+
+
 def test_shipped_checkpoint_says_so_and_keeps_its_alias(open_page: Callable[..., Page]) -> None:
     page = opened(open_page, "reach")
     expect(page.locator(f"{card('reach')} .job-sub")).to_have_text(

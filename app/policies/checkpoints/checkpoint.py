@@ -38,6 +38,7 @@ RANGE_SIZES: Mapping[str, Mapping[str, int]] = {
     SORTING: {},
 }
 """Groups of the training range of each purpose, and their numbers of values."""
+_PREFIX = "Error while deserializing: "
 REQUIRED = {
     "format": str,
     "kind": str,
@@ -77,7 +78,8 @@ class TensorFile:
         try:
             return load_tensors(self.tensors)
         except SafetensorError as error:
-            raise InvalidInput("tensors", str(error), "must be a safetensors file") from error
+            rule = f"must be a safetensors file ({str(error).removeprefix(_PREFIX)})"
+            raise InvalidInput("tensors", f"<{len(self.tensors)} bytes>", rule) from error
         except KeyError as error:  # bfloat16 and types of 8 bits
             kind = str(error.args[0])
             raise InvalidInput("tensors", kind, "is a type that is not read", REAL) from None

@@ -11,6 +11,10 @@ import { useListFocus } from "../listfocus.js";
 import { measuresOf } from "./measures.js";
 import { PAGE, storedCheckpoints } from "./checkpoints.js";
 
+/** Names that the service takes, but for those of 64 hexadecimal digits; others, such as with a slash, have no route. */
+const ALIAS = /^[a-z0-9][a-z0-9._-]{0,63}$/;
+const ALIAS_RULE = "An alias has 1 to 64 of the characters a-z 0-9 . _ - and starts with a-z or 0-9.";
+
 /** The section of the checkpoints; `acting` are the SHA-256 of those of the live cell. */
 export function CheckpointCards({ link, jobs, acting, presets, protocols }) {
   const section = useListFocus();
@@ -136,7 +140,10 @@ function Aliases({ one, onChanged }) {
   });
   const add = (event) => {
     event.preventDefault();
-    run(() => put(`v1/aliases/${encodeURIComponent(name.trim())}`, { checkpoint: one.sha256 }));
+    run(() => {
+      if (!ALIAS.test(name.trim())) throw new Error(ALIAS_RULE);
+      return put(`v1/aliases/${encodeURIComponent(name.trim())}`, { checkpoint: one.sha256 });
+    });
   };
   return html`<form class="job-actions" onSubmit=${add} aria-label="Aliases">
     ${one.shipped.map((alias) => html`<span class="chip" key=${alias}
