@@ -97,8 +97,8 @@ export function seconds(t) {
 export function ago(iso, now = serverTime()) {
   if (!iso) return "";
   const past = (now - Date.parse(iso)) / 1000;
-  if (past >= 2 * DAY_S) return `${Math.floor(past / DAY_S)} days ago`;
-  return past < 5 ? "just now" : `${duration(past).replace(/ \d\d\ss$/, "")} ago`;
+  if (past >= 2 * DAY_S) return `${Math.floor(past / DAY_S)}${NB}days${NB}ago`;
+  return past < 5 ? "just now" : `${duration(past).replace(/ \d\d\ss$/, "")}${NB}ago`;
 }
 
 /** A plain number with at most `digits` significant digits; whole ones in groups from 10 000 on. */

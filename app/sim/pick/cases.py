@@ -55,8 +55,8 @@ CASES = (
         id="case-1",
         title="Nearer, unobstructed",
         text=(
-            "A hand rests beside cube 4; both cubes can be reached, and the robot should take "
-            "cube 4 from the start: it is nearer, and the path does not cross the person."
+            "A hand rests beside Cube 4; both cubes can be reached, and the robot should take "
+            "Cube 4 from the start: it is nearer, and the path does not cross the person."
         ),
         robot_start="cube5",
         goals=("cube0", "cube4"),
@@ -72,7 +72,7 @@ CASES = (
         id="case-2",
         title="Farther, clear of the hand",
         text=(
-            "The right hand stays on cube 2, the nearer goal; the robot should end at cube 0, "
+            "The right hand stays on Cube 2, the nearer goal; the robot should end at Cube 0, "
             "the farther and free one."
         ),
         robot_start="cube3",
@@ -86,8 +86,8 @@ CASES = (
         id="case-3",
         title="Blocked for a while",
         text=(
-            "The left arm moves from cube 4 to dock 1 across cube 3, the nearer goal; the "
-            "robot should switch while cube 3 is blocked, and end there."
+            "The left arm moves from Cube 4 to Dock 1 across Cube 3, the nearer goal; the "
+            "robot should switch while Cube 3 is blocked, and end there."
         ),
         robot_start="cube5",
         goals=("cube1", "cube3"),
@@ -102,8 +102,8 @@ CASES = (
         id="case-4",
         title="Single switch, no oscillation",
         text=(
-            "The left arm moves from cube 0 to cube 4, the nearer goal; the robot should "
-            "start for cube 4, switch to cube 1 and stay with it."
+            "The left arm moves from Cube 0 to Cube 4, the nearer goal; the robot should "
+            "start for Cube 4, switch to Cube 1 and stay with it."
         ),
         robot_start="cube5",
         goals=("cube1", "cube4"),

@@ -245,7 +245,7 @@ TESTS: tuple[SortingTest, ...] = (
     SortingTest(
         name="test-1",
         title="Sort five blocks",
-        text="Five blocks lie about; all of them shall be sorted.",
+        text="Five blocks lie in clutter slots; the robot sorts all of them.",
         expected="Every block is sorted, without a contact.",
         n_objects=5,
         n_goal=5,

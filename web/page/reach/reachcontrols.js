@@ -48,7 +48,7 @@ export function ReachControls({ world, send }) {
       <${Segmented} labelledby="ahead-label" mark=${marked("ahead")} value=${ahead} items=${AHEAD}
         onPick=${(one) => ask({ ahead: one })} /></span>`}
     ${modes.includes("distance-weighted") && world.people.length > 1 && html`<span class="dock-pair">
-      <span class="dock-label dock-label-free" id="beside-label">Policy sees</span>
+      <span class="dock-label dock-label-free" id="beside-label">Observed people</span>
       <${Segmented} labelledby="beside-label" mark=${marked("beside")} value=${weighted} items=${BESIDE}
         onPick=${(one) => ask({ weighted: one })} /></span>`}</div>`}`;
 }

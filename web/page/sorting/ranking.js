@@ -112,7 +112,7 @@ export function SortingSmallPrint({ world, cell, checkpoints, jobs, send }) {
       send=${send} />
     <${Order} order=${world.sorting.order} send=${send} />
     <p class="range">${world.checkpoint
-      ? html`<span>Motions between them by ${world.policy_title ?? "checkpoint"}
+      ? html`<span>Motions by ${world.policy_title ?? "checkpoint"}
           ${" "}<code title=${world.checkpoint}>${format.short(world.checkpoint)}</code>.</span>`
       : html`<span>No policy moves the arm.</span>`}</p>
   </section>`;

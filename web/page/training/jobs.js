@@ -143,7 +143,7 @@ export function JobList({ jobs, error, older, onNew, ...rest }) {
   if (!jobs) return html`<div class="skeleton" aria-busy="true" aria-label="Loading jobs"></div>`;
   if (jobs.length === 0) {
     return html`<div class="empty">
-      <p><b>No jobs yet.</b> A training job teaches a policy from nothing, here on this machine.</p>
+      <p><b>No jobs yet.</b> A training job trains a policy from random weights.</p>
       ${onNew && html`<button type="button" class="primary" data-action="new-job" onClick=${onNew}>
         <${Icon} name="plus" />Start one</button>`}</div>`;
   }
