@@ -100,6 +100,15 @@ def test_page_fits_its_window_and_its_text_stands_out(open_page: Callable[..., P
     assert page.problems == []  # type: ignore[attr-defined]
 
 
+def test_description_of_the_interface_fits_a_phone(
+    open_page: Callable[..., Page], server: str
+) -> None:
+    page = open_page(PHONE, scene=False)
+    page.goto(f"{server}/docs")
+    page.evaluate("document.querySelectorAll('details').forEach((one) => (one.open = true))")
+    assert size_of(page)[0] == PHONE[0]
+
+
 @pytest.mark.usefixtures("shown")
 def test_controls_of_the_cell_stay_in_the_dock_at_every_width(
     open_page: Callable[..., Page],

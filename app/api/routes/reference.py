@@ -35,6 +35,8 @@ table { border-collapse: collapse; width: 100%; margin: .3rem 0 }
 td { padding: .2rem .6rem .2rem 0; vertical-align: top; border-bottom: 1px solid var(--line) }
 td:first-child { white-space: nowrap } h3 { font-size: .85rem; margin: .8rem 0 0;
   color: var(--faint); font-weight: 600 } a { color: var(--accent) }
+:is(p, td, code) { overflow-wrap: anywhere }
+@media (max-width: 48rem) { td { min-width: 5.2rem } td:first-child { white-space: normal } }
 """
 
 
