@@ -114,8 +114,8 @@ class SortingTestRun:
         self._riskier += riskier
 
     def note_visitor(self) -> None:
-        """Invalidate the test: a visitor changed blocks or goal."""
-        self._spoilt = "a visitor changed blocks or goal"
+        """Invalidate the test: a user changed blocks or goal."""
+        self._spoilt = "blocks or goal were changed by hand"
 
     def verdict(self, *, solved: bool, moves: int) -> Verdict:
         """Return expectation, observation and whether they agree."""

@@ -105,7 +105,7 @@ def test_test_that_a_visitor_changed_is_not_judged() -> None:
     changed.note_visitor()
     found = changed.verdict(solved=True, moves=5)
     assert found.as_expected is None
-    assert found.observed == "Not judged: a visitor changed blocks or goal."
+    assert found.observed == "Not judged: blocks or goal were changed by hand."
     robbed = begun("test-6")
     state = robbed.start(SHAPE, FAIL)
     empty = replace(state, clutter=np.zeros_like(state.clutter), towers=state.goal)
