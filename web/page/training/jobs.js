@@ -194,7 +194,7 @@ function stateOf(job) {
 
 /** What a job trains or evaluates. */
 function kindOf({ preset, spec, kind }, { presets, protocols }) {
-  return preset ? presetTitle(presets, preset) : protocolTitle(protocols.items, spec?.protocol) ?? kind;
+  return preset ? presetTitle(presets, preset) : protocolTitle(protocols.items, spec?.protocol) ?? format.capital(kind);
 }
 
 function titleOf(job, kind) {
@@ -212,7 +212,7 @@ function subtitle(job, jobs, kind) {
   const last = lastStep(job);
   if (isActive(job) && last) {
     const budget = last < job.total_steps ? " (budget)" : "";
-    parts.push(`${format.steps(job.step)} of ${format.steps(last)} ${unit}${budget}`);
+    parts.push(`${format.steps(job.step)} of ${format.count(last, unit.slice(0, -1))}${budget}`);
     if (job.state === "running" && job.kind === "train") {
       const left = job.time_left_s;
       if (Number.isFinite(left)) parts.push(`${format.duration(left)} left`);
