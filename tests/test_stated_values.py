@@ -8,11 +8,13 @@ import numpy as np
 import pytest
 from scipy.special import logit
 
+from app.api.problems import MAX_LISTED_ERRORS, Problem
 from app.policies.configs.pick import PICK
 from app.policies.configs.presets import PRESETS
 from app.policies.configs.sorting import SORTING_PRESETS
 from app.policies.inference.task_selection import HYSTERESIS
 from app.policies.networks.outcome import MEMBERS, N_OUT, combine
+from app.sim.mocap.faults import MAX_FAULTS
 from app.sim.sorting.kernels.reward import distance_cost
 from app.sim.sorting.near_optimal_moves import MARGIN
 from app.store.cells import MAX_CELLS
@@ -44,6 +46,14 @@ def test_the_glossary_states_the_margins_of_selections() -> None:
     glossary = rows((DOCS / "glossary.md").read_text("utf-8"))
     assert float(glossary["hysteresis"][1]) == HYSTERESIS
     assert f" {MARGIN:g} " in glossary["near-optimal move"][0]
+
+
+def test_errors_are_stated_with_the_number_that_is_listed() -> None:
+    page = " ".join((DOCS / "http.md").read_text("utf-8").split())
+    described = Problem.model_fields["errors"].description or ""
+    assert MAX_LISTED_ERRORS == MAX_FAULTS
+    assert f"faults of a body or of the parameters, at most {MAX_LISTED_ERRORS}," in page
+    assert f"at most {MAX_LISTED_ERRORS}" in described
 
 
 def test_the_method_states_the_reward_of_sorting() -> None:

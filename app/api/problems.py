@@ -102,7 +102,9 @@ class Problem(BaseModel):
     value: str | None = None
     rule: str | None = None
     choices: list[str] | None = None
-    errors: list[FaultPublic] | None = Field(None, description="all faults of a body or file")
+    errors: list[FaultPublic] | None = Field(
+        None, description="faults of a body or file, at most 20; all faults of a cell"
+    )
 
 
 def problem(
